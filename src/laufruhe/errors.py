@@ -1,0 +1,45 @@
+"""Errors that a user can act on: what, where, which rule, and the remedy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class LaufruheError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class ModelError(LaufruheError, ValueError):
+    """A machine that cannot exist or cannot run as described."""
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """One thing wrong with an input, in the order in which a user reads it."""
+
+    where: str
+    value: str
+    rule: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        shown = f" = {self.value}" if self.value else ""
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{self.where}{shown}: {self.rule}{remedy}"
+
+
+class InputError(LaufruheError, ValueError):
+    """Bad input: one line a complaint, each led by the file it stands in."""
+
+    def __init__(self, source: str, complaints: tuple[Complaint, ...]) -> None:
+        self.source = source
+        self.complaints = complaints
+        super().__init__("\n".join(f"{source}: {complaint}" for complaint in complaints))
+
+
+class UncarriedLoadError(ModelError):
+    """The engine excites a direction that no mount carries."""
+
+
+class SolverError(LaufruheError, RuntimeError):
+    """A solver stopped without an answer that can be used."""

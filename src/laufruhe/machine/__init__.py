@@ -1,0 +1,24 @@
+"""What the engine is: slider-cranks and rotors on a block on mounts, in SI (C1)."""
+
+from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
+from laufruhe.machine.gas import GasModel, PressureTrace, Seiliger, Wiebe
+from laufruhe.machine.mount import Mount
+from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
+from laufruhe.machine.slider_crank import Rod, SliderCrank
+
+__all__ = [
+    "CRANKSHAFT",
+    "Cycle",
+    "Engine",
+    "GasModel",
+    "Mount",
+    "OperatingPoint",
+    "PressureTrace",
+    "Rod",
+    "Role",
+    "Rotor",
+    "Seiliger",
+    "Shaft",
+    "SliderCrank",
+    "Wiebe",
+]

@@ -1,0 +1,125 @@
+"""The engine: a list of slider-cranks and rotors on mounts, and how it is run."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+from enum import Enum
+from fractions import Fraction
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.gas import GasModel
+from laufruhe.machine.mount import Mount
+from laufruhe.machine.rotor import Rotor, Shaft
+from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.numerics.turns import as_turn
+
+
+class Cycle(Enum):
+    """Turns of the crank in one working cycle (C6)."""
+
+    TWO_STROKE = 1
+    FOUR_STROKE = 2
+
+    @property
+    def turns(self) -> int:
+        """Crank turns a cycle."""
+        return self.value
+
+    @property
+    def angle(self) -> float:
+        """Crank angle of a cycle [rad]."""
+        return math.tau * self.value
+
+    @property
+    def base_order(self) -> Fraction:
+        """Lowest order of gas loads (C6)."""
+        return Fraction(1, self.value)
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A speed and a load.
+
+    Attributes
+    ----------
+    name
+        Unique in a problem.
+    speed
+        Crank speed [rad/s].
+    gas
+        Working gas of every cylinder; none for a motored engine.
+    weight
+        Share in a metric taken over several points.
+    """
+
+    name: str
+    speed: float
+    gas: GasModel | None = None
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Engine:
+    """Everything that moves, and what holds it.
+
+    Attributes
+    ----------
+    name
+        Of the design.
+    cycle
+        Two- or four-stroke.
+    slider_cranks
+        In the order of cylinder numbers (C3).
+    rotors
+        Unbalances on the crank and on balancer shafts.
+    mounts
+        Empty for an engine whose shaking loads alone are asked for.
+    """
+
+    name: str
+    cycle: Cycle
+    slider_cranks: tuple[SliderCrank, ...]
+    rotors: tuple[Rotor, ...] = ()
+    mounts: tuple[Mount, ...] = ()
+
+    def __post_init__(self) -> None:
+        for kind in ("slider_cranks", "rotors", "mounts"):
+            names = Counter(part.name for part in getattr(self, kind))
+            double = [name for name, count in names.items() if count > 1]
+            if double:
+                raise ModelError(f"two {kind.replace('_', '-')} are called '{double[0]}'; give each its own name")
+        for shaft in self.shafts:
+            self._check_period(shaft)
+        for part in self.slider_cranks:
+            self._check_firing(part)
+
+    def _check_period(self, shaft: Shaft) -> None:
+        if (Fraction(shaft.ratio).limit_denominator(1000) * self.cycle.turns).denominator != 1:
+            raise ModelError(
+                f"shaft '{shaft.name}' with ratio {shaft.ratio:g} does not return within the cycle of "
+                f"{self.cycle.turns} turns; use a multiple of 1/{self.cycle.turns}"
+            )
+
+    def _check_firing(self, part: SliderCrank) -> None:
+        crank_angle = part.shaft.ratio * part.firing_angle + part.throw - part.bank
+        if abs(math.remainder(crank_angle, math.tau)) > 1e-9:
+            raise ModelError(
+                f"{part.name} fires at {math.degrees(part.firing_angle):g} deg, "
+                f"{math.degrees(math.remainder(crank_angle, math.tau)):g} deg from its dead centre"
+            )
+
+    @property
+    def shafts(self) -> tuple[Shaft, ...]:
+        """Every shaft that something turns with, in order of first use."""
+        used = [part.shaft for part in self.slider_cranks] + [rotor.shaft for rotor in self.rotors]
+        return tuple(dict.fromkeys(used))
+
+    @property
+    def firing_intervals(self) -> tuple[float, ...]:
+        """Crank angles from each firing to the next over a cycle [rad]."""
+        whole = self.cycle.turns
+        turns = sorted(as_turn(part.firing_angle) % whole for part in self.slider_cranks)
+        following = [*turns[1:], turns[0] + whole] if turns else []
+        return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))

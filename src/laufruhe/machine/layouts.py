@@ -1,0 +1,293 @@
+"""Engine layouts: lists of slider-cranks built from what engineers say of them.
+
+Cylinders are counted from the front (C3). In a vee and a boxer the left bank, leaning
+to +y, has numbers 1 to n/2 and the right bank the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.engine import Cycle
+from laufruhe.machine.rotor import Role, Rotor
+from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.numerics.turns import Turn, angle_of, as_turn, cis
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """What all cylinders of an engine share.
+
+    Attributes
+    ----------
+    crank_radius, rod_length, offset, bore
+        [m]; see `SliderCrank`.
+    reciprocating_mass
+        Per cylinder [kg].
+    rotating_mass
+        Per throw, at the crank radius [kg].
+    rod_rotating_mass
+        The rod's share per cylinder [kg].
+    rod_inertia_deficit
+        [kg m2] (eq. 10).
+    """
+
+    crank_radius: float
+    rod_length: float
+    reciprocating_mass: float
+    rotating_mass: float = 0.0
+    rod_rotating_mass: float = 0.0
+    rod_inertia_deficit: float = 0.0
+    offset: float = 0.0
+    bore: float | None = None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where cylinders and throws are, without their masses.
+
+    Attributes
+    ----------
+    positions, banks
+        Place along x [m] and bank angle [rad] of every cylinder.
+    pins
+        Index of the throw that every cylinder works on.
+    pin_offsets
+        Angle of a cylinder's own pin from its throw [rad], for split pins.
+    throw_positions
+        Place along x of every throw [m].
+    """
+
+    name: str
+    positions: tuple[float, ...]
+    banks: tuple[float, ...]
+    pins: tuple[int, ...]
+    pin_offsets: tuple[float, ...]
+    throw_positions: tuple[float, ...]
+
+
+def stations(count: int, spacing: float) -> tuple[float, ...]:
+    """`count` places a `spacing` apart, the first at the front, the middle at x = 0 (C2)."""
+    return tuple((count - 1 - 2 * k) * (0.5 * spacing) for k in range(count))
+
+
+def inline(cylinders: int, spacing: float) -> Layout:
+    """One bank, upright."""
+    places = stations(cylinders, spacing)
+    none = (0.0,) * cylinders
+    return Layout("inline", places, none, tuple(range(cylinders)), none, places)
+
+
+def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.0, bank_stagger: float = 0.0) -> Layout:
+    """Two banks on shared or split pins.
+
+    Parameters
+    ----------
+    cylinders
+        Even number.
+    spacing
+        Between throws [m].
+    bank_angle
+        Between the banks [rad].
+    split_pin
+        Angle by which the right bank's pin leads the left bank's on one throw [rad].
+    bank_stagger
+        Distance by which the left bank stands forward of the right one [m].
+    """
+    _even(cylinders, "a vee")
+    throws = cylinders // 2
+    places = stations(throws, spacing)
+    half = 0.5 * bank_stagger
+    return Layout(
+        "vee",
+        tuple(x + half for x in places) + tuple(x - half for x in places),
+        (0.5 * bank_angle,) * throws + (-0.5 * bank_angle,) * throws,
+        (*range(throws), *range(throws)),
+        (-0.5 * split_pin,) * throws + (0.5 * split_pin,) * throws,
+        places,
+    )
+
+
+def boxer(cylinders: int, spacing: float, bank_stagger: float) -> Layout:
+    """Banks at 180 degrees, every cylinder on a throw of its own, opposed pistons in step.
+
+    Parameters
+    ----------
+    spacing
+        Between neighbours of one bank [m].
+    bank_stagger
+        Distance by which a left cylinder stands forward of its opposite [m].
+    """
+    _even(cylinders, "a boxer")
+    half = 0.5 * bank_stagger
+    centres = stations(cylinders // 2, spacing)
+    left, right = tuple(x + half for x in centres), tuple(x - half for x in centres)
+    quarter = 0.5 * math.pi
+    count = cylinders // 2
+    places = left + right
+    return Layout(
+        "boxer", places, (quarter,) * count + (-quarter,) * count, tuple(range(cylinders)), (0.0,) * cylinders, places
+    )
+
+
+def _even(cylinders: int, what: str) -> None:
+    if cylinders < 2 or cylinders % 2:
+        raise ModelError(f"{what} needs an even number of cylinders, got {cylinders}")
+
+
+def firing_angles(
+    cycle: Cycle, layout: Layout, throws: Sequence[float], firing_order: Sequence[int]
+) -> tuple[float, ...]:
+    """Crank angle at which every cylinder fires [rad], each at the first dead centre after the one before.
+
+    Raises
+    ------
+    ModelError
+        If these throws cannot fire in this order within one cycle.
+    """
+    previous: Turn = Fraction(-1, 10**9)
+    angles = [0.0] * len(layout.positions)
+    start: Turn | None = None
+    for number in firing_order:
+        k = number - 1
+        centre = _dead_centre(layout, throws, k) % 1
+        while centre <= previous:
+            centre += 1
+        start = centre if start is None else start
+        if centre >= start + cycle.turns:
+            raise ModelError(
+                f"throws {[round(math.degrees(t), 3) for t in throws]} deg cannot fire in the order "
+                f"{list(firing_order)} within {cycle.turns} turn(s): cylinder {number} would come after "
+                f"{math.degrees(angle_of(centre)):.6g} deg"
+            )
+        angles[k] = angle_of(centre)
+        previous = centre
+    return tuple(angles)
+
+
+def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tuple[float, ...]:
+    """Angles of the throws that fire evenly in this order, from cylinder 1's dead centre at phi = 0.
+
+    Raises
+    ------
+    ModelError
+        If cylinders on one throw ask for two different angles.
+    """
+    step = Fraction(cycle.turns, len(firing_order))
+    asked: dict[int, Turn] = {}
+    for place, number in enumerate(firing_order):
+        k = number - 1
+        turn = (as_turn(layout.banks[k]) - as_turn(layout.pin_offsets[k]) - place * step) % 1
+        first = asked.setdefault(layout.pins[k], turn)
+        if abs(math.remainder(float(first - turn), 1.0)) > 1e-9:
+            raise ModelError(
+                f"firing order {list(firing_order)} cannot be even with these pins and banks: cylinder {number} "
+                f"wants its throw at {math.degrees(angle_of(turn)):.6g} deg, another on it at "
+                f"{math.degrees(angle_of(first)):.6g} deg; give the throws"
+            )
+    return tuple(angle_of(asked[pin]) for pin in range(len(layout.throw_positions)))
+
+
+def _dead_centre(layout: Layout, throws: Sequence[float], k: int) -> Turn:
+    """Crank angle of cylinder k's dead centre as a part of a turn: alpha = 0 (C5)."""
+    return as_turn(layout.banks[k]) - as_turn(layout.pin_offsets[k]) - as_turn(throws[layout.pins[k]])
+
+
+@dataclass(frozen=True)
+class Throw:
+    """One throw of the crankshaft.
+
+    Attributes
+    ----------
+    x
+        Place along the crank axis [m].
+    angle
+        At phi = 0 [rad] (C3).
+    cylinders
+        Indices of the slider-cranks that work on it.
+    unbalance
+        Of its rotating mass, rods not included [kg m].
+    """
+
+    x: float
+    angle: float
+    cylinders: tuple[int, ...]
+    unbalance: complex = 0.0
+
+
+def throw_rotors(throws: Sequence[Throw]) -> tuple[Rotor, ...]:
+    """The rotating masses of the throws."""
+    return tuple(
+        Rotor(f"throw {k + 1}", throw.x, throw.unbalance, role=Role.THROW)
+        for k, throw in enumerate(throws)
+        if throw.unbalance != 0.0
+    )
+
+
+def build(
+    cycle: Cycle,
+    layout: Layout,
+    mechanism: Mechanism,
+    angles: Sequence[float],
+    firing_order: Sequence[int] | None = None,
+) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
+    """Slider-cranks and the throws that they work on.
+
+    Parameters
+    ----------
+    cycle
+        Two- or four-stroke.
+    layout
+        Places, banks and pins.
+    mechanism
+        What every cylinder shares.
+    angles
+        Angle of every throw when phi = 0 [rad] (C3).
+    firing_order
+        Cylinder numbers; without it every cylinder is taken to fire at its first dead
+        centre, which matters to gas loads alone.
+
+    Raises
+    ------
+    ModelError
+        If the order cannot be met by the throws.
+    """
+    if len(angles) != len(layout.throw_positions):
+        raise ModelError(f"{len(angles)} throw(s) given where the layout has {len(layout.throw_positions)}")
+    cylinders = range(len(layout.positions))
+    fires = (
+        firing_angles(cycle, layout, angles, firing_order)
+        if firing_order
+        else tuple(angle_of(_dead_centre(layout, angles, k) % 1) for k in cylinders)
+    )
+    slider_cranks = tuple(
+        SliderCrank(
+            name=f"cylinder {k + 1}",
+            x=layout.positions[k],
+            crank_radius=mechanism.crank_radius,
+            rod_length=mechanism.rod_length,
+            reciprocating_mass=mechanism.reciprocating_mass,
+            throw=angles[layout.pins[k]] + layout.pin_offsets[k],
+            bank=layout.banks[k],
+            offset=mechanism.offset,
+            rotating_mass=mechanism.rod_rotating_mass,
+            rod_inertia_deficit=mechanism.rod_inertia_deficit,
+            bore=mechanism.bore,
+            firing_angle=fires[k],
+        )
+        for k in cylinders
+    )
+    throws = tuple(
+        Throw(
+            x,
+            angles[pin],
+            tuple(k for k in cylinders if layout.pins[k] == pin),
+            mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angles[pin])),
+        )
+        for pin, x in enumerate(layout.throw_positions)
+    )
+    return slider_cranks, throws

@@ -1,0 +1,174 @@
+"""Piston, rod and throw: the one mechanism of every piston engine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.rotor import CRANKSHAFT, Shaft
+from laufruhe.numerics.turns import Turn, as_turn
+
+
+@dataclass(frozen=True)
+class Rod:
+    """Connecting rod as a rigid body.
+
+    Attributes
+    ----------
+    length
+        Between the pins [m].
+    mass
+        [kg].
+    centre_of_gravity
+        Distance from the crank pin, on the line of the pins [m].
+    inertia
+        About the centre of gravity, across the plane of motion [kg m2].
+    """
+
+    length: float
+    mass: float
+    centre_of_gravity: float
+    inertia: float
+
+    @property
+    def reciprocating_mass(self) -> float:
+        """Share of the piston pin: two masses keep mass and centre of gravity (eq. 9)."""
+        return self.mass * self.centre_of_gravity / self.length
+
+    @property
+    def rotating_mass(self) -> float:
+        """Share of the crank pin."""
+        return self.mass - self.reciprocating_mass
+
+    @property
+    def inertia_deficit(self) -> float:
+        """Theta - m1 s1^2 - m2 s2^2 [kg m2], what two masses get wrong (eqs. 9, 10)."""
+        return self.inertia - self.mass * self.centre_of_gravity * (self.length - self.centre_of_gravity)
+
+
+@dataclass(frozen=True)
+class SliderCrank:
+    """One cylinder's mechanism.
+
+    Attributes
+    ----------
+    name
+        Unique in an engine.
+    x
+        Place along the crank axis [m].
+    crank_radius
+        Throw r [m].
+    rod_length
+        Between the pins, l [m]; infinite for a Scotch yoke.
+    reciprocating_mass
+        Piston, pin, and the rod's share [kg].
+    throw
+        Angle theta of the crank pin when phi = 0 [rad] (C3).
+    bank
+        Angle beta of the cylinder axis [rad] (C5).
+    offset
+        Distance e of the pin's path from the crank axis, positive towards +i e^{i beta} [m].
+    rotating_mass
+        The rod's share at the crank pin [kg].
+    rod_inertia_deficit
+        True inertia of the rod less that of its two masses [kg m2] (eq. 10).
+    bore
+        Piston diameter [m]; needed with gas only.
+    firing_angle
+        Crank angle phi at which this cylinder fires [rad], within the cycle (C5).
+    shaft
+        The crankshaft that it works on.
+    """
+
+    name: str
+    x: float
+    crank_radius: float
+    rod_length: float
+    reciprocating_mass: float
+    throw: float = 0.0
+    bank: float = 0.0
+    offset: float = 0.0
+    rotating_mass: float = 0.0
+    rod_inertia_deficit: float = 0.0
+    bore: float | None = None
+    firing_angle: float = 0.0
+    shaft: Shaft = CRANKSHAFT
+
+    def __post_init__(self) -> None:
+        if not self.crank_radius > 0.0:
+            raise ModelError(f"{self.name}: crank radius {self.crank_radius} m must be positive")
+        if not self.rod_length > 0.0:
+            raise ModelError(f"{self.name}: rod length {self.rod_length} m must be positive")
+        if self.reciprocating_mass < 0.0 or self.rotating_mass < 0.0:
+            raise ModelError(f"{self.name}: masses must not be negative")
+        if math.isinf(self.rod_length) and self.offset != 0.0:
+            raise ModelError(f"{self.name}: an offset means nothing with an infinite rod")
+        if self.rod_ratio + abs(self.offset_ratio) >= 1.0:
+            raise ModelError(
+                f"{self.name}: the crank cannot turn, (r + |e|) / l = "
+                f"{self.rod_ratio + abs(self.offset_ratio):.4g} must be under 1"
+            )
+
+    @property
+    def rod_ratio(self) -> float:
+        """lambda = r / l."""
+        return self.crank_radius / self.rod_length
+
+    @property
+    def offset_ratio(self) -> float:
+        """epsilon = e / l."""
+        return self.offset / self.rod_length
+
+    @property
+    def star_turn(self) -> Turn:
+        """theta - beta as a part of a turn: the local crank angle at phi = 0 (C5)."""
+        return as_turn(self.throw) - as_turn(self.bank)
+
+    @property
+    def piston_area(self) -> float:
+        """Area the gas acts on [m2]."""
+        if self.bore is None:
+            raise ModelError(f"{self.name}: gas forces need a bore")
+        return math.pi * self.bore**2 / 4.0
+
+    @property
+    def stroke(self) -> float:
+        """Distance between the dead centres [m]; with an offset a little over 2 r."""
+        if math.isinf(self.rod_length):
+            return 2.0 * self.crank_radius
+        e2 = self.offset**2
+        top = math.sqrt((self.rod_length + self.crank_radius) ** 2 - e2)
+        bottom = math.sqrt((self.rod_length - self.crank_radius) ** 2 - e2)
+        return 4.0 * self.rod_length * self.crank_radius / (top + bottom)
+
+
+def radius_for_stroke(
+    stroke: float, offset: float, *, rod_length: float | None = None, rod_ratio: float = 0.0
+) -> float:
+    """Crank radius [m] that makes a stroke [m], at a given rod length or rod ratio.
+
+    Squaring stroke = sqrt((l + r)^2 - e^2) - sqrt((l - r)^2 - e^2) twice leaves an
+    equation linear in r^2 for a given l, and quadratic for a given r / l.
+
+    Raises
+    ------
+    ModelError
+        If no crank with this rod turns through this stroke.
+    """
+    s2, e2 = stroke * stroke, offset * offset
+    if offset == 0.0:
+        return 0.5 * stroke
+    if rod_length is not None and math.isfinite(rod_length):
+        l2 = rod_length * rod_length
+        square = s2 * (4.0 * (l2 - e2) - s2) / (4.0 * (4.0 * l2 - s2)) if 4.0 * l2 > s2 else -1.0
+    else:
+        k2 = rod_ratio * rod_ratio
+        root = (s2 * (1.0 + k2)) ** 2 - 4.0 * k2 * s2 * (4.0 * e2 + s2)
+        square = (s2 * (1.0 + k2) + math.sqrt(root)) / 8.0 if root >= 0.0 else -1.0
+    if square <= 0.0:
+        raise ModelError(
+            f"no crank makes a stroke of {stroke * 1e3:.6g} mm with an offset of {offset * 1e3:.6g} mm on this rod; "
+            "lengthen the rod or lessen the offset"
+        )
+    return math.sqrt(square)

@@ -1,0 +1,1 @@
+"""Mathematics without engines: exact turns, spectra, sampling."""

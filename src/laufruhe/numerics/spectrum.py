@@ -1,0 +1,119 @@
+"""Periodic signals by their complex coefficients per order (C8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import reduce
+from math import gcd, lcm
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """f(phi) = Re sum_j c_j e^{i j b phi}, b the lowest order (C8).
+
+    Attributes
+    ----------
+    base
+        The lowest order b: 1 for a period of one turn, 1/2 for a four-stroke cycle.
+    coefficients
+        Shape (n, ...): c_j of order j b, j = 0 ... n-1, of a signal of any shape.
+    """
+
+    base: Fraction
+    coefficients: NDArray[np.complex128]
+
+    @property
+    def orders(self) -> NDArray[np.float64]:
+        """Orders of the coefficients, multiples of crank speed."""
+        return np.asarray(np.arange(len(self.coefficients)) * float(self.base))
+
+    def at(self, order: float) -> NDArray[np.complex128]:
+        """Coefficient of one order; zero where the signal holds none."""
+        index = Fraction(order).limit_denominator(1000) / self.base
+        if index.denominator == 1 and 0 <= index < len(self.coefficients):
+            return np.asarray(self.coefficients[int(index)])
+        return np.zeros(self.coefficients.shape[1:], dtype=complex)
+
+    def sample(self, samples: int) -> NDArray[np.float64]:
+        """Values at `samples` equal steps over one period 2 pi / b, shape (samples, ...).
+
+        Orders above half the number of samples are folded, not dropped: every
+        value is that of the whole series at its angle.
+        """
+        folded = np.zeros((samples, *self.coefficients.shape[1:]), dtype=complex)
+        for start in range(0, len(self.coefficients), samples):
+            block = self.coefficients[start : start + samples]
+            folded[: len(block)] += block
+        return np.asarray((np.fft.ifft(folded, axis=0) * samples).real)
+
+    def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at any crank angles [rad], shape (len(angles), ...)."""
+        waves = np.exp(1j * np.outer(angles, self.orders))
+        return np.asarray(np.tensordot(waves, self.coefficients, axes=(1, 0)).real)
+
+    def rebased(self, base: Fraction) -> Self:
+        """The same signal counted in a finer lowest order."""
+        factor = self.base / base
+        if factor.denominator != 1:
+            raise ValueError(f"{base} does not divide {self.base}")
+        if factor == 1:
+            return self
+        step = int(factor)
+        spread = np.zeros(((len(self.coefficients) - 1) * step + 1, *self.coefficients.shape[1:]), dtype=complex)
+        spread[::step] = self.coefficients
+        return type(self)(base, spread)
+
+    def reduced(self, also: tuple[Fraction, ...] = ()) -> Self:
+        """The same signal over its own shortest period.
+
+        Parameters
+        ----------
+        also
+            Further orders that the period must hold.
+        """
+        used = np.flatnonzero(np.any(self.coefficients.reshape(len(self.coefficients), -1) != 0.0, axis=1))
+        orders = [int(j) * self.base for j in used if j > 0] + [order for order in also if order > 0]
+        if not orders:
+            return type(self)(Fraction(1), self.coefficients[:1])
+        base = common_base(orders)
+        fine = self.rebased(_common(base, self.base))
+        step = int(base / fine.base)
+        return type(self)(base, fine.coefficients[::step])
+
+    def kept(self, highest: float) -> Self:
+        """The signal without the orders above `highest`."""
+        return type(self)(self.base, self.coefficients[: int(highest / float(self.base) + 1e-9) + 1])
+
+    def __add__(self, other: Self) -> Self:
+        base = _common(self.base, other.base)
+        a, b = self.rebased(base).coefficients, other.rebased(base).coefficients
+        longer, shorter = (a, b) if len(a) >= len(b) else (b, a)
+        total = longer.copy()
+        total[: len(shorter)] += shorter
+        return type(self)(base, total)
+
+
+def _common(a: Fraction, b: Fraction) -> Fraction:
+    """Greatest common divisor of two orders."""
+    return Fraction(gcd(a.numerator, b.numerator), lcm(a.denominator, b.denominator))
+
+
+def common_base(orders: Sequence[Fraction]) -> Fraction:
+    """The largest lowest order that all of these are multiples of."""
+    return reduce(_common, orders)
+
+
+def spectrum_of(samples: NDArray[np.float64], base: Fraction) -> Spectrum:
+    """Coefficients of a real signal sampled over one period, shape (n, ...) to (n//2 + 1, ...)."""
+    count = len(samples)
+    coefficients = np.fft.rfft(samples, axis=0) * (2.0 / count)
+    coefficients[0] /= 2.0
+    if count % 2 == 0:
+        coefficients[-1] /= 2.0
+    return Spectrum(base, coefficients)

@@ -1,0 +1,134 @@
+"""Angles as exact parts of a turn, so that a crank star that cancels gives zero.
+
+Crank throws, banks and firing intervals are rational parts of a turn. Products of
+such an angle with an order stay rational, and their sines and cosines are read from
+one table whose entries mirror each other to the last bit. Sums over a star then
+cancel exactly, or to a rounding of their own terms, which is flushed to zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import lru_cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+MAX_DENOMINATOR = 20_000
+_EPS = float(np.finfo(float).eps)
+
+Turn: TypeAlias = Fraction | float
+
+
+def as_turn(angle: float) -> Turn:
+    """Angle in radians as a part of a turn, exact where it is a rounded rational.
+
+    A float within four roundings of a fraction with a denominator of at most 20 000
+    is taken for that fraction; any other stays a float.
+    """
+    turns = angle / math.tau
+    nearest = Fraction(turns).limit_denominator(MAX_DENOMINATOR)
+    return nearest if abs(float(nearest) - turns) <= 4 * _EPS * max(abs(turns), 1.0) else turns
+
+
+def angle_of(turn: Turn) -> float:
+    """Radians of a part of a turn."""
+    return math.tau * float(turn)
+
+
+def cis(turn: Turn) -> complex:
+    """e^{2 pi i turn}, with every symmetry of the circle kept to the last bit.
+
+    A Fraction is exact at multiples of 1/8 and 1/12 turn, and mirrors exactly in the
+    axes and the diagonals.
+    """
+    if not isinstance(turn, Fraction):
+        return complex(math.cos(math.tau * turn), math.sin(math.tau * turn))
+    eighths, rest = divmod(turn % 1, Fraction(1, 8))
+    odd = eighths % 2 == 1
+    small = Fraction(1, 8) - rest if odd else rest
+    cosine, sine = _first_octant(small)
+    if odd:
+        cosine, sine = sine, cosine
+    quadrant = int(eighths) // 2
+    return (complex(cosine, sine), complex(-sine, cosine), complex(-cosine, -sine), complex(sine, -cosine))[quadrant]
+
+
+def _first_octant(turn: Fraction) -> tuple[float, float]:
+    if turn == 0:
+        return 1.0, 0.0
+    if turn == Fraction(1, 12):
+        return math.sqrt(3.0) / 2.0, 0.5
+    if turn == Fraction(1, 8):
+        return math.sqrt(0.5), math.sqrt(0.5)
+    return math.cos(math.tau * float(turn)), math.sin(math.tau * float(turn))
+
+
+@lru_cache(maxsize=256)
+def _roots(denominator: int) -> NDArray[np.complex128]:
+    table = np.array([cis(Fraction(k, denominator)) for k in range(denominator)])
+    table.setflags(write=False)
+    return table
+
+
+def phasors(turns: Sequence[Turn], multiples: NDArray[np.int64]) -> NDArray[np.complex128]:
+    """e^{2 pi i m t} for every multiple m and turn t.
+
+    Parameters
+    ----------
+    turns
+        Angles as parts of a turn, length n.
+    multiples
+        Integers, length m (orders in units of the lowest order).
+
+    Returns
+    -------
+    Array of shape (m, n). Exact turns give table values, others plain exponentials.
+    """
+    out = np.empty((len(multiples), len(turns)), dtype=complex)
+    for column, turn in enumerate(turns):
+        if isinstance(turn, Fraction) and turn.denominator <= MAX_DENOMINATOR:
+            index = (multiples * (turn.numerator % turn.denominator)) % turn.denominator
+            out[:, column] = _roots(turn.denominator)[index]
+        else:
+            out[:, column] = np.exp(2j * np.pi * ((multiples * float(turn)) % 1.0))
+    return out
+
+
+def star_sum(
+    weights: NDArray[np.float64], turns: Sequence[Turn], multiples: NDArray[np.int64]
+) -> NDArray[np.complex128]:
+    """Sum over a star, sum_k w_k e^{2 pi i m t_k}, with true zeros.
+
+    Parameters
+    ----------
+    weights
+        Shape (n, c): c real weights of each of n members.
+    turns
+        Length n, the members' angles as parts of a turn.
+    multiples
+        Length m.
+
+    Returns
+    -------
+    Shape (m, c). A real or imaginary part below the rounding of its own sum,
+    (n + 2) eps sum |w|, cannot be told from zero and is zero.
+    """
+    sums = phasors(turns, multiples) @ weights
+    return _flushed(sums, np.abs(weights).sum(axis=0), len(turns))
+
+
+def cancelling_sum(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Sum over the first axis, zero where it is under the rounding of its own terms."""
+    size = np.abs(values.real) + np.abs(values.imag)
+    return _flushed(values.sum(axis=0), size.sum(axis=0), len(values))
+
+
+def _flushed(sums: NDArray[np.complex128], magnitude: NDArray[np.float64], count: int) -> NDArray[np.complex128]:
+    floor = (count + 2) * _EPS * magnitude
+    real = np.where(np.abs(sums.real) <= floor, 0.0, sums.real)
+    imaginary = np.where(np.abs(sums.imag) <= floor, 0.0, sums.imag)
+    return np.asarray(real + 1j * imaginary)

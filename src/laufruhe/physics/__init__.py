@@ -1,0 +1,1 @@
+"""What the engine does: kinematics, gas, shaking loads, mount forces, metrics."""

@@ -1,0 +1,97 @@
+"""Forces on the mounts of an engine that its mounting holds far below resonance (M1-M3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import UncarriedLoadError
+from laufruhe.machine import Mount
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.shaking_loads import WRENCH
+
+FREE_STIFFNESS = 1e-12
+UNCARRIED_SHARE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class RigidMounting:
+    """The linear map from the wrench on the block to the forces on the mounts.
+
+    Attributes
+    ----------
+    maps
+        Shape (mounts, 3, 6): force of the engine on each mount [N] per wrench (C7).
+    free
+        Shape (k, 6), orthonormal in scaled wrenches: what no mount carries.
+    arm
+        Length that makes moments comparable with forces [m].
+    """
+
+    maps: NDArray[np.float64]
+    free: NDArray[np.float64]
+    arm: float
+
+    def forces(self, wrench: Spectrum) -> Spectrum:
+        """Mount forces by order, shape (n, mounts, 3) [N].
+
+        Raises
+        ------
+        UncarriedLoadError
+            If the wrench drives a direction that no mount carries.
+        """
+        self.check_carried(wrench)
+        return Spectrum(wrench.base, np.einsum("mij,nj->nmi", self.maps, wrench.coefficients))
+
+    def check_carried(self, wrench: Spectrum) -> None:
+        """Refuse a wrench that some direction lets through."""
+        scaled = wrench.coefficients / _scales(self.arm)
+        size = float(np.abs(scaled).max(initial=0.0))
+        for direction in self.free:
+            drive = np.abs(scaled @ direction)
+            if size > 0.0 and drive.max(initial=0.0) > UNCARRIED_SHARE * size:
+                order = float(wrench.orders[int(np.argmax(drive))])
+                name = WRENCH[int(np.argmax(np.abs(direction)))]
+                raise UncarriedLoadError(
+                    f"order {order:g} drives the engine along {name}, which no mount carries; "
+                    "give a mount stiffness in that direction or a second place"
+                )
+
+
+def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:
+    """F_i = K_i G_i (sum_j G_j^T K_j G_j)^+ w (M1, M2).
+
+    Directions that no mount carries are left to `check_carried`; the scene may not
+    drive them.
+    """
+    positions = np.array([mount.position for mount in mounts])
+    arm = float(np.linalg.norm(positions, axis=1).max(initial=0.0)) or 1.0
+    scales = _scales(arm)
+    # displacements of the mount points per scaled motion (translation, arm * rotation)
+    geometry = np.array([_point_motion(position) for position in positions]) / scales
+    stiffness = np.array([mount.stiffness_matrix for mount in mounts])
+    stiffness = stiffness / np.abs(stiffness).max()
+    total = np.einsum("mai,mab,mbj->ij", geometry, stiffness, geometry)
+    values, vectors = np.linalg.eigh(total)
+    carried = values > FREE_STIFFNESS * values[-1]
+    inverse = (vectors[:, carried] / values[carried]) @ vectors[:, carried].T
+    maps = np.einsum("mab,mbj,jk->mak", stiffness, geometry, inverse) / scales
+    return RigidMounting(maps, vectors[:, ~carried].T, arm)
+
+
+def rigid_mount_maps(mounts: Sequence[Mount]) -> NDArray[np.float64]:
+    """The maps of `rigid_mounting` alone, shape (mounts, 3, 6)."""
+    return rigid_mounting(mounts).maps
+
+
+def _scales(arm: float) -> NDArray[np.float64]:
+    return np.array([1.0, 1.0, 1.0, arm, arm, arm])
+
+
+def _point_motion(position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Motion of a point per motion of the body, shape (3, 6): u + omega x r (M1)."""
+    x, y, z = position
+    return np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])

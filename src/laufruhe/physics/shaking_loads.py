@@ -1,0 +1,236 @@
+"""Shaking loads of an engine on its block, order by order (L1-L6).
+
+The loads of one cylinder, times the phase and geometry of each: identical cylinders
+share their order coefficients, and the sum over the star is taken with exact turns, so
+what the star cancels is zero and not a rounding.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank
+from laufruhe.numerics.spectrum import Spectrum, spectrum_of
+from laufruhe.numerics.turns import Turn, as_turn, cancelling_sum, cis, star_sum
+from laufruhe.physics import order_coefficients, slider_crank
+from laufruhe.physics.gas_cycle import cylinder_pressure
+
+WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """What of the physics is kept.
+
+    Attributes
+    ----------
+    kinematics
+        "exact", or "two-order": cos alpha + lambda cos 2 alpha of the textbooks.
+    samples
+        Steps over the working cycle at which gas torque and mount forces are taken.
+    """
+
+    kinematics: Literal["exact", "two-order"] = "exact"
+    samples: int = 1440
+
+
+EXACT = Fidelity()
+
+
+def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Wrench on the block from everything that moves (C7).
+
+    Parameters
+    ----------
+    engine
+        Slider-cranks and rotors.
+    point
+        Speed and working gas.
+    fidelity
+        Kinematics and samples.
+
+    Returns
+    -------
+    Spectrum of shape (n, 6): (Fx, Fy, Fz, Mx, My, Mz) about the origin of C2 [N, N m].
+
+    Raises
+    ------
+    ModelError
+        If the gas model cannot be met, or a gas-loaded cylinder has no bore.
+    """
+    total = reciprocating_loads(engine, point.speed, fidelity) + rod_inertia_loads(engine, point.speed, fidelity)
+    total = total + rotating_loads(engine, point.speed)
+    return total + gas_loads(engine, point.gas, fidelity) if point.gas is not None else total
+
+
+def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Inertia of the reciprocating masses: F = -m s'' along each axis, and its roll moment (L2, L3)."""
+
+    def force(part: SliderCrank) -> NDArray[np.complex128]:
+        return -_acceleration(part, fidelity)
+
+    def roll(part: SliderCrank) -> NDArray[np.complex128]:
+        return _roll(part, fidelity)
+
+    moving = [part for part in engine.slider_cranks if part.reciprocating_mass > 0.0]
+    forces = _star_loads(
+        engine.cycle, moving, force, lambda p: p.reciprocating_mass * p.crank_radius * _square(p, speed) * _axial(p)
+    )
+    rolls = _star_loads(
+        engine.cycle, moving, roll, lambda p: p.reciprocating_mass * p.crank_radius**2 * _square(p, speed) * _ROLL
+    )
+    return forces + rolls
+
+
+def rod_inertia_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
+
+    def roll(part: SliderCrank) -> NDArray[np.complex128]:
+        if fidelity.kinematics == "two-order":
+            return np.array([0.0, -1j * part.rod_ratio])
+        highest = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
+        return order_coefficients.rod_roll_orders(part.rod_ratio, part.offset_ratio, part.shaft.ratio, highest)
+
+    swinging = [part for part in engine.slider_cranks if part.rod_inertia_deficit != 0.0 and part.rod_ratio > 0.0]
+    return _star_loads(engine.cycle, swinging, roll, lambda p: p.rod_inertia_deficit * _square(p, speed) * _ROLL)
+
+
+def rotating_loads(engine: Engine, speed: float) -> Spectrum:
+    """Loads of rotating masses at the crank pins and of every rotor (L1)."""
+    pins = [
+        Rotor(
+            f"pin of {part.name}", part.x, part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft
+        )
+        for part in engine.slider_cranks
+        if part.rotating_mass > 0.0
+    ]
+    return rotor_loads((*pins, *engine.rotors), speed, engine.cycle)
+
+
+def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum:
+    """F = U (n w)^2 e^{i n phi} of each rotor, with its moments (L1).
+
+    Returns
+    -------
+    Spectrum of shape (n, 6) [N, N m]; linear in the unbalances and their conjugates.
+    """
+    wrenches: dict[int, list[NDArray[np.complex128]]] = defaultdict(list)
+    for rotor in rotors:
+        index = _index(cycle, abs(rotor.shaft.ratio))
+        wrenches[index].append(rotor_wrench(rotor, speed))
+    out = np.zeros((max(wrenches, default=0) + 1, 6), dtype=complex)
+    for index, parts in wrenches.items():
+        out[index] = cancelling_sum(np.array(parts))
+    return Spectrum(cycle.base_order, out)
+
+
+def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
+    """Coefficient of order |n| of one rotor's wrench, shape (6,) (L1)."""
+    shaft = rotor.shaft
+    forward = shaft.ratio > 0.0
+    vertical = rotor.unbalance if forward else rotor.unbalance.conjugate()
+    lateral = vertical * (-1j if forward else 1j)
+    return np.asarray((shaft.ratio * speed) ** 2 * _wrench_of(lateral, vertical, rotor.x, shaft))
+
+
+def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Roll moment of the gas, the reaction to its crank torque (L5; eq. 1). No net force."""
+    turns, samples = engine.cycle.turns, fidelity.samples
+    # equal mechanisms differ only in when they fire
+    alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
+    for part in engine.slider_cranks:
+        alike[part.crank_radius, part.rod_length, part.offset, part.bore, part.shaft.ratio].append(part)
+    total = Spectrum(engine.cycle.base_order, np.zeros((1, 6), dtype=complex))
+    for parts in alike.values():
+        torque = spectrum_of(gas_torque(gas, parts[0], engine.cycle, samples), engine.cycle.base_order)
+        delays: list[Turn] = [-as_turn(part.firing_angle) / turns for part in parts]
+        multiples = np.arange(len(torque.coefficients))
+        star = star_sum(np.tile(_ROLL, (len(parts), 1)), delays, multiples)
+        total = total + Spectrum(engine.cycle.base_order, torque.coefficients[:, None] * star)
+    return total
+
+
+def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:
+    """Torque of one cylinder's gas on the engine's output, -n A (p - p_crankcase) ds/dalpha (L5).
+
+    Returns
+    -------
+    Shape (samples,) [N m], at equal steps over the cycle from the firing dead centre.
+    """
+    pressure = cylinder_pressure(gas, part, cycle, samples) - gas.crankcase_pressure
+    alpha = part.shaft.ratio * cycle.angle * np.arange(samples) / samples
+    velocity = slider_crank.piston_velocity(np, alpha, part.rod_ratio, part.offset_ratio)
+    return np.asarray(-part.shaft.ratio * part.piston_area * part.crank_radius * pressure * velocity)
+
+
+_ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+
+
+def _wrench_of(lateral: complex, vertical: complex, x: float, shaft: Shaft) -> NDArray[np.complex128]:
+    """Wrench of a force in the plane at x through a shaft's axis (C2)."""
+    roll = shaft.y * vertical - shaft.z * lateral
+    return np.array([0.0, lateral, vertical, roll, -x * vertical, x * lateral])
+
+
+def _axial(part: SliderCrank) -> NDArray[np.float64]:
+    """Wrench of a unit force along the cylinder axis through the crank axis."""
+    axis = cis(as_turn(part.bank))
+    return _wrench_of(axis.imag, axis.real, part.x, part.shaft).real
+
+
+def _square(part: SliderCrank, speed: float) -> float:
+    return (part.shaft.ratio * speed) ** 2
+
+
+def _acceleration(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
+    if fidelity.kinematics == "two-order":
+        return np.array([0.0, -1.0, -part.rod_ratio], dtype=complex)
+    return order_coefficients.piston_acceleration_orders(part.rod_ratio, part.offset_ratio)
+
+
+def _roll(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
+    if fidelity.kinematics == "two-order":
+        ratio, lam = part.shaft.ratio, part.rod_ratio
+        # (cos a + lam cos 2a)(-n)(sin a + lam/2 sin 2a), to first order in lam
+        return ratio * 1j * np.array([0.0, -lam / 4.0, 0.5, 0.75 * lam])
+    highest = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
+    return order_coefficients.inertia_roll_orders(part.rod_ratio, part.offset_ratio, part.shaft.ratio, highest)
+
+
+def _star_loads(
+    cycle: Cycle,
+    parts: Sequence[SliderCrank],
+    coefficients: Callable[[SliderCrank], NDArray[np.complex128]],
+    weight: Callable[[SliderCrank], NDArray[np.float64]],
+) -> Spectrum:
+    """(coefficients of one cylinder) x (phase and weight of each), summed over the star (L6)."""
+    alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
+    for part in parts:
+        alike[part.rod_ratio, part.offset_ratio, part.shaft.ratio].append(part)
+    total = Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
+    for members in alike.values():
+        series = coefficients(members[0])
+        weights = np.array([weight(part) for part in members])
+        star = star_sum(weights, [part.star_turn for part in members], np.arange(len(series)))
+        load = series[:, None] * star
+        ratio = members[0].shaft.ratio
+        # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
+        total = total + _spread(load if ratio > 0.0 else load.conj(), _index(cycle, abs(ratio)), cycle)
+    return total
+
+
+def _spread(load: NDArray[np.complex128], step: int, cycle: Cycle) -> Spectrum:
+    out = np.zeros(((len(load) - 1) * step + 1, 6), dtype=complex)
+    out[::step] = load
+    return Spectrum(cycle.base_order, out)
+
+
+def _index(cycle: Cycle, order: float) -> int:
+    return int(Fraction(order).limit_denominator(1000) / cycle.base_order)

@@ -1,0 +1,331 @@
+"""From the tables of a problem file to slider-cranks, gas, mounts and operating points."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from laufruhe import units
+from laufruhe.machine import CRANKSHAFT, Cycle, Mount, OperatingPoint, PressureTrace, Rod, Shaft, SliderCrank
+from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
+from laufruhe.machine.layouts import Layout, Mechanism, Throw, boxer, build, even_throws, inline, vee
+from laufruhe.machine.mount import UPRIGHT, Matrix3
+from laufruhe.machine.slider_crank import radius_for_stroke
+from laufruhe.problem.complaints import Refused, blamed_on, nearest
+from laufruhe.problem.file_models import (
+    EngineTable,
+    MountsTable,
+    MountTable,
+    OperatingPointTable,
+    ProblemFile,
+    SeiligerTable,
+    SliderCrankTable,
+    TraceTable,
+    WiebeTable,
+)
+
+_CYCLES = {"two-stroke": Cycle.TWO_STROKE, "four-stroke": Cycle.FOUR_STROKE}
+_ONLY_FOR = {
+    "bank_angle": ("vee",),
+    "split_pin_angle": ("vee",),
+    "bank_stagger": ("vee", "boxer"),
+    "cylinder_spacing": ("inline", "vee", "boxer"),
+    "throws": ("inline", "vee", "boxer"),
+    "firing_order": ("inline", "vee", "boxer"),
+    "slider_cranks": ("parts",),
+    "shafts": ("parts",),
+}
+
+
+def cycle_of(table: EngineTable) -> Cycle:
+    """Two- or four-stroke."""
+    return _CYCLES[table.cycle]
+
+
+def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
+    """Slider-cranks of [engine], and the throws that they work on."""
+    for key, layouts in _ONLY_FOR.items():
+        if getattr(table, key) and table.layout not in layouts:
+            raise Refused(f"engine.{key}", None, f"means nothing in layout '{table.layout}'", "leave it out")
+    bores = [part.bore for part in table.slider_cranks] or [None]
+    if gas and table.bore is None and None in bores:
+        raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
+    if table.layout == "parts":
+        parts = _free_parts(table)
+        return parts, tuple(Throw(p.x, p.throw, (k,)) for k, p in enumerate(parts) if p.shaft == CRANKSHAFT)
+    layout = _layout(table)
+    throws = _throws(table, layout)
+    with blamed_on("engine.firing_order" if table.firing_order else "engine"):
+        return build(cycle_of(table), layout, _mechanism(table), throws, table.firing_order)
+
+
+def _layout(table: EngineTable) -> Layout:
+    count = _cylinders(table)
+    spacing = table.cylinder_spacing
+    if spacing is None:
+        if count > 1:
+            raise Refused("engine.cylinder_spacing", None, "is missing", 'add it, for example "125 mm"')
+        spacing = 1.0
+    with blamed_on("engine.cylinders"):
+        if table.layout == "inline":
+            return inline(count, spacing)
+        if table.layout == "boxer":
+            if table.bank_stagger is None:
+                raise Refused("engine.bank_stagger", None, "is missing", "add the distance between opposed cylinders")
+            return boxer(count, spacing, table.bank_stagger)
+        if table.bank_angle is None:
+            raise Refused("engine.bank_angle", None, "is missing", "add the angle between the banks")
+        return vee(count, spacing, table.bank_angle, table.split_pin_angle or 0.0, table.bank_stagger or 0.0)
+
+
+def _cylinders(table: EngineTable) -> int:
+    throws_per_cylinder = 2 if table.layout == "vee" else 1
+    told = {
+        "engine.cylinders": table.cylinders,
+        "engine.firing_order": len(table.firing_order) if table.firing_order is not None else None,
+        "engine.throws": len(table.throws) * throws_per_cylinder if table.throws is not None else None,
+    }
+    given = {key: count for key, count in told.items() if count is not None}
+    if not given:
+        raise Refused("engine.cylinders", None, "is missing", "add it, or throws, or firing_order")
+    count = next(iter(given.values()))
+    for key, other in given.items():
+        if other != count:
+            raise Refused(
+                key, None, f"makes {other} cylinder(s), but {next(iter(given))} makes {count}", "let them agree"
+            )
+    order = table.firing_order
+    if order is not None and sorted(order) != list(range(1, count + 1)):
+        raise Refused("engine.firing_order", order, f"is no permutation of 1 to {count}", "name every cylinder once")
+    return count
+
+
+def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
+    if table.throws is not None:
+        return tuple(table.throws)
+    if table.firing_order is None:
+        if len(layout.throw_positions) == 1:
+            return (layout.banks[0] - layout.pin_offsets[0],)
+        raise Refused("engine.throws", None, "is missing", "add it, or firing_order for even firing")
+    with blamed_on("engine.firing_order"):
+        return even_throws(cycle_of(table), layout, table.firing_order)
+
+
+def _mechanism(table: EngineTable) -> Mechanism:
+    radius, rod_length = _radius_and_rod(table)
+    rod = _rod(table, rod_length)
+    if rod is not None and table.rod_inertia_deficit != 0.0:
+        raise Refused("engine.rod_inertia_deficit", None, "is given twice, here and by [engine.rod]", "keep one")
+    return Mechanism(
+        crank_radius=radius,
+        rod_length=rod_length,
+        reciprocating_mass=table.reciprocating_mass + (rod.reciprocating_mass if rod else 0.0),
+        rotating_mass=table.rotating_mass,
+        rod_rotating_mass=rod.rotating_mass if rod else 0.0,
+        rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit,
+        offset=table.offset,
+        bore=table.bore,
+    )
+
+
+def _rod(table: EngineTable, length: float) -> Rod | None:
+    if table.rod is None:
+        return None
+    if math.isinf(length):
+        raise Refused("engine.rod", None, "means nothing in a Scotch yoke (rod_ratio = 0)", "leave it out")
+    if not 0.0 <= table.rod.centre_of_gravity <= length:
+        raise Refused(
+            "engine.rod.centre_of_gravity",
+            units.shown(table.rod.centre_of_gravity, "m"),
+            f"does not lie on the rod of {units.shown(length, 'm')}",
+            "count it from the crank pin",
+        )
+    return Rod(length, table.rod.mass, table.rod.centre_of_gravity, table.rod.inertia)
+
+
+def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
+    """Crank radius and rod length [m] from stroke, offset and one of rod ratio and rod length."""
+    ratio, length = table.rod_ratio, table.rod_length
+    if (ratio is None) == (length is None):
+        state = "is missing" if ratio is None else "is given twice, also as rod_length"
+        raise Refused("engine.rod_ratio", ratio, state, "give rod_ratio or rod_length, one of them")
+    with blamed_on("engine.offset"):
+        radius = radius_for_stroke(table.stroke, table.offset, rod_length=length, rod_ratio=ratio or 0.0)
+    rod = length if length is not None else (radius / ratio if ratio else math.inf)
+    turning = (radius + abs(table.offset)) / rod
+    if turning >= 1.0:
+        key, value = ("rod_length", units.shown(rod, "m")) if length is not None else ("rod_ratio", f"{ratio:g}")
+        rule = f"does not let the crank turn, (crank radius + |offset|) / rod length = {turning:.4g} must be under 1"
+        raise Refused(f"engine.{key}", value, rule, "lengthen the rod")
+    return radius, rod
+
+
+def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
+    if not table.slider_cranks:
+        raise Refused("engine.slider_cranks", None, "is missing", "list at least one [[engine.slider_cranks]]")
+    shafts = {"crankshaft": CRANKSHAFT}
+    for k, shaft in enumerate(table.shafts):
+        with blamed_on(f"engine.shafts[{k + 1}]"):
+            shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
+    return tuple(_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks))
+
+
+def _free_part(table: EngineTable, part: SliderCrankTable, k: int, shafts: dict[str, Shaft]) -> SliderCrank:
+    where = f"engine.slider_cranks[{k + 1}]"
+    if part.shaft not in shafts:
+        raise Refused(f"{where}.shaft", part.shaft, "is no shaft of this engine", nearest(part.shaft, list(shafts)))
+    own = part.rod_ratio is not None or part.rod_length is not None
+    merged = table.model_copy(
+        update={
+            **{
+                key: value
+                for key in ("stroke", "bore", "offset", "reciprocating_mass", "rod_inertia_deficit")
+                if (value := getattr(part, key)) is not None
+            },
+            **({"rod_ratio": part.rod_ratio, "rod_length": part.rod_length} if own else {}),
+        }
+    )
+    shaft = shafts[part.shaft]
+    with blamed_on(where):
+        mechanism = _mechanism(merged)
+        rotating = part.rotating_mass if part.rotating_mass is not None else table.rotating_mass
+        first = (part.bank_angle - part.throw) / shaft.ratio % (math.tau / abs(shaft.ratio))
+        return SliderCrank(
+            name=f"cylinder {k + 1}",
+            x=part.x,
+            crank_radius=mechanism.crank_radius,
+            rod_length=mechanism.rod_length,
+            reciprocating_mass=mechanism.reciprocating_mass,
+            throw=part.throw,
+            bank=part.bank_angle,
+            offset=mechanism.offset,
+            rotating_mass=rotating + mechanism.rod_rotating_mass,
+            rod_inertia_deficit=mechanism.rod_inertia_deficit,
+            bore=mechanism.bore,
+            firing_angle=part.firing_angle if part.firing_angle is not None else first,
+            shaft=shaft,
+        )
+
+
+def mounts_of(table: MountsTable | None) -> tuple[Mount, ...]:
+    """Mounts from positions, or one by one from places."""
+    if table is None:
+        return ()
+    if bool(table.positions) == bool(table.places):
+        state = "is missing" if not table.positions else "is given twice, as positions and as places"
+        raise Refused("mounts.positions", None, state, "give positions or [[mounts.places]], one of them")
+    places = table.places or [MountTable.model_construct(position=p) for p in table.positions]
+    names = table.names or [place.name or f"mount {k + 1}" for k, place in enumerate(places)]
+    if len(names) != len(places):
+        raise Refused("mounts.names", names, f"names {len(names)} of {len(places)} mounts", "name each once")
+    mounts = []
+    for k, (name, place) in enumerate(zip(names, places, strict=True)):
+        stiffness = place.relative_stiffness or table.relative_stiffness
+        if not any(stiffness):
+            raise Refused(
+                f"mounts.places[{k + 1}].relative_stiffness", stiffness, "carries nothing", "give one a value"
+            )
+        x, y, z = place.position
+        mounts.append(Mount(name, (x, y, z), (stiffness[0], stiffness[1], stiffness[2]), _turned(place.turned)))
+    _all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place")
+    _all_different([m.name for m in mounts], "mounts.names", "mounts have one name")
+    return tuple(mounts)
+
+
+def _all_different(things: list[Any], where: str, rule: str) -> None:
+    for k, thing in enumerate(things):
+        if thing in things[:k]:
+            raise Refused(f"{where}[{k + 1}]", thing, f"two {rule}", "move or rename one")
+
+
+def _turned(angles: list[float] | None) -> Matrix3:
+    if angles is None:
+        return UPRIGHT
+    (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    rows = (about_z @ about_y @ about_x).T.tolist()
+    return (tuple(rows[0]), tuple(rows[1]), tuple(rows[2]))
+
+
+def operating_points(file: ProblemFile, folder: Path) -> tuple[OperatingPoint, ...]:
+    """Speeds and loads."""
+    gas = gas_of(file, folder)
+    points = []
+    for k, table in enumerate(file.operating_points):
+        speed = _speed(table, file.engine.stroke, f"operating_points[{k + 1}]")
+        name = table.name or f"{speed * 30.0 / math.pi:.6g} rpm"
+        points.append(OperatingPoint(name, speed, _loaded(gas, table, k), table.weight))
+    _all_different([p.name for p in points], "operating_points", "operating points have one name")
+    return tuple(points)
+
+
+def _speed(table: OperatingPointTable, stroke: float, where: str) -> float:
+    if (table.speed is None) == (table.mean_piston_speed is None):
+        state = "is missing" if table.speed is None else "is given twice, also as mean_piston_speed"
+        raise Refused(f"{where}.speed", None, state, "give speed or mean_piston_speed, one of them")
+    if table.speed is not None:
+        return table.speed
+    # c_m = 2 s n (Roetscher eq. 290)
+    return math.pi * float(table.mean_piston_speed or 0.0) / stroke
+
+
+def _loaded(gas: GasModel | None, table: OperatingPointTable, k: int) -> GasModel | None:
+    where = f"operating_points[{k + 1}]"
+    if table.motored:
+        return None
+    if table.imep is None:
+        return gas
+    if gas is None or isinstance(gas, PressureTrace):
+        raise Refused(f"{where}.imep", None, "needs a gas model that can be solved for it", "add [gas] or leave it out")
+    return replace(gas, imep=table.imep)
+
+
+def gas_of(file: ProblemFile, folder: Path) -> GasModel | None:
+    """The working gas of [gas]."""
+    table = file.gas
+    if table is None:
+        return None
+    with blamed_on("gas"):
+        if isinstance(table, TraceTable):
+            return _trace(table, folder)
+        given = {key: value for key, value in table.model_dump().items() if value is not None and key != "model"}
+        kinds: dict[type, type[Seiliger] | type[Wiebe]] = {SeiligerTable: Seiliger, WiebeTable: Wiebe}
+        return kinds[type(table)](**given)
+
+
+def _trace(table: TraceTable, folder: Path) -> PressureTrace:
+    path = folder / table.file
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            rows = [row for row in csv.reader(stream) if row and not row[0].lstrip().startswith("#")]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise Refused(
+            "gas.file", table.file, f"cannot be read ({_why(error)})", "give a CSV file beside the problem"
+        ) from None
+    try:
+        angle, pressure = units.parse(f"1 {table.angle_unit}", "rad"), units.parse(f"1 {table.pressure_unit}", "Pa")
+    except units.UnitError as error:
+        rule, _, remedy = str(error).partition("; ")
+        raise Refused("gas.pressure_unit", table.pressure_unit, rule, remedy) from None
+    numbers = []
+    for line, row in enumerate(rows):
+        try:
+            numbers.append((float(row[0]) * angle, float(row[1]) * pressure))
+        except (ValueError, IndexError):
+            if line > 0:
+                raise Refused(
+                    "gas.file", table.file, f"row {line + 1} is no pair of numbers", "write: crank angle, pressure"
+                ) from None
+    extra = {} if table.crankcase_pressure is None else {"crankcase_pressure": table.crankcase_pressure}
+    return PressureTrace(tuple(a for a, _ in numbers), tuple(p for _, p in numbers), **extra)
+
+
+def _why(error: Exception) -> str:
+    return error.strerror or "error" if isinstance(error, OSError) else type(error).__name__

@@ -1,0 +1,132 @@
+"""From what a validator found to one line that a user can act on."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from laufruhe.errors import Complaint, LaufruheError, ModelError
+
+_RULES = {
+    "missing": "is missing",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "string_type": "must be text in quotes",
+    "list_type": "must be a list in [ ]",
+    "bool_type": "must be true or false",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "dict_type": "must be a table",
+}
+
+
+def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Complaint, ...]:
+    """One complaint for every key that is wrong, in the order of the file."""
+    found: dict[str, Complaint] = {}
+    for detail in error.errors(include_url=False):
+        loc = _without_tags(detail["loc"])
+        found.setdefault(key_path(loc), _complaint(detail, loc, model))
+    return tuple(found.values())
+
+
+def key_path(loc: Sequence[str | int]) -> str:
+    """engine.throws[2], counted from one as the reader counts."""
+    text = ""
+    for part in loc:
+        text += f"[{part + 1}]" if isinstance(part, int) else (f".{part}" if text else str(part))
+    return text
+
+
+def short(value: Any) -> str:
+    """A value as the file has it, cut where it is long."""
+    if isinstance(value, dict | list):
+        text = json.dumps(value, default=str, ensure_ascii=False)
+    else:
+        text = f'"{value}"' if isinstance(value, str) else str(value)
+    text = "".join(c if c.isprintable() else "?" for c in text)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def nearest(word: str, words: Sequence[str]) -> str:
+    """A remedy that names the nearest right word, or all of them."""
+    close = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
+    return f"did you mean '{close[0]}'?" if close else "use one of: " + ", ".join(sorted(words))
+
+
+def _complaint(detail: Any, loc: tuple[str | int, ...], model: type[BaseModel]) -> Complaint:
+    kind, where = detail["type"], key_path(loc)
+    if kind == "extra_forbidden":
+        table = _model_at(loc[:-1], model)
+        return Complaint(where, short(detail["input"]), "is not a key here", nearest(str(loc[-1]), _keys(table)))
+    if kind == "missing":
+        return Complaint(where, "", "is missing", "add it")
+    if kind == "union_tag_not_found":
+        return Complaint(f"{where}.model", "", "is missing", "use one of: seiliger, wiebe, trace")
+    if kind in ("literal_error", "union_tag_invalid"):
+        allowed = str(detail["ctx"].get("expected") or detail["ctx"].get("expected_tags"))
+        where = f"{where}.model" if kind == "union_tag_invalid" else where
+        value = detail["ctx"].get("tag", detail["input"])
+        words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
+        return Complaint(where, short(value), "is not allowed", nearest(str(value), words))
+    rule, _, remedy = _RULES.get(kind, _lowered(detail["msg"])).partition("; ")
+    return Complaint(where, short(detail["input"]), rule, remedy or "correct it")
+
+
+def _lowered(message: str) -> str:
+    return (message[:1].lower() + message[1:]).replace("input should", "must")
+
+
+def _keys(model: type[BaseModel] | None) -> list[str]:
+    return [f.alias or name for name, f in model.model_fields.items()] if model else []
+
+
+def _model_at(loc: Sequence[str | int], model: type[BaseModel]) -> type[BaseModel] | None:
+    here: list[type[BaseModel]] = [model]
+    for part in loc:
+        if isinstance(part, int):
+            continue
+        fields = [m.model_fields[part] for m in here if part in m.model_fields]
+        tagged = [m for m in here if any(str(part) in get_args(f.annotation) for f in m.model_fields.values())]
+        here = [m for f in fields for m in _models_in(f.annotation)] if fields else tagged or here
+    return here[0] if here else None
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if get_origin(annotation) in (list, Union, UnionType) or get_args(annotation):
+        return [m for part in get_args(annotation) for m in _models_in(part)]
+    return []
+
+
+def _without_tags(loc: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    """Drops what pydantic adds to a path for tagged tables: gas.seiliger.imep is gas.imep."""
+    return tuple(
+        part
+        for k, part in enumerate(loc)
+        if not (k == 1 and loc[0] == "gas" and part in ("seiliger", "wiebe", "trace"))
+    )
+
+
+class Refused(LaufruheError):
+    """Raised while a problem is put together; the reader adds the file's name."""
+
+    def __init__(self, where: str, value: Any, rule: str, remedy: str) -> None:
+        self.complaint = Complaint(where, "" if value is None else short(value), rule, remedy)
+        super().__init__(str(self.complaint))
+
+
+@contextmanager
+def blamed_on(where: str) -> Iterator[None]:
+    """A machine that cannot exist is the fault of this key."""
+    try:
+        yield
+    except ModelError as error:
+        rule, _, remedy = str(error).partition("; ")
+        raise Refused(where, None, rule, remedy or "correct it") from None

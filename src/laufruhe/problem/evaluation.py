@@ -1,0 +1,108 @@
+"""The exact model's answer to one design: loads at every operating point, and any quantity of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.shaking_loads import Fidelity, shaking_loads
+from laufruhe.problem.model import Problem
+from laufruhe.problem.quantity import MASSES, Quantity, Rows, Subject, load_rows, mass_rows
+
+
+@dataclass(frozen=True, eq=False)
+class PointLoads:
+    """Loads at one operating point.
+
+    Attributes
+    ----------
+    wrench
+        On the block, shape (n, 6) (C7).
+    mount_forces
+        Of the engine on its mounts, shape (n, mounts, 3); None without mounts.
+    """
+
+    point: OperatingPoint
+    wrench: Spectrum
+    mount_forces: Spectrum | None
+
+    def signal(self, subject: Subject) -> Spectrum:
+        """The signal that a load is measured on."""
+        if subject is not Subject.MOUNT_FORCE:
+            return self.wrench
+        if self.mount_forces is None:
+            raise ValueError("an engine without mounts has no mount forces")
+        return self.mount_forces
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Everything known of one design at every operating point."""
+
+    engine: Engine
+    fidelity: Fidelity
+    loads: tuple[PointLoads, ...]
+
+    @cached_property
+    def mount_names(self) -> list[str]:
+        """In the order of the engine."""
+        return [mount.name for mount in self.engine.mounts]
+
+    def rows(self, quantity: Quantity, samples: int | None = None) -> Rows:
+        """Rows whose norm a quantity is, over the whole cycle."""
+        if quantity.subject in MASSES:
+            return mass_rows(quantity, self.engine.rotors)
+        signals = [loads.signal(quantity.subject) for loads in self.loads]
+        return load_rows(
+            quantity,
+            [loads.point for loads in self.loads],
+            over(self.engine.cycle.base_order, signals),
+            self.mount_names,
+            samples or self.fidelity.samples,
+        )
+
+    def value(self, quantity: Quantity) -> float:
+        """A quantity of this design [SI]."""
+        return self.rows(quantity).value
+
+
+def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
+    """Signals brought to one lowest order, a multiple of or equal to theirs."""
+    finest = common_base([base, *(signal.base for signal in signals)])
+    return [signal.rebased(finest) for signal in signals]
+
+
+def evaluate(problem: Problem, engine: Engine | None = None) -> Evaluation:
+    """Loads of a design by the exact model.
+
+    Parameters
+    ----------
+    problem
+        Operating points and fidelity.
+    engine
+        The design; that of the problem as given when left out.
+
+    Raises
+    ------
+    ModelError
+        If the gas model cannot be met.
+    UncarriedLoadError
+        If the engine drives a direction that no mount carries.
+    """
+    engine = problem.engine if engine is None else engine
+    mounting = rigid_mounting(engine.mounts) if engine.mounts else None
+    loads = []
+    for point in problem.points:
+        wrench = shaking_loads(engine, point, problem.fidelity)
+        loads.append(PointLoads(point, wrench, mounting.forces(wrench) if mounting else None))
+    return Evaluation(engine, problem.fidelity, tuple(loads))
+
+
+def objective_value(problem: Problem, evaluation: Evaluation) -> float:
+    """The weighted sum that the problem minimises."""
+    return sum(term.weight * evaluation.value(term.quantity) for term in problem.objective)

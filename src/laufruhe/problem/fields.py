@@ -1,0 +1,151 @@
+"""Field types of problem files: numbers with units, and numbers left open."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import PydanticCustomError, core_schema
+
+from laufruhe import units
+
+
+@dataclass(frozen=True)
+class Open:
+    """A number left open between bounds [SI], with a value to start from."""
+
+    lower: float
+    upper: float
+    start: float
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A pydantic field that reads a number with a unit into SI (C1).
+
+    Attributes
+    ----------
+    unit
+        SI unit; "" for a plain number.
+    openable
+        Whether `{ between = [low, high] }` may stand in place of the number.
+    least
+        Smallest value allowed [SI].
+    above
+        Value that must be exceeded [SI].
+    most
+        Largest value allowed [SI].
+    plain
+        Factor that turns a bare number into SI, where one is allowed (degrees).
+    """
+
+    unit: str
+    openable: bool = False
+    least: float = -math.inf
+    above: float = -math.inf
+    most: float = math.inf
+    plain: float | None = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        number = self._number_schema()
+        if not self.openable:
+            return number
+        pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
+        between = {
+            "type": "object",
+            "properties": {"between": pair, "start": number},
+            "required": ["between"],
+            "additionalProperties": False,
+        }
+        return {"anyOf": [number, between]}
+
+    def _number_schema(self) -> dict[str, Any]:
+        text = {
+            "type": "string",
+            "description": units.dimension_name(self.unit),
+            "examples": [units.example(self.unit)],
+        }
+        if not self.unit:
+            return {"type": "number"}
+        return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
+
+    def _read(self, given: Any) -> float | Open:
+        if isinstance(given, dict):
+            return self._open(given)
+        return self._bounded(self._number(given))
+
+    def _number(self, given: Any) -> float:
+        if isinstance(given, bool) or not isinstance(given, int | float | str):
+            raise _complaint(f"is no {'number' if not self.unit else 'number with a unit'}; {units._advice(self.unit)}")
+        if isinstance(given, str):
+            try:
+                return units.parse(given, self.unit)
+            except units.UnitError as error:
+                raise _complaint(str(error)) from None
+        if self.unit and self.plain is None:
+            raise _complaint(f"has no unit, {units.dimension_name(self.unit)} needs one; {units._advice(self.unit)}")
+        value = float(given) * (self.plain if self.plain is not None else 1.0)
+        if not math.isfinite(value):
+            raise _complaint("is not finite; give a number")
+        return value
+
+    def _bounded(self, value: float) -> float:
+        if value <= self.above:
+            raise _complaint(f"must be more than {units.shown(self.above, self.unit)}; {units._advice(self.unit)}")
+        if value < self.least:
+            raise _complaint(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
+        if value > self.most:
+            raise _complaint(f"must be at most {units.shown(self.most, self.unit)}; give a smaller value")
+        return value
+
+    def _open(self, given: dict[str, Any]) -> Open:
+        if not self.openable:
+            raise _complaint("cannot be left open; give a number")
+        unknown = set(given) - {"between", "start"}
+        if unknown:
+            raise _complaint(
+                f"has an unknown key '{min(unknown)}'; write {{ between = [low, high] }}, start = ... is optional"
+            )
+        pair = given.get("between")
+        if not isinstance(pair, list) or len(pair) != 2:
+            raise _complaint("needs two bounds; write { between = [low, high] }")
+        low, high = (self._bounded(self._number(bound)) for bound in pair)
+        if low > high:
+            raise _complaint("has its bounds reversed; write the smaller one first")
+        start = self._bounded(self._number(given["start"])) if "start" in given else min(max(0.0, low), high)
+        if not low <= start <= high:
+            raise _complaint("starts outside its bounds; move start or the bounds")
+        return Open(low, high, start)
+
+
+def _complaint(text: str) -> PydanticCustomError:
+    # braces would be read as a template
+    return PydanticCustomError("laufruhe", "{text}", {"text": text})
+
+
+_DEG = math.radians(1.0)
+
+Length: TypeAlias = Annotated[float, Quantity("m")]
+PositiveLength: TypeAlias = Annotated[float, Quantity("m", above=0.0)]
+Mass: TypeAlias = Annotated[float, Quantity("kg", least=0.0)]
+PositiveMass: TypeAlias = Annotated[float, Quantity("kg", above=0.0)]
+Inertia: TypeAlias = Annotated[float, Quantity("kg m^2")]
+Pressure: TypeAlias = Annotated[float, Quantity("Pa")]
+PositivePressure: TypeAlias = Annotated[float, Quantity("Pa", above=0.0)]
+Angle: TypeAlias = Annotated[float, Quantity("rad", plain=_DEG)]
+OpenAngle: TypeAlias = Annotated[float | Open, Quantity("rad", plain=_DEG, openable=True)]
+Speed: TypeAlias = Annotated[float, Quantity("rad/s", above=0.0)]
+PistonSpeed: TypeAlias = Annotated[float, Quantity("m/s", above=0.0)]
+Number: TypeAlias = Annotated[float, Quantity("")]
+NonNegative: TypeAlias = Annotated[float, Quantity("", least=0.0)]
+Positive: TypeAlias = Annotated[float, Quantity("", above=0.0)]
+Fraction: TypeAlias = Annotated[float | Open, Quantity("", least=-10.0, most=10.0, openable=True)]
+OpenUnbalance: TypeAlias = Annotated[float | Open, Quantity("kg m", least=0.0, openable=True)]
+OpenMass: TypeAlias = Annotated[float | Open, Quantity("kg", least=0.0, openable=True)]

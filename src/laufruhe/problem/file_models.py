@@ -1,0 +1,264 @@
+"""The problem file, key by key: what may stand where (docs/problem-files.md)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from laufruhe.problem import fields as f
+from laufruhe.problem.quantity import MASSES, MEASURES, Subject
+
+LOAD_NAMES = tuple(f"{measure} {s}" for s in Subject if s not in MASSES for measure in MEASURES)
+MASS_NAMES = tuple(str(s) for s in MASSES)
+QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": [*LOAD_NAMES, *MASS_NAMES]})]
+Count: TypeAlias = Annotated[int, Field(ge=1, le=48)]
+CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
+Place: TypeAlias = Annotated[list[f.Length], Field(min_length=3, max_length=3)]
+Triple: TypeAlias = Annotated[list[f.NonNegative], Field(min_length=3, max_length=3)]
+Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60)]
+
+
+class Table(BaseModel):
+    """A TOML table that knows its keys and takes no others."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class RodTable(Table):
+    """The connecting rod as a rigid body."""
+
+    mass: f.PositiveMass
+    centre_of_gravity: f.Length = Field(description="Distance from the crank pin, on the line of the pins.")
+    inertia: f.Inertia = Field(description="About the centre of gravity.")
+
+
+class ShaftTable(Table):
+    """A crankshaft of a free list of parts."""
+
+    name: Name
+    ratio: f.Number = 1.0
+    position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
+
+
+class SliderCrankTable(Table):
+    """One slider-crank of a free list of parts; what it leaves out it takes from [engine]."""
+
+    x: f.Length
+    bank_angle: f.Angle = Field(default=0.0, description="Of the cylinder axis, from upright towards the left.")
+    throw: f.Angle = 0.0
+    firing_angle: f.Angle | None = Field(default=None, description="Crank angle at which it fires.")
+    shaft: str = "crankshaft"
+    stroke: f.PositiveLength | None = None
+    bore: f.PositiveLength | None = None
+    rod_ratio: f.NonNegative | None = None
+    rod_length: f.PositiveLength | None = None
+    offset: f.Length | None = None
+    reciprocating_mass: f.Mass | None = None
+    rotating_mass: f.Mass | None = None
+    rod_inertia_deficit: f.Inertia | None = None
+
+
+class EngineTable(Table):
+    """What the engine is."""
+
+    layout: Literal["inline", "vee", "boxer", "parts"]
+    cycle: Literal["two-stroke", "four-stroke"]
+    cylinders: Count | None = Field(default=None, description="Told by throws or firing order where left out.")
+    bore: f.PositiveLength | None = Field(default=None, description="Needed with gas.")
+    stroke: f.PositiveLength
+    rod_ratio: f.NonNegative | None = Field(
+        default=None, description="Crank radius over rod length; 0 is a Scotch yoke."
+    )
+    rod_length: f.PositiveLength | None = None
+    offset: f.Length = Field(default=0.0, description="Of the pin's path from the crank axis.")
+    reciprocating_mass: f.Mass = Field(description="Per cylinder, with the rod's share unless [engine.rod] is given.")
+    rotating_mass: f.Mass = Field(default=0.0, description="Per throw, at the crank radius.")
+    rod: RodTable | None = None
+    rod_inertia_deficit: f.Inertia = Field(default=0.0, description="True inertia less that of the two masses.")
+    cylinder_spacing: f.PositiveLength | None = Field(
+        default=None, description="Between throws; in a boxer, of a bank."
+    )
+    bank_angle: f.Angle | None = Field(default=None, description="Between the banks of a vee.")
+    split_pin_angle: f.Angle | None = None
+    bank_stagger: f.Length | None = None
+    throws: list[f.Angle] | None = Field(default=None, description="At phi = 0; even firing where left out.")
+    firing_order: list[CylinderNumber] | None = None
+    shafts: list[ShaftTable] = Field(default_factory=list)
+    slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
+
+
+class OperatingPointTable(Table):
+    """A speed and a load."""
+
+    name: Name | None = None
+    speed: f.Speed | None = None
+    mean_piston_speed: f.PistonSpeed | None = None
+    imep: f.Pressure | None = Field(default=None, description="In place of that of [gas].")
+    motored: bool = False
+    weight: f.Positive = 1.0
+
+
+class SeiligerTable(Table):
+    """Mixed cycle, its cut-off solved for the indicated mean pressure."""
+
+    model: Literal["seiliger"]
+    peak_pressure: f.PositivePressure
+    imep: f.Pressure
+    compression_ratio: f.Positive | None = None
+    compression_exponent: f.Positive | None = None
+    expansion_exponent: f.Positive | None = None
+    intake_pressure: f.PositivePressure | None = None
+    exhaust_pressure: f.PositivePressure | None = None
+    crankcase_pressure: f.PositivePressure | None = None
+
+
+class WiebeTable(Table):
+    """Finite heat release, the heat solved for the indicated mean pressure."""
+
+    model: Literal["wiebe"]
+    imep: f.Pressure
+    start: f.Angle
+    duration: f.Angle
+    shape: f.NonNegative | None = None
+    completeness: f.Positive | None = None
+    compression_ratio: f.Positive | None = None
+    heat_ratio: f.Positive | None = None
+    intake_pressure: f.PositivePressure | None = None
+    exhaust_pressure: f.PositivePressure | None = None
+    crankcase_pressure: f.PositivePressure | None = None
+
+
+class TraceTable(Table):
+    """A measured trace: a CSV file of crank angle after the firing dead centre and absolute pressure."""
+
+    model: Literal["trace"]
+    file: str
+    pressure_unit: str = "bar"
+    angle_unit: str = "deg"
+    crankcase_pressure: f.PositivePressure | None = None
+
+
+GasTable: TypeAlias = Annotated[SeiligerTable | WiebeTable | TraceTable, Field(discriminator="model")]
+
+
+class MountTable(Table):
+    """One mount."""
+
+    name: Name | None = None
+    position: Place
+    relative_stiffness: Triple | None = Field(default=None, description="Along its own x, y, z; 0 carries nothing.")
+    turned: Annotated[list[f.Angle], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="Turns about x, then y, then z that bring the axes of C2 to its own."
+    )
+
+
+class MountsTable(Table):
+    """How the engine is held."""
+
+    kind: Literal["rigid"] = "rigid"
+    positions: list[Place] = Field(default_factory=list)
+    names: list[Name] | None = None
+    relative_stiffness: Triple = Field(default=[0.0, 1.0, 1.0], description="Of every mount that gives none.")
+    places: list[MountTable] = Field(default_factory=list)
+
+
+class CounterweightTable(Table):
+    """A counterweight on the crankshaft, or one opposite every throw."""
+
+    name: Name
+    balance_fraction: f.Fraction | None = Field(
+        default=None, description="kappa: rotating mass and this share of the reciprocating mass, opposite each throw."
+    )
+    throws: list[CylinderNumber] | None = None
+    x: f.Length | None = None
+    opposite_throw: CylinderNumber | None = Field(default=None, description="Angle and place are counted from it.")
+    unbalance: f.OpenUnbalance | None = None
+    mass: f.OpenMass | None = None
+    radius: f.PositiveLength | None = None
+    angle: f.OpenAngle = 0.0
+
+
+class CoupledTable(Table):
+    """Follows another unbalance."""
+
+    to: str
+    how: Literal["equal", "opposite", "mirrored", "mirrored opposite"] = Field(alias="as")
+
+
+class UnbalanceTable(Table):
+    """One unbalance of a shaft."""
+
+    name: Name | None = None
+    x: f.Length = 0.0
+    unbalance: f.OpenUnbalance | None = None
+    mass: f.OpenMass | None = None
+    radius: f.PositiveLength | None = None
+    angle: f.OpenAngle = 0.0
+    coupled: CoupledTable | None = None
+
+
+class BalancerShaftTable(Table):
+    """A balancer shaft."""
+
+    name: Name
+    ratio: f.Number
+    position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
+    unbalances: list[UnbalanceTable] = Field(min_length=1)
+
+
+class QuantityTable(Table):
+    """What part of a quantity counts."""
+
+    mounts: list[str] | None = None
+    operating_points: list[str] | None = None
+    orders: list[f.NonNegative] | None = None
+    direction_weights: Triple | None = None
+
+
+class TermTable(QuantityTable):
+    """One part of a weighted objective."""
+
+    quantity: QuantityName
+    weight: f.Positive = 1.0
+
+
+class ObjectiveTable(QuantityTable):
+    """What is to be least: one quantity, or a weighted sum of terms."""
+
+    minimise: QuantityName | None = None
+    terms: list[TermTable] = Field(default_factory=list)
+
+
+class ConstraintTable(QuantityTable):
+    """A limit on a quantity."""
+
+    limit: QuantityName
+    max: str = Field(description="With the unit of the quantity.", examples=["6 kg"])
+    name: Name | None = None
+    of: list[str] | None = Field(default=None, description="Counterweights or balancers whose mass counts.")
+
+
+class FidelityTable(Table):
+    """Speed against accuracy."""
+
+    kinematics: Literal["exact", "two-order"] = "exact"
+    samples: int = Field(default=1440, ge=48, le=100_000, description="Steps over the working cycle.")
+
+
+class ProblemFile(Table):
+    """A whole problem file."""
+
+    title: str = Field(min_length=1)
+    source: str = ""
+    assumptions: list[str] = Field(default_factory=list)
+    tolerance: f.Positive = Field(default=1e-4, description="Relative gap at which an optimum counts as proven.")
+    engine: EngineTable
+    operating_points: list[OperatingPointTable] = Field(min_length=1)
+    gas: GasTable | None = None
+    mounts: MountsTable | None = None
+    counterweights: list[CounterweightTable] = Field(default_factory=list)
+    balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
+    objective: ObjectiveTable | None = None
+    constraints: list[ConstraintTable] = Field(default_factory=list)
+    fidelity: FidelityTable = Field(default_factory=FidelityTable)

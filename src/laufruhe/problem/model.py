@@ -1,0 +1,146 @@
+"""A design problem: an engine, what may be decided, what is wanted, what is forbidden."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.physics.shaking_loads import EXACT, Fidelity
+from laufruhe.problem.quantity import Quantity
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """How a decision acts on one rotor: U += gain u, or gain conj(u) when mirrored."""
+
+    rotor: str
+    gain: complex
+    mirrored: bool = False
+
+
+@dataclass(frozen=True)
+class UnbalanceDecision:
+    """A size, and an angle where that is open, that rotors' unbalances follow (C4).
+
+    The decision is u = size e^{i angle}. With the angle fixed it is one real number
+    between bounds; else it lies in the disc or the sector of the largest size.
+
+    Attributes
+    ----------
+    name
+        As in the problem file.
+    unit
+        Of the size: "kg m", "kg", or "" for a balance fraction.
+    lower, upper
+        Bounds of the size; the lower one is zero unless the angle is fixed.
+    angle
+        Bounds of the angle [rad]: equal when fixed, a whole turn apart when free.
+    start
+        u of the design as given.
+    drives
+        The rotors that follow.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    angle: tuple[float, float]
+    start: complex
+    drives: tuple[Drive, ...]
+
+    @property
+    def fixed_angle(self) -> bool:
+        """Whether the size alone is open."""
+        return self.angle[0] == self.angle[1]
+
+    @property
+    def free_angle(self) -> bool:
+        """Whether every angle is allowed."""
+        return self.angle[1] - self.angle[0] >= math.tau * (1.0 - 1e-12)
+
+    def split(self, u: complex) -> tuple[float, float]:
+        """Size and angle [rad] of a value, the angle within the bounds' own turn."""
+        if self.fixed_angle:
+            return (u * cmath.exp(-1j * self.angle[0])).real, self.angle[0]
+        low = self.angle[0]
+        return abs(u), low + (cmath.phase(u) - low) % math.tau if u != 0 else low
+
+
+@dataclass(frozen=True)
+class Term:
+    """One weighted part of the objective."""
+
+    quantity: Quantity
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A quantity that may not exceed a value [SI]."""
+
+    name: str
+    quantity: Quantity
+    maximum: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything that a solver and a report need to know.
+
+    Attributes
+    ----------
+    name
+        Of the file, for results.
+    title, source, assumptions
+        For the reader of a report.
+    engine
+        The design as given; open numbers stand at their start.
+    points
+        Operating points.
+    decisions
+        What is open.
+    objective
+        Weighted sum of quantities to be least.
+    limits
+        What is forbidden.
+    fidelity
+        What of the physics is kept.
+    tolerance
+        Relative gap at which an optimum counts as proven.
+    """
+
+    name: str
+    title: str
+    engine: Engine
+    points: tuple[OperatingPoint, ...]
+    decisions: tuple[UnbalanceDecision, ...] = ()
+    objective: tuple[Term, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    source: str = ""
+    assumptions: tuple[str, ...] = ()
+    fidelity: Fidelity = EXACT
+    tolerance: float = 1e-4
+
+    @property
+    def start(self) -> tuple[complex, ...]:
+        """Decisions of the design as given."""
+        return tuple(decision.start for decision in self.decisions)
+
+    def design(self, values: Sequence[complex]) -> Engine:
+        """The engine with these decisions in place of those it was given with."""
+        unbalances = {rotor.name: rotor.unbalance for rotor in self.engine.rotors}
+        for decision, value in zip(self.decisions, values, strict=True):
+            change = value - decision.start
+            for drive in decision.drives:
+                unbalances[drive.rotor] += drive.gain * (change.conjugate() if drive.mirrored else change)
+        rotors = tuple(replace(rotor, unbalance=unbalances[rotor.name]) for rotor in self.engine.rotors)
+        return replace(self.engine, rotors=rotors)

@@ -1,0 +1,179 @@
+"""Reading a problem file: TOML, keys, geometry, and what is asked of it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from laufruhe import units
+from laufruhe.errors import Complaint, InputError, ModelError
+from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
+from laufruhe.machine.layouts import throw_rotors
+from laufruhe.physics.shaking_loads import Fidelity
+from laufruhe.problem.assemble_engine import cycle_of, mounts_of, moving_parts, operating_points
+from laufruhe.problem.assemble_rotors import RotorList, balancer_shafts, counterweights
+from laufruhe.problem.complaints import Refused, complaints_of, nearest
+from laufruhe.problem.file_models import LOAD_NAMES, MASS_NAMES, ConstraintTable, ProblemFile, QuantityTable
+from laufruhe.problem.model import Limit, Problem, Term
+from laufruhe.problem.quantity import MEASURES, Quantity, Subject, counted_rotors
+
+
+def load(path: str | Path) -> Problem:
+    """Read and check a problem file.
+
+    Raises
+    ------
+    InputError
+        With one line for everything wrong: file, key, value, rule, remedy.
+    """
+    path = Path(path)
+    file = _parsed(path)
+    try:
+        return _assembled(file, path)
+    except Refused as refused:
+        raise InputError(str(path), (refused.complaint,)) from None
+    except ModelError as error:
+        rule, _, remedy = str(error).partition("; ")
+        raise InputError(str(path), (Complaint("engine", "", rule, remedy),)) from None
+
+
+def _parsed(path: Path) -> ProblemFile:
+    try:
+        text = path.read_bytes().decode("utf-8")
+        tables = tomllib.loads(text)
+    except IsADirectoryError:
+        raise _unreadable(path, "is a folder", "name a problem file in it") from None
+    except FileNotFoundError:
+        raise _unreadable(path, "does not exist", "check the path") from None
+    except OSError as error:
+        raise _unreadable(path, f"cannot be read ({error.strerror})", "check its permissions") from None
+    except UnicodeDecodeError as error:
+        raise _unreadable(path, f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        raise _unreadable(path, f"is no TOML: {error}", "correct it there") from None
+    except RecursionError:
+        raise _unreadable(path, "is nested too deeply", "flatten it") from None
+    try:
+        return ProblemFile.model_validate(tables)
+    except ValidationError as error:
+        raise InputError(str(path), complaints_of(error, ProblemFile)) from None
+
+
+def _unreadable(path: Path, rule: str, remedy: str) -> InputError:
+    return InputError(str(path), (Complaint("file", "", rule, remedy),))
+
+
+def _assembled(file: ProblemFile, path: Path) -> Problem:
+    has_gas = file.gas is not None and not all(point.motored for point in file.operating_points)
+    cylinders, throws = moving_parts(file.engine, has_gas)
+    collected = RotorList(rotors=list(throw_rotors(throws)))
+    counterweights(file.counterweights, cylinders, throws, collected)
+    balancer_shafts(file.balancer_shafts, collected)
+    mounts = mounts_of(file.mounts)
+    engine = Engine(file.title, cycle_of(file.engine), cylinders, tuple(collected.rotors), mounts)
+    points = operating_points(file, path.parent)
+    scene = _Scene(mounts, points, tuple(collected.rotors))
+    return Problem(
+        name=path.stem,
+        title=file.title,
+        engine=engine,
+        points=points,
+        decisions=tuple(collected.decisions),
+        objective=_objective(file, scene),
+        limits=tuple(_limit(table, k, scene) for k, table in enumerate(file.constraints)),
+        source=file.source,
+        assumptions=tuple(file.assumptions),
+        fidelity=Fidelity(file.fidelity.kinematics, file.fidelity.samples),
+        tolerance=file.tolerance,
+    )
+
+
+class _Scene:
+    """What quantities may refer to."""
+
+    def __init__(self, mounts: Sequence[Mount], points: Sequence[OperatingPoint], rotors: Sequence[Rotor]) -> None:
+        self.mounts = [mount.name for mount in mounts]
+        self.points = [point.name for point in points]
+        self.rotors = rotors
+
+    def quantity(self, name: str, table: QuantityTable, where: str, of: list[str] | None = None) -> Quantity:
+        """The quantity that a name and its filters mean, checked against the engine."""
+        if name not in (*LOAD_NAMES, *MASS_NAMES):
+            raise Refused(where, name, "is no quantity", nearest(name, [*LOAD_NAMES, *MASS_NAMES]))
+        at = where.rsplit(".", 1)[0]
+        if name in MASS_NAMES:
+            return self._mass(name, table, at, of)
+        measure, _, subject = name.partition(" ")
+        if of is not None:
+            raise Refused(f"{at}.of", of, "goes with masses only", "leave it out")
+        if subject == Subject.MOUNT_FORCE and not self.mounts:
+            raise Refused(where, name, "needs mounts", "add [mounts], or ask for a shaking force")
+        if subject != Subject.MOUNT_FORCE and (table.mounts or table.direction_weights):
+            raise Refused(f"{at}.mounts", None, "goes with mount forces only", "leave it out")
+        self._known(table.mounts, self.mounts, f"{at}.mounts", "mount")
+        self._known(table.operating_points, self.points, f"{at}.operating_points", "operating point")
+        weights = table.direction_weights
+        return Quantity(
+            Subject(subject),
+            MEASURES[measure],
+            mounts=_tuple(table.mounts),
+            points=_tuple(table.operating_points),
+            orders=None if table.orders is None else tuple(table.orders),
+            direction_weights=None if weights is None else (weights[0], weights[1], weights[2]),
+        )
+
+    def _mass(self, name: str, table: QuantityTable, at: str, of: list[str] | None) -> Quantity:
+        for key in ("mounts", "operating_points", "orders", "direction_weights"):
+            if getattr(table, key) is not None:
+                raise Refused(f"{at}.{key}", None, "means nothing for a mass", "leave it out")
+        self._known(of, [rotor.name for rotor in self.rotors], f"{at}.of", "counterweight or balancer")
+        quantity = Quantity(Subject(name), MEASURES["mean"], rotors=_tuple(of))
+        for rotor in counted_rotors(quantity, self.rotors):
+            if rotor.radius is None:
+                raise Refused(f"{at}", name, f"counts the mass of '{rotor.name}', which has no radius", "give it one")
+        return quantity
+
+    @staticmethod
+    def _known(names: list[str] | None, known: Sequence[str], where: str, what: str) -> None:
+        if names is not None and not names:
+            raise Refused(where, names, "is empty", "leave it out to count all")
+        for name in names or ():
+            if name not in known:
+                raise Refused(where, name, f"is no {what} here", nearest(name, list(known)) if known else "add it")
+
+
+def _tuple(names: list[str] | None) -> tuple[str, ...] | None:
+    return None if names is None else tuple(names)
+
+
+def _objective(file: ProblemFile, scene: _Scene) -> tuple[Term, ...]:
+    table = file.objective
+    if table is None:
+        return (
+            (Term(scene.quantity("mean mount force", QuantityTable(), "objective.minimise")),) if scene.mounts else ()
+        )
+    if (table.minimise is None) == (not table.terms):
+        state = "is missing" if table.minimise is None else "is given twice, also as terms"
+        raise Refused("objective.minimise", table.minimise, state, "give minimise or [[objective.terms]], one of them")
+    if table.minimise is not None:
+        return (Term(scene.quantity(table.minimise, table, "objective.minimise")),)
+    return tuple(
+        Term(scene.quantity(term.quantity, term, f"objective.terms[{k + 1}].quantity"), term.weight)
+        for k, term in enumerate(table.terms)
+    )
+
+
+def _limit(table: ConstraintTable, k: int, scene: _Scene) -> Limit:
+    where = f"constraints[{k + 1}]"
+    quantity = scene.quantity(table.limit, table, f"{where}.limit", table.of)
+    try:
+        maximum = units.parse(table.max, quantity.unit)
+    except units.UnitError as error:
+        rule, _, remedy = str(error).partition("; ")
+        raise Refused(f"{where}.max", table.max, rule, remedy) from None
+    if maximum < 0.0:
+        raise Refused(f"{where}.max", table.max, "is negative, and no norm is", "give a value of zero or more")
+    return Limit(table.name or quantity.name, quantity, maximum)

@@ -1,0 +1,48 @@
+"""One solver per file; what they return is evaluated again by the exact model."""
+
+from __future__ import annotations
+
+import time
+
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.model import Problem
+from laufruhe.solve.result import ObjectiveValue, Result, Status
+from laufruhe.solve.unbalances import objective_name, sampling_error, solve_unbalances
+
+__all__ = ["Result", "Status", "solve", "state"]
+
+
+def solve(problem: Problem) -> Result:
+    """Decide what a problem leaves open.
+
+    Raises
+    ------
+    SolverError
+        If a solver stops without an answer.
+    ModelError
+        If the engine as given cannot be evaluated.
+    """
+    return solve_unbalances(problem) if problem.decisions else state(problem)
+
+
+def state(problem: Problem) -> Result:
+    """The design as given, evaluated and not changed."""
+    started = time.perf_counter()
+    evaluation = evaluate(problem)
+    objective = None
+    if problem.objective:
+        value = objective_value(problem, evaluation)
+        unit = problem.objective[0].quantity.unit
+        objective = ObjectiveValue(objective_name(problem), value, unit, value)
+    return Result(
+        problem=problem,
+        status=Status.FEASIBLE,
+        objective=objective,
+        certificate=None,
+        decisions=(),
+        limits=(),
+        initial=evaluation,
+        final=evaluation,
+        error_estimate=sampling_error(problem, evaluation) if problem.objective else 0.0,
+        timing={"evaluate": time.perf_counter() - started},
+    )

@@ -1,0 +1,111 @@
+"""Units at the border (C1): text with a unit in, SI inside, readable text out."""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pint
+
+_QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
+_DEFINITIONS = (
+    "@alias kilogram_force = kp = kilopond",
+    "pferdestaerke = 75 * kilogram_force * meter / second = PS",
+)
+
+
+class UnitError(ValueError):
+    """A text that is no number with the unit wanted: rule first, then remedy after '; '."""
+
+
+@cache
+def _registry() -> pint.UnitRegistry[Any]:
+    import pint
+
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry()
+    for definition in _DEFINITIONS:
+        registry.define(definition)
+    return registry
+
+
+@cache
+def _factor(unit: str, wanted: str) -> float:
+    """SI value of one `unit` of the dimension of `wanted`."""
+    registry = _registry()
+    try:
+        one = registry.Quantity(1.0, registry.parse_units(unit))
+        target = registry.parse_units(wanted) if wanted else registry.dimensionless
+        ratio = float(one.to(target).magnitude)
+        doubled = float((2.0 * one).to(target).magnitude)
+    except Exception as error:
+        if type(error).__name__ == "DimensionalityError":
+            raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {_advice(wanted)}") from None
+        raise UnitError(f"unit '{unit}' is not known; {_advice(wanted)}") from None
+    if not math.isclose(doubled, 2.0 * ratio):
+        raise UnitError(f"'{unit}' has a zero of its own; {_advice(wanted)}")
+    return ratio
+
+
+_EXAMPLES = {
+    "m": ("a length", "120 mm"),
+    "kg": ("a mass", "1.25 kg"),
+    "kg m": ("an unbalance", "0.02 kg m"),
+    "kg m^2": ("a moment of inertia", "4.2 kg cm^2"),
+    "Pa": ("a pressure", "5.5 kp/cm^2"),
+    "N": ("a force", "900 N"),
+    "N m": ("a moment", "120 N m"),
+    "N/m": ("a stiffness", "300 N/mm"),
+    "rad": ("an angle", "90 deg"),
+    "rad/s": ("a speed of rotation", "2500 rpm"),
+    "m/s": ("a speed", "10 m/s"),
+    "": ("a plain number", "0.26"),
+}
+
+
+def dimension_name(unit: str) -> str:
+    """What a unit measures, in words."""
+    return _EXAMPLES.get(unit, (f"the dimension of {unit}", ""))[0]
+
+
+def example(unit: str) -> str:
+    """A value as a user would write it."""
+    return _EXAMPLES.get(unit, ("", f"1 {unit}"))[1]
+
+
+def _advice(unit: str) -> str:
+    return f'write for example "{example(unit)}"'
+
+
+def parse(text: str, unit: str) -> float:
+    """SI value of a text such as '120 mm' in the dimension of `unit`.
+
+    Raises
+    ------
+    UnitError
+        If the text is no number, has no unit, or a unit of another dimension.
+    """
+    match = _QUANTITY.match(text)
+    if match is None:
+        raise UnitError(f"is not a number with a unit; {_advice(unit)}")
+    number, divisor, name = match.groups()
+    if divisor is not None and int(divisor) == 0:
+        raise UnitError(f"divides by zero; {_advice(unit)}")
+    value = float(number) / (int(divisor) if divisor else 1)
+    if name is None and unit:
+        raise UnitError(f"has no unit, {dimension_name(unit)} needs one; {_advice(unit)}")
+    value *= _factor(name.strip(), unit) if name else 1.0
+    if not math.isfinite(value):
+        raise UnitError(f"is not finite; {_advice(unit)}")
+    return value
+
+
+_SHOWN = {"rad": ("deg", math.degrees(1.0)), "rad/s": ("rpm", 30.0 / math.pi), "m": ("mm", 1e3)}
+
+
+def shown(value: float, unit: str, digits: int = 4) -> str:
+    """Value and unit as a report prints them: angles in degrees, lengths in mm, speeds in rpm."""
+    name, factor = _SHOWN.get(unit, (unit, 1.0))
+    return f"{value * factor:.{digits}g} {name}".rstrip()
