@@ -69,17 +69,24 @@ class ConicProgram:
     Parameters
     ----------
     problem
-        Its slopes, weights and domains are built in; constants and maxima may change.
+        Its slopes, weights and domains are built in.
+    reusable
+        Whether constants and maxima may change between solves. What is gained in a
+        sweep is paid once, when the program is compiled.
     """
 
-    def __init__(self, problem: AffineProblem) -> None:
+    def __init__(self, problem: AffineProblem, reusable: bool = False) -> None:
         self._problem = problem
+        self._reusable = reusable
         # decisions in units of their bounds, rows in units of what they can reach
         self._y = cp.Variable(problem.size)
         self._unit = _reach(problem, [norm for _, norm in problem.terms])
         self._terms = [self._cone(norm, self._unit) for _, norm in problem.terms]
         self._limits = [self._cone(norm, _reach(problem, [norm])) for _, norm in problem.limits]
-        self._maxima = [cp.Parameter(nonneg=True) for _ in problem.limits]
+        self._maxima = [
+            self._number(np.array(maximum / cone.unit))
+            for (maximum, _), cone in zip(problem.limits, self._limits, strict=True)
+        ]
         least = [weight * _value(norm, cone) for (weight, norm), cone in zip(problem.terms, self._terms, strict=True)]
         constraints = [cone.cone for cone in (*self._terms, *self._limits)]
         constraints += [
@@ -92,7 +99,7 @@ class ConicProgram:
     def _cone(self, norm: AffineNorm, unit: float) -> _Cone:
         """V0 + B x in a second-order cone a row, or in one cone for a root mean square."""
         k, d = norm.constant.shape
-        constant = cp.Parameter((k, d))
+        constant = self._number(norm.constant / unit)
         slope = (norm.slope * (self._problem.scales / unit)).reshape(k * d, -1)
         rows = cp.reshape(slope @ self._y, (k, d), order="C") + constant
         if norm.norm is Norm.RMS:
@@ -104,6 +111,9 @@ class ConicProgram:
         tops = heads if norm.norm is Norm.SUM else heads * np.ones(k)
         return _Cone(constant, heads, cp.SOC(tops, rows, axis=1), unit, (k, d), np.ones(k))
 
+    def _number(self, value: Array) -> Any:
+        return cp.Parameter(value.shape, value=value) if self._reusable else cp.Constant(value)
+
     def solve(self, problem: AffineProblem | None = None) -> ConicSolution:
         """Solve with the constants and maxima of `problem`, whose slopes must be those built in.
 
@@ -112,11 +122,9 @@ class ConicProgram:
         SolverError
             If the solver stops without telling optimal from infeasible.
         """
+        if problem is not None:
+            self._take(problem)
         problem = self._problem if problem is None else problem
-        for cone, (_, norm) in zip((*self._terms, *self._limits), (*problem.terms, *problem.limits), strict=True):
-            cone.constant.value = norm.constant / cone.unit
-        for most, cone, (maximum, _) in zip(self._maxima, self._limits, problem.limits, strict=True):
-            most.value = maximum / cone.unit
         with warnings.catch_warnings():
             # an inaccurate answer is judged by its certificate, not by a warning
             warnings.simplefilter("ignore")
@@ -125,6 +133,14 @@ class ConicProgram:
             except cp.error.SolverError as error:
                 raise SolverError(f"the cone solver gave up ({error})") from None
         return self._answer(problem)
+
+    def _take(self, problem: AffineProblem) -> None:
+        if not self._reusable:
+            raise ValueError("a program that is not reusable cannot take other constants")
+        for cone, (_, norm) in zip((*self._terms, *self._limits), (*problem.terms, *problem.limits), strict=True):
+            cone.constant.value = norm.constant / cone.unit
+        for most, cone, (maximum, _) in zip(self._maxima, self._limits, problem.limits, strict=True):
+            most.value = maximum / cone.unit
 
     def _answer(self, problem: AffineProblem) -> ConicSolution:
         status, stats = self._program.status, self._program.solver_stats

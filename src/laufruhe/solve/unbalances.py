@@ -19,7 +19,9 @@ from laufruhe.solve.result import DecisionValue, LimitValue, ObjectiveValue, Res
 
 Array = NDArray[np.float64]
 
-FIRST_SAMPLES = 64
+MOST_DOUBLINGS = 2
+MOST_ROWS = 60_000
+NEGLIGIBLE = 1e-9
 FEASIBLE = 1e-6
 ACTIVE = 1e-5
 FLOOR = 1e-3
@@ -33,7 +35,6 @@ class _Optimum:
     problem: AffineProblem
     gap: float
     samples: int
-    iterations: int
 
 
 def solve_unbalances(problem: Problem) -> Result:
@@ -65,51 +66,50 @@ def solve_unbalances(problem: Problem) -> Result:
 
 
 def _refine(problem: Problem, model: AffineModel, initial: float) -> _Optimum | None:
-    """Solve on finer and finer grids until the bound on the finest meets the design (P6)."""
-    from laufruhe.solve.conic import ConicProgram, lightest
+    """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6)."""
+    from laufruhe.solve.conic import ConicProgram
 
-    full = model.full_samples
-    fine = model.at(full)
-    samples, best = _coarsest(full), None
-    while True:
-        coarse = fine if samples == full else model.at(samples)
+    samples = model.full_samples
+    for doubling in range(MOST_DOUBLINGS + 1):
+        coarse, fine = model.at(samples), model.at(2 * samples)
         solution = ConicProgram(coarse).solve()
         if solution.x is None:
             # fewer angles ask for less: what they cannot meet, all cannot
             return None
-        x = solution.x
+        x = _settled(problem, fine, solution.x)
         bound = best_bound(fine, coarse, x, solution.multipliers)
-        value = fine.objective(x)
-        gap = (value - bound.value) / _measure(value, initial)
-        excess = max((n.value(x) - m) / (m or 1.0) for m, n in fine.limits) if fine.limits else 0.0
-        best = _Optimum(x, bound, fine, gap, samples, solution.iterations)
-        if (gap <= problem.tolerance and excess <= FEASIBLE) or samples == full:
+        gap = (fine.objective(x) - bound.value) / _measure(fine.objective(x), initial)
+        proven = gap <= problem.tolerance and _excess(fine, x) <= FEASIBLE
+        if proven or doubling == MOST_DOUBLINGS or len(fine.terms[0][1].weights) > MOST_ROWS:
             break
-        samples = _next(samples, full)
-    still = _indistinguishable(problem, fine)
+        samples *= 2
+    return _Optimum(x, bound, fine, max(gap, 0.0), samples)
+
+
+def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
+    """Of designs that no load can tell apart the lightest, what is negligible in it left out."""
+    from laufruhe.solve.conic import lightest
+
+    still = _indistinguishable(problem, affine)
     if still.shape[1]:
-        sizes = [sum(abs(drive.gain) for drive in domain.decision.drives) for domain in fine.domains]
-        x = lightest(fine, best.x, still, sizes)
-        value = fine.objective(x)
-        best = replace(best, x=x, gap=(value - best.bound.value) / _measure(value, initial))
-    return best
+        sizes = [sum(abs(drive.gain) for drive in domain.decision.drives) for domain in affine.domains]
+        x = lightest(affine, x, still, sizes)
+    x = x.copy()
+    for domain in affine.domains:
+        part = x[domain.columns]
+        if domain.decision.lower <= 0.0 and float(np.hypot.reduce(part)) <= NEGLIGIBLE * domain.scale:
+            x[domain.columns] = 0.0
+    return x
+
+
+def _excess(affine: AffineProblem, x: Array) -> float:
+    """Largest relative excess over a limit."""
+    return max(((norm.value(x) - maximum) / (maximum or 1.0) for maximum, norm in affine.limits), default=0.0)
 
 
 def _measure(value: float, initial: float) -> float:
     """What a gap is counted in: a perfectly balanced engine has no objective of its own."""
     return max(value, FLOOR * initial) or 1.0
-
-
-def _divisors(full: int) -> list[int]:
-    return [n for n in range(1, full + 1) if full % n == 0]
-
-
-def _coarsest(full: int) -> int:
-    return next((n for n in _divisors(full) if n >= FIRST_SAMPLES), full)
-
-
-def _next(samples: int, full: int) -> int:
-    return next(n for n in _divisors(full) if n % samples == 0 and n > samples)
 
 
 def _indistinguishable(problem: Problem, affine: AffineProblem) -> Array:
@@ -131,19 +131,18 @@ def _indistinguishable(problem: Problem, affine: AffineProblem) -> Array:
 
 def _triangle(slope: Array) -> Array:
     """R of a QR factorisation, scaled: the same directions in as few rows as there are columns."""
-    triangle: Array = np.linalg.qr(slope, mode="r")
+    triangle: Array = np.asarray(np.linalg.qr(slope, mode="r"))
     return triangle / (float(np.abs(triangle).max()) or 1.0)
 
 
 def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Evaluation) -> Result:
     value, given = objective_value(problem, final), objective_value(problem, initial)
     bound = optimum.bound
-    gap = (value - bound.value) / _measure(value, given)
     residual = kkt_residual(optimum.problem, optimum.x, bound)
     certificate = Certificate(
-        kind=Proof.GLOBAL if gap <= problem.tolerance else Proof.WITHIN_GAP,
+        kind=Proof.GLOBAL if optimum.gap <= problem.tolerance else Proof.WITHIN_GAP,
         lower_bound=bound.value,
-        gap=gap,
+        gap=optimum.gap,
         kkt_residual=residual,
         method=f"second-order cones at {optimum.samples} angles, dual bound at {optimum.problem.samples}",
     )
@@ -222,7 +221,7 @@ def _decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[Decisio
 
 
 def _infeasible(problem: Problem, model: AffineModel, initial: Evaluation, timing: dict[str, float]) -> Result:
-    conflict = _conflict(model.at(_coarsest(model.full_samples)), [limit.name for limit in problem.limits])
+    conflict = _conflict(model.at(model.full_samples), [limit.name for limit in problem.limits])
     names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
     verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
     return Result(
