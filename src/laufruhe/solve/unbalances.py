@@ -19,10 +19,10 @@ from laufruhe.solve.result import DecisionValue, LimitValue, ObjectiveValue, Res
 
 Array = NDArray[np.float64]
 
-MOST_DOUBLINGS = 2
+MOST_DOUBLINGS = 4
 MOST_ROWS = 60_000
 NEGLIGIBLE = 1e-9
-FEASIBLE = 1e-6
+FEASIBLE = 1e-5
 ACTIVE = 1e-5
 FLOOR = 1e-3
 SAME_LOAD = 1e-10
@@ -60,7 +60,9 @@ def solve_unbalances(problem: Problem) -> Result:
     if optimum is None:
         return _infeasible(problem, model, initial, timing)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
-    final = evaluate(problem, problem.design(values))
+    cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
+    final = evaluate(problem, problem.design(values), cycle_samples)
+    initial = replace(initial, samples=cycle_samples)
     result = _result(problem, optimum, initial, final)
     return replace(result, timing={**timing, "evaluate": time.perf_counter() - solved})
 
@@ -181,7 +183,7 @@ def objective_name(problem: Problem) -> str:
 
 def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
     """Relative change of the objective when every second angle is left out."""
-    samples = evaluation.fidelity.samples
+    samples = evaluation.samples
     whole = objective_value(problem, evaluation)
     if samples % 2 or not whole:
         return 0.0
