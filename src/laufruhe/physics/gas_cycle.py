@@ -34,7 +34,7 @@ some 3.4 MJ/m3 at 1 bar and 300 K, which is 34; 50 leaves room for cold charges.
 MAX_TRACE_GAP = math.radians(30.0)
 """Largest gap between points of a measured trace."""
 
-_JUMP_WIDTH = 1e-9
+_JUMP_WIDTH = 1e-11
 _ROUNDING = 1e-12
 
 
@@ -404,8 +404,8 @@ def _unit_quadrature() -> tuple[FloatArray, FloatArray]:
 
     The burn rate behaves as x^m at its start: this rule takes any such end in its stride.
     """
-    step = 1.0 / 16.0
-    t = step * np.arange(-56, 57)
+    step = 1.0 / 24.0
+    t = step * np.arange(-84, 85)
     lean = 0.5 * math.pi * np.sinh(t)
     places = 1.0 / (1.0 + np.exp(-2.0 * lean))
     weights = step * math.pi * np.cosh(t) * places / (1.0 + np.exp(2.0 * lean))
