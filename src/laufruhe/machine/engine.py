@@ -9,6 +9,7 @@ from enum import Enum
 from fractions import Fraction
 
 from laufruhe.errors import ModelError
+from laufruhe.machine.block import Block
 from laufruhe.machine.gas import GasModel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
@@ -76,6 +77,8 @@ class Engine:
         Unbalances on the crank and on balancer shafts.
     mounts
         Empty for an engine whose shaking loads alone are asked for.
+    block
+        The body that elastic mounts carry; without one the mounts are rigid.
     """
 
     name: str
@@ -83,6 +86,7 @@ class Engine:
     slider_cranks: tuple[SliderCrank, ...]
     rotors: tuple[Rotor, ...] = ()
     mounts: tuple[Mount, ...] = ()
+    block: Block | None = None
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts"):

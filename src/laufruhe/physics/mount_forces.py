@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import UncarriedLoadError
 from laufruhe.machine import Mount
+from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.rigid_body import point_motion
 from laufruhe.physics.shaking_loads import WRENCH
 
 FREE_STIFFNESS = 1e-12
@@ -35,8 +37,8 @@ class RigidMounting:
     free: NDArray[np.float64]
     arm: float
 
-    def forces(self, wrench: Spectrum) -> Spectrum:
-        """Mount forces by order, shape (n, mounts, 3) [N].
+    def forces(self, wrench: Spectrum, speed: float = 0.0) -> Spectrum:  # noqa: ARG002
+        """Mount forces by order, shape (n, mounts, 3) [N]; the same at every speed.
 
         Raises
         ------
@@ -71,7 +73,7 @@ def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:
     arm = float(np.linalg.norm(positions, axis=1).max(initial=0.0)) or 1.0
     scales = _scales(arm)
     # displacements of the mount points per scaled motion (translation, arm * rotation)
-    geometry = np.array([_point_motion(position) for position in positions]) / scales
+    geometry = np.array([point_motion(NUMBERS, position) for position in positions]) / scales
     stiffness = np.array([mount.stiffness_matrix for mount in mounts])
     stiffness = stiffness / np.abs(stiffness).max()
     total = np.einsum("mai,mab,mbj->ij", geometry, stiffness, geometry)
@@ -89,9 +91,3 @@ def rigid_mount_maps(mounts: Sequence[Mount]) -> NDArray[np.float64]:
 
 def _scales(arm: float) -> NDArray[np.float64]:
     return np.array([1.0, 1.0, 1.0, arm, arm, arm])
-
-
-def _point_motion(position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Motion of a point per motion of the body, shape (3, 6): u + omega x r (M1)."""
-    x, y, z = position
-    return np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])

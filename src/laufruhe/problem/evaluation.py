@@ -10,10 +10,10 @@ from functools import cached_property
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.spectrum import Spectrum, common_base
-from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.mounting import mounting_of, travel_of
 from laufruhe.physics.shaking_loads import Fidelity, shaking_loads
 from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import MASSES, Quantity, Rows, Subject, load_rows, mass_rows
+from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
 
 PEAK_REFINEMENT = 8
 
@@ -28,19 +28,23 @@ class PointLoads:
         On the block, shape (n, 6) (C7).
     mount_forces
         Of the engine on its mounts, shape (n, mounts, 3); None without mounts.
+    mount_travel
+        Displacement of the engine at them, shape (n, mounts, 3) [m]; None where rigid.
     """
 
     point: OperatingPoint
     wrench: Spectrum
     mount_forces: Spectrum | None
+    mount_travel: Spectrum | None = None
 
     def signal(self, subject: Subject) -> Spectrum:
         """The signal that a load is measured on."""
-        if subject is not Subject.MOUNT_FORCE:
+        if subject not in ON_MOUNTS:
             return self.wrench
-        if self.mount_forces is None:
-            raise ValueError("an engine without mounts has no mount forces")
-        return self.mount_forces
+        signal = self.mount_forces if subject is Subject.MOUNT_FORCE else self.mount_travel
+        if signal is None:
+            raise ValueError(f"this mounting has no {subject}")
+        return signal
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,11 +119,12 @@ def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None
         If the engine drives a direction that no mount carries.
     """
     engine = problem.engine if engine is None else engine
-    mounting = rigid_mounting(engine.mounts) if engine.mounts else None
+    mounting = mounting_of(engine)
     loads = []
     for point in problem.points:
         wrench = shaking_loads(engine, point, problem.fidelity)
-        loads.append(PointLoads(point, wrench, mounting.forces(wrench) if mounting else None))
+        forces = mounting.forces(wrench, point.speed) if mounting else None
+        loads.append(PointLoads(point, wrench, forces, travel_of(mounting, wrench, point.speed)))
     return Evaluation(engine, problem.fidelity, tuple(loads), samples or problem.fidelity.samples)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.shaking_loads import EXACT, Fidelity
+from laufruhe.problem.mount_design import MountDesign
 from laufruhe.problem.quantity import Quantity
 
 Array = NDArray[np.float64]
@@ -116,6 +117,8 @@ class Problem:
         What of the physics is kept.
     tolerance
         Relative gap at which an optimum counts as proven.
+    mount_design
+        What of elastic mounts is open and asked.
     """
 
     name: str
@@ -129,6 +132,7 @@ class Problem:
     assumptions: tuple[str, ...] = ()
     fidelity: Fidelity = EXACT
     tolerance: float = 1e-4
+    mount_design: MountDesign = MountDesign()
 
     @property
     def start(self) -> tuple[complex, ...]:

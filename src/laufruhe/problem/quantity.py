@@ -26,6 +26,7 @@ class Subject(StrEnum):
     """What is measured."""
 
     MOUNT_FORCE = "mount force"
+    MOUNT_TRAVEL = "mount travel"
     SHAKING_FORCE = "shaking force"
     ROCKING_COUPLE = "rocking couple"
     ROLL_MOMENT = "roll moment"
@@ -38,6 +39,8 @@ class Subject(StrEnum):
         """SI unit."""
         if self in MASSES:
             return "kg"
+        if self is Subject.MOUNT_TRAVEL:
+            return "m"
         return "N" if self in (Subject.MOUNT_FORCE, Subject.SHAKING_FORCE) else "N m"
 
 
@@ -46,6 +49,7 @@ MASSES: Mapping[Subject, tuple[Role, ...]] = {
     Subject.BALANCER_MASS: (Role.BALANCER,),
     Subject.ADDED_MASS: (Role.COUNTERWEIGHT, Role.BALANCER),
 }
+ON_MOUNTS = (Subject.MOUNT_FORCE, Subject.MOUNT_TRAVEL)
 _COMPONENTS: Mapping[Subject, slice] = {
     Subject.SHAKING_FORCE: slice(0, 3),
     Subject.ROLL_MOMENT: slice(3, 4),
@@ -140,7 +144,7 @@ def load_rows(
     points
         Operating points, in the order of `signals`.
     signals
-        Per point, mount forces (n, mounts, 3) or the wrench (n, 6), all of one base.
+        Per point, mount forces or travels (n, mounts, 3) or the wrench (n, 6), all of one base.
     mount_names
         In the order of the second axis.
     samples
@@ -165,7 +169,7 @@ def load_rows(
 def _selected(quantity: Quantity, signal: Spectrum, mount_names: Sequence[str]) -> Spectrum:
     """The components, mounts and orders that count, shape (n, mounts or 1, d)."""
     c = signal.coefficients
-    if quantity.subject is Subject.MOUNT_FORCE:
+    if quantity.subject in ON_MOUNTS:
         if quantity.mounts is not None:
             c = c[:, [mount_names.index(name) for name in quantity.mounts], :]
         if quantity.direction_weights is not None:

@@ -13,11 +13,11 @@ from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.spectrum import Spectrum, common_base
-from laufruhe.physics.mount_forces import RigidMounting, rigid_mounting
+from laufruhe.physics.mounting import Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import MASSES, Quantity, Rows, Subject, load_rows, mass_rows
+from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
 from laufruhe.solve.domain import Domain, domains_of
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ class AffineModel:
         self.problem = problem
         self.domains = domains_of(problem.decisions)
         bare = evaluate(problem, problem.design([0.0] * len(problem.decisions)))
-        mounting = rigid_mounting(problem.engine.mounts) if problem.engine.mounts else None
+        mounting = mounting_of(problem.engine)
         changes = [_change(problem, k, direction) for k, d in enumerate(self.domains) for direction in d.directions]
         self._bare, self._changes = bare, changes
         orders = [Fraction(abs(r.shaft.ratio)).limit_denominator(1000) for rotors in changes for r in rotors]
@@ -110,8 +110,10 @@ class AffineModel:
         }
         self.base = self._shortest_base(bare, orders)
 
-    def _subjects(self, mounting: RigidMounting | None) -> tuple[Subject, ...]:
-        return (Subject.SHAKING_FORCE, *((Subject.MOUNT_FORCE,) if mounting else ()))
+    def _subjects(self, mounting: Mounting | None) -> tuple[Subject, ...]:
+        travels = self.problem.engine.block is not None
+        return (Subject.SHAKING_FORCE, *((Subject.MOUNT_FORCE,) if mounting else ()),
+                *((Subject.MOUNT_TRAVEL,) if mounting and travels else ()))  # fmt: skip
 
     def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
         used = [loads.wrench.reduced(tuple(orders)).base for loads in bare.loads]
@@ -135,7 +137,7 @@ class AffineModel:
             bare = mass_rows(quantity, self._bare.engine.rotors)
             slopes = [mass_rows(quantity, _only(self._bare.engine, rotors)).vectors for rotors in self._changes]
             return _stacked(bare, slopes)
-        subject = Subject.MOUNT_FORCE if quantity.subject is Subject.MOUNT_FORCE else Subject.SHAKING_FORCE
+        subject = quantity.subject if quantity.subject in ON_MOUNTS else Subject.SHAKING_FORCE
         bare = self._rows(quantity, [loads.signal(quantity.subject) for loads in self._bare.loads], samples)
         by_point = self._slopes[subject]
         slopes = [
@@ -168,10 +170,12 @@ def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
 
 
 def _slope(
-    rotors: Sequence[Rotor], point: OperatingPoint, engine: Engine, mounting: RigidMounting | None, subject: Subject
+    rotors: Sequence[Rotor], point: OperatingPoint, engine: Engine, mounting: Mounting | None, subject: Subject
 ) -> Spectrum:
     wrench = rotor_loads(rotors, point.speed, engine.cycle)
-    return mounting.forces(wrench) if mounting and subject is Subject.MOUNT_FORCE else wrench
+    if subject is Subject.MOUNT_FORCE and mounting is not None:
+        return mounting.forces(wrench, point.speed)
+    return travel_of(mounting, wrench, point.speed) or wrench if subject is Subject.MOUNT_TRAVEL else wrench
 
 
 def _stacked(bare: Rows, slopes: Sequence[Array]) -> AffineNorm:

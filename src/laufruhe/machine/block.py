@@ -1,0 +1,65 @@
+"""The body that the mounts carry."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.mount import Matrix3, Vector3
+
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class Block:
+    """Engine, gearbox and all that is bolted to them, as one rigid body.
+
+    Attributes
+    ----------
+    mass
+        Everything that the mounts carry, moving parts included [kg].
+    inertia
+        Tensor about the centre of gravity in the axes of C2 [kg m2]; off the diagonal
+        stand its entries, xy = - integral of x y dm.
+    centre_of_gravity
+        (x, y, z) [m] (C2).
+    """
+
+    mass: float
+    inertia: Matrix3
+    centre_of_gravity: Vector3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not (self.mass > 0.0 and math.isfinite(self.mass)):
+            raise ModelError(f"the block's mass {self.mass:g} kg must be positive")
+        tensor = self.tensor
+        if not np.all(np.isfinite(tensor)) or np.abs(tensor - tensor.T).max() > _SLACK * np.abs(tensor).max():
+            raise ModelError("the block's inertia tensor is not symmetric; give xy, xz and yz once each")
+        small, middle, large = np.linalg.eigvalsh(tensor)
+        if small <= 0.0:
+            raise ModelError(
+                f"the block's inertia tensor has a principal moment of {small:.4g} kg m2, no body has that; "
+                "check the products of inertia and their sign"
+            )
+        if large > (small + middle) * (1.0 + _SLACK):
+            raise ModelError(
+                f"the block's principal moments of inertia {small:.4g}, {middle:.4g}, {large:.4g} kg m2 belong to no "
+                "body, the largest must not exceed the sum of the others; check the numbers and the signs of products"
+            )
+
+    @property
+    def tensor(self) -> NDArray[np.float64]:
+        """Inertia tensor, shape (3, 3)."""
+        return np.array(self.inertia, dtype=float)
+
+    @property
+    def mass_matrix(self) -> NDArray[np.float64]:
+        """M of (u, theta) of the centre of gravity, shape (6, 6) (E1)."""
+        matrix = np.zeros((6, 6))
+        matrix[:3, :3] = self.mass * np.eye(3)
+        matrix[3:, 3:] = self.tensor
+        return matrix

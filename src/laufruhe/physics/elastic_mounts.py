@@ -1,0 +1,263 @@
+"""A rigid block on elastic mounts: response and mount forces, order by order (E1-E5, E11, E12).
+
+Motion q = (u, theta) of the centre of gravity follows from the wrench w about it by
+
+    (K + i H + i W C - W^2 M) q = w,    W = order x speed                               (E4)
+
+with K, H, C the sums of G' k G over the mounts, k their stiffness, stiffness times loss
+factor, and viscous damping. In coordinates of the undamped modes M is one and K is
+diagonal, so modes that nothing drives, and that no damping couples to driven ones, are
+seen and left out (E12). Orders without load are left out as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError, UncarriedLoadError
+from laufruhe.machine.block import Block
+from laufruhe.machine.mount import Mount
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.modes import Modes, modes_of
+from laufruhe.physics.rigid_body import carried, moved_wrench, point_motion
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+UNDRIVEN = 1e-12
+RESONANCE = 1e-8
+
+
+class ResonanceError(ModelError):
+    """An order excites a mode at its own frequency, and nothing damps it."""
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticMounting:
+    """The linear map from the wrench on the block to motion and forces, at any speed.
+
+    Attributes
+    ----------
+    block
+        The body carried.
+    mounts
+        What carries it.
+    """
+
+    block: Block
+    mounts: tuple[Mount, ...]
+
+    @cached_property
+    def motions(self) -> Array:
+        """G of every mount, shape (mounts, 3, 6) (E1)."""
+        centre = np.array(self.block.centre_of_gravity)
+        arms = [np.array(mount.position) - centre for mount in self.mounts]
+        return np.array([point_motion(NUMBERS, arm) for arm in arms]).reshape(-1, 3, 6)
+
+    @cached_property
+    def springs(self) -> Array:
+        """k of every mount in the axes of C2, shape (mounts, 3, 3) [N/m] (E2)."""
+        return np.array([mount.stiffness_matrix for mount in self.mounts]).reshape(-1, 3, 3)
+
+    @cached_property
+    def losses(self) -> Array:
+        """Loss factor times k, shape (mounts, 3, 3) [N/m] (E2)."""
+        factors = np.array([mount.loss_factor for mount in self.mounts])
+        return np.asarray(factors[:, None, None] * self.springs)
+
+    @cached_property
+    def dampers(self) -> Array:
+        """Viscous damping in the axes of C2, shape (mounts, 3, 3) [N s/m] (E2)."""
+        return np.array([mount.damping_matrix for mount in self.mounts]).reshape(-1, 3, 3)
+
+    def total(self, each: Array) -> Array:
+        """Sum of G' k G over the mounts, shape (6, 6) (E3)."""
+        return np.sum([carried(g, k) for g, k in zip(self.motions, each, strict=True)], axis=0)
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """K, shape (6, 6) (E3)."""
+        return self.total(self.springs)
+
+    @cached_property
+    def modes(self) -> Modes:
+        """Undamped natural modes (E6)."""
+        return modes_of(self.block.mass_matrix, self.stiffness, self.total(self.losses))
+
+    @cached_property
+    def _loss(self) -> Array:
+        return self._modal(self.total(self.losses))
+
+    @cached_property
+    def _damping(self) -> Array:
+        return self._modal(self.total(self.dampers))
+
+    def _modal(self, matrix: Array) -> Array:
+        """A matrix in coordinates of the modes, without the roundings that would couple them."""
+        shapes = self.modes.shapes
+        out = np.asarray(shapes.T @ matrix @ shapes)
+        return np.where(np.abs(out) > UNDRIVEN * np.abs(out).max(initial=0.0), out, 0.0)
+
+    @cached_property
+    def _about_centre(self) -> Array:
+        """From the wrench about the origin to the drive of every mode, shape (6 modes, 6)."""
+        moved = moved_wrench(NUMBERS, self.block.centre_of_gravity)
+        return np.asarray(self.modes.shapes.T @ moved)
+
+    def drives(self, wrenches: ComplexArray) -> ComplexArray:
+        """Drive of every mode by wrenches about the origin, shape (n, 6) to (n, 6), roundings left out."""
+        drive = wrenches @ self._about_centre.T
+        # what cancels in the sum counts against the size of its terms
+        size = np.abs(wrenches) @ np.abs(self._about_centre).T
+        floor = UNDRIVEN * np.maximum(size, np.abs(drive).max(axis=-1, keepdims=True, initial=0.0))
+        return np.where(np.abs(drive) > floor, drive, 0.0)
+
+    def excited(self, wrench: Spectrum) -> tuple[int, ...]:
+        """Modes that a wrench drives, directly or through damping (E12)."""
+        return self._reached(self.drives(wrench.coefficients))
+
+    def _reached(self, drive: ComplexArray) -> tuple[int, ...]:
+        coupled = (self._loss != 0.0) | (self._damping != 0.0)
+        reached = np.any(drive != 0.0, axis=0)
+        while True:
+            further = reached | np.any(coupled[reached], axis=0)
+            if np.array_equal(further, reached):
+                return tuple(int(j) for j in np.flatnonzero(reached))
+            reached = further
+
+    def responses(self, omegas: Array, wrenches: ComplexArray) -> ComplexArray:
+        """Amplitudes of the modes, wrench by wrench (E4).
+
+        Parameters
+        ----------
+        omegas
+            Angular frequencies [rad/s], shape (n,).
+        wrenches
+            About the origin, shape (n, 6).
+
+        Returns
+        -------
+        Shape (n, 6): factors of the mode shapes.
+
+        Raises
+        ------
+        ResonanceError
+            If an undamped mode is driven at its own frequency.
+        UncarriedLoadError
+            If a steady load drives a free mode.
+        """
+        drive = self.drives(wrenches)
+        kept = list(self._reached(drive))
+        out = np.zeros(drive.shape, dtype=complex)
+        if not kept:
+            return out
+        self._refuse_resonance(omegas, drive)
+        squares, damped = self.modes.squares[kept], (omegas > 0.0)
+        loss, damping = self._loss[np.ix_(kept, kept)], self._damping[np.ix_(kept, kept)]
+        reactance = squares - omegas[:, None] ** 2
+        if not (_coupled(loss) or _coupled(damping)):
+            impedance = reactance + 1j * (damped[:, None] * np.diag(loss) + omegas[:, None] * np.diag(damping))
+            out[:, kept] = drive[:, kept] / np.where(impedance == 0.0, 1.0, impedance)
+            return out
+        full = 1j * (damped[:, None, None] * loss + omegas[:, None, None] * damping)
+        diagonal = np.arange(len(kept))
+        full[:, diagonal, diagonal] += reactance
+        # a free mode under no steady load stays where it is
+        still = (omegas == 0.0)[:, None] & (squares == 0.0)
+        full[:, diagonal, diagonal] += still
+        out[:, kept] = np.linalg.solve(full, drive[:, kept, None])[..., 0]
+        return out
+
+    def _refuse_resonance(self, omegas: Array, drive: ComplexArray) -> None:
+        square = omegas[:, None] ** 2
+        near = np.abs(self.modes.squares - square) <= RESONANCE * square
+        undamped = np.diag(self._loss) + omegas[:, None] * np.diag(self._damping) <= RESONANCE * square
+        struck = near & undamped & (drive != 0.0)
+        if not np.any(struck):
+            return
+        k, mode = (int(j) for j in np.argwhere(struck)[0])
+        if omegas[k] == 0.0:
+            raise UncarriedLoadError(
+                f"a steady load drives the block in {self.modes.names[mode]}, which no mount resists; add a mount"
+            )
+        raise ResonanceError(
+            f"the {self.modes.names[mode]} mode at {omegas[k] / math.tau:.6g} Hz is driven at its own frequency and "
+            "nothing damps it; give the mounts a loss factor or damping"
+        )
+
+    def motion(self, wrench: Spectrum, speed: float) -> Spectrum:
+        """Motion (u, theta) of the centre of gravity, shape (n, 6) [m, rad]."""
+        return Spectrum(wrench.base, self._modal_motion(wrench, speed) @ self.modes.shapes.T)
+
+    def travel(self, wrench: Spectrum, speed: float) -> Spectrum:
+        """Displacement of the engine at every mount, shape (n, mounts, 3) [m]."""
+        return Spectrum(wrench.base, np.einsum("mij,nj->nmi", self._travels, self._modal_motion(wrench, speed)))
+
+    def forces(self, wrench: Spectrum, speed: float) -> Spectrum:
+        """Forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7, E5)."""
+        amplitudes = self._modal_motion(wrench, speed)
+        return Spectrum(wrench.base, self.mount_forces(wrench.orders * speed, amplitudes))
+
+    def mount_forces(self, omegas: Array, amplitudes: ComplexArray) -> ComplexArray:
+        """Mount forces of modal amplitudes (n, 6), shape (n, mounts, 3) (E5)."""
+        elastic, lossy, viscous = self._force_maps
+        out = np.einsum("mij,nj->nmi", elastic, amplitudes)
+        if np.any(lossy):
+            out += 1j * np.einsum("mij,nj->nmi", lossy, amplitudes * (omegas > 0.0)[:, None])
+        if np.any(viscous):
+            out += 1j * np.einsum("mij,nj->nmi", viscous, amplitudes * omegas[:, None])
+        return np.asarray(out)
+
+    def _modal_motion(self, wrench: Spectrum, speed: float) -> ComplexArray:
+        loaded = np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1))
+        out = np.zeros((len(wrench.coefficients), 6), dtype=complex)
+        out[loaded] = self.responses(wrench.orders[loaded] * speed, wrench.coefficients[loaded])
+        return out
+
+    @cached_property
+    def _travels(self) -> Array:
+        return np.asarray(self.motions @ self.modes.shapes)
+
+    @cached_property
+    def _force_maps(self) -> tuple[Array, Array, Array]:
+        return self.springs @ self._travels, self.losses @ self._travels, self.dampers @ self._travels
+
+
+def _coupled(matrix: Array) -> bool:
+    return bool(np.any(matrix[~np.eye(len(matrix), dtype=bool)]))
+
+
+def elastic_mounting(block: Block, mounts: Sequence[Mount]) -> ElasticMounting:
+    """A block on its mounts.
+
+    Raises
+    ------
+    ModelError
+        Without a mount that has a stiffness.
+    """
+    if not any(any(mount.stiffness) for mount in mounts):
+        raise ModelError("no mount has a stiffness; an elastic mounting needs one")
+    return ElasticMounting(block, tuple(mounts))
+
+
+def single_transmissibility(ratio: Array, loss_factor: float = 0.0, damping_ratio: float = 0.0) -> Array:
+    """Foundation over exciting force of one mass on one spring (E11; Fig. 31).
+
+    Parameters
+    ----------
+    ratio
+        Speed over critical speed, any shape.
+    loss_factor
+        Hysteretic; psi / (2 pi) of eq. 40.
+    damping_ratio
+        Viscous, of critical damping.
+    """
+    lag = loss_factor + 2.0 * damping_ratio * np.asarray(ratio)
+    return np.asarray(np.hypot(1.0, lag) / np.hypot(1.0 - np.asarray(ratio) ** 2, lag))

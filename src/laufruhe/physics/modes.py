@@ -1,0 +1,144 @@
+"""Natural modes of a block on its mounts, and what they say (E6-E10)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import UncarriedLoadError
+from laufruhe.machine.block import Block
+
+Array = NDArray[np.float64]
+
+GRAVITY = 9.80665
+MOTIONS = ("fore-aft", "lateral", "bounce", "roll", "pitch", "yaw")
+FREE_STIFFNESS = 1e-12
+PURE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Undamped natural modes, the lowest first (E6).
+
+    Attributes
+    ----------
+    squares
+        Squares of the natural angular frequencies [1/s2], shape (6,); zero where free.
+    shapes
+        Columns (u, theta) of the centre of gravity, shape (6, 6), with shape' M shape = 1.
+    energy
+        Share of each motion in the kinetic energy of each mode, shape (motions, modes);
+        columns add up to one, and an entry may leave 0 to 1 where inertia couples (E7).
+    loss
+        Loss factor of each mode by the hysteretic mounts, shape (6,).
+    """
+
+    squares: Array
+    shapes: Array
+    energy: Array
+    loss: Array
+
+    @property
+    def frequencies(self) -> Array:
+        """Natural frequencies [Hz], shape (6,)."""
+        return np.asarray(np.sqrt(self.squares) / math.tau)
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Modes that no mount resists, shape (6,)."""
+        return np.asarray(self.squares == 0.0)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What each mode mostly is: bounce, or bounce-pitch where none has half of the energy."""
+        return tuple(_name(column) for column in self.energy.T)
+
+
+def _name(shares: Array) -> str:
+    first, second = np.argsort(-shares)[:2]
+    return MOTIONS[first] if shares[first] >= PURE else f"{MOTIONS[first]}-{MOTIONS[second]}"
+
+
+def modes_of(mass: Array, stiffness: Array, loss: Array | None = None) -> Modes:
+    """Modes of M and K, shapes (6, 6) (E6, E7).
+
+    Solved in coordinates in which the mass is one, so that a block with hardly any
+    inertia about one axis costs no digits of the others.
+    """
+    root = np.linalg.cholesky(mass)
+    inverse = np.linalg.inv(root)
+    scaled = inverse @ stiffness @ inverse.T
+    squares, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
+    squares = np.where(squares > FREE_STIFFNESS * max(squares[-1], 0.0), squares, 0.0)
+    shapes = inverse.T @ vectors
+    # the sign of a mode is free: its largest entry is positive
+    shapes *= np.sign(vectors[np.argmax(np.abs(vectors), axis=0), np.arange(6)])
+    energy = shapes * (mass @ shapes)
+    lost = np.zeros(6) if loss is None else np.einsum("ij,ik,kj->j", shapes, loss, shapes)
+    return Modes(squares, shapes, energy, lost / np.where(squares > 0.0, squares, 1.0))
+
+
+def free_motion(modes: Modes) -> str:
+    """The motions that no mount resists, in words; empty where there are none."""
+    return " and ".join(dict.fromkeys(name for name, free in zip(modes.names, modes.free, strict=True) if free))
+
+
+def static_motion(modes: Modes, wrench: Array) -> Array:
+    """Motion (u, theta) of the centre of gravity under a steady wrench about it, shape (6,) (E9, E10).
+
+    Raises
+    ------
+    UncarriedLoadError
+        If the wrench drives a motion that no mount resists.
+    """
+    drive = modes.shapes.T @ wrench
+    loose = modes.free & (np.abs(drive) > 1e-9 * max(np.abs(drive).max(), 1e-300))
+    if np.any(loose):
+        name = modes.names[int(np.argmax(loose))]
+        raise UncarriedLoadError(f"a steady load drives the block in {name}, which no mount resists; add a mount")
+    return np.asarray(modes.shapes @ (drive / np.where(modes.free, 1.0, modes.squares)))
+
+
+def weight_wrench(block: Block) -> Array:
+    """Gravity on the block, about its centre of gravity, shape (6,) [N, N m]."""
+    return np.array([0.0, 0.0, -block.mass * GRAVITY, 0.0, 0.0, 0.0])
+
+
+def sag_frequency(sag: float) -> float:
+    """Natural frequency [Hz] of a mass that sags by `sag` [m] on its spring (E9; eq. 41)."""
+    return math.sqrt(GRAVITY / sag) / math.tau
+
+
+def sag_for_critical_speed(speed: float, order: float) -> float:
+    """Sag [m] that puts the critical speed of an order at `speed` [rad/s] (E9; eq. 41, Fig. 32)."""
+    return GRAVITY / (speed * order) ** 2
+
+
+def torque_roll_axis(block: Block, torque_axis: Sequence[float] = (1.0, 0.0, 0.0)) -> Array:
+    """Direction about which a free block starts to turn under a torque, through its centre of gravity (E8).
+
+    Returns
+    -------
+    Unit vector, shape (3,): I^-1 e over its length.
+    """
+    axis = np.linalg.solve(block.tensor, np.asarray(torque_axis, dtype=float))
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def torque_roll_coupling(block: Block, stiffness: Array, torque_axis: Sequence[float] = (1.0, 0.0, 0.0)) -> float:
+    """How far turning about the torque-roll axis is from being a mode of its own (E8).
+
+    0: a torque about the crank moves the block about that axis alone, at one natural
+    frequency. 1: the mounts answer with nothing but other motions.
+    """
+    motion = np.concatenate([np.zeros(3), torque_roll_axis(block, torque_axis)])
+    inverse = np.linalg.inv(np.linalg.cholesky(block.mass_matrix))
+    along = np.linalg.solve(inverse.T, motion)
+    along /= np.linalg.norm(along)
+    answer = inverse @ stiffness @ inverse.T @ along
+    size = float(np.linalg.norm(answer))
+    return float(np.linalg.norm(answer - along * (along @ answer))) / size if size > 0.0 else 0.0
