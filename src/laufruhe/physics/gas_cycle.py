@@ -361,7 +361,7 @@ def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
     most = least + MAX_CHARGE_HEAT * charge * efficiency / gas.completeness
     slack = _ROUNDING * max(gas.intake_pressure, gas.exhaust_pressure)
     if not least - slack <= gas.imep <= most:
-        remedy = "raise intake_pressure" if gas.imep > most else "raise imep or lower exhaust_pressure"
+        remedy = "raise intake_pressure or burn earlier" if gas.imep > most else "raise imep or lower exhaust_pressure"
         raise ModelError(
             f"imep {_bar(gas.imep)} cannot be reached with an intake pressure of {_bar(gas.intake_pressure)}: from no "
             f"heat to the most that fuel and air can hold it is between {_bar(least)} and {_bar(most)}; {remedy}"
