@@ -80,7 +80,7 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
     if not least - slack <= gas.imep <= most + slack:
         remedy = "raise peak_pressure" if gas.imep > most else "lower peak_pressure"
         raise ModelError(
-            f"imep {in_bar(gas.imep)} cannot be reached with a peak pressure of {in_bar(gas.peak_pressure)}: from no to "
+            f"imep {in_bar(gas.imep)} cannot be reached with peak_pressure {in_bar(gas.peak_pressure)}: from no to "
             f"full cut-off it is between {in_bar(least)} and {in_bar(most)}; {remedy} or change imep"
         )
     if gas.imep <= least:

@@ -86,7 +86,7 @@ def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
     if not least - slack <= gas.imep <= most:
         remedy = "raise intake_pressure or burn earlier" if gas.imep > most else "raise imep or lower exhaust_pressure"
         raise ModelError(
-            f"imep {in_bar(gas.imep)} is out of reach with an intake pressure of {in_bar(gas.intake_pressure)}: from no "
+            f"imep {in_bar(gas.imep)} is out of reach with intake_pressure {in_bar(gas.intake_pressure)}: from no "
             f"heat to the most that fuel and air can hold it is between {in_bar(least)} and {in_bar(most)}; {remedy}"
         )
     return max(gas.imep - least, 0.0) / efficiency
