@@ -35,6 +35,9 @@ def _registry() -> pint.UnitRegistry[Any]:
 def _factor(unit: str, wanted: str) -> float:
     """SI value of one `unit` of the dimension of `wanted`."""
     registry = _registry()
+    if wanted == "Hz" and "Hz" not in unit:
+        # radians have no dimension, so rpm would be taken for a frequency 2 pi too high
+        raise UnitError(f"'{unit}' is no frequency in Hz; {_advice(wanted)}")
     try:
         one = registry.Quantity(1.0, registry.parse_units(unit))
         target = registry.parse_units(wanted) if wanted else registry.dimensionless
@@ -58,6 +61,8 @@ _EXAMPLES = {
     "N": ("a force", "900 N"),
     "N m": ("a moment", "120 N m"),
     "N/m": ("a stiffness", "300 N/mm"),
+    "N s/m": ("a viscous damping", "800 N s/m"),
+    "Hz": ("a frequency", "12 Hz"),
     "rad": ("an angle", "90 deg"),
     "rad/s": ("a speed of rotation", "2500 rpm"),
     "m/s": ("a speed", "10 m/s"),

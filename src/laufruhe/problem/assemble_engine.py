@@ -11,16 +11,13 @@ from typing import Any
 import numpy as np
 
 from laufruhe import units
-from laufruhe.machine import CRANKSHAFT, Cycle, Mount, OperatingPoint, PressureTrace, Rod, Shaft, SliderCrank
+from laufruhe.machine import CRANKSHAFT, Cycle, OperatingPoint, PressureTrace, Rod, Shaft, SliderCrank
 from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
 from laufruhe.machine.layouts import Layout, Mechanism, Throw, boxer, build, even_throws, inline, vee
-from laufruhe.machine.mount import UPRIGHT, Matrix3
 from laufruhe.machine.slider_crank import radius_for_stroke
 from laufruhe.problem.complaints import Refused, blamed_on, nearest
 from laufruhe.problem.file_models import (
     EngineTable,
-    MountsTable,
-    MountTable,
     OperatingPointTable,
     ProblemFile,
     SeiligerTable,
@@ -212,46 +209,11 @@ def _free_part(table: EngineTable, part: SliderCrankTable, k: int, shafts: dict[
         )
 
 
-def mounts_of(table: MountsTable | None) -> tuple[Mount, ...]:
-    """Mounts from positions, or one by one from places."""
-    if table is None:
-        return ()
-    if bool(table.positions) == bool(table.places):
-        state = "is missing" if not table.positions else "is given twice, as positions and as places"
-        raise Refused("mounts.positions", None, state, "give positions or [[mounts.places]], one of them")
-    places = table.places or [MountTable.model_construct(position=p) for p in table.positions]
-    names = table.names or [place.name or f"mount {k + 1}" for k, place in enumerate(places)]
-    if len(names) != len(places):
-        raise Refused("mounts.names", names, f"names {len(names)} of {len(places)} mounts", "name each once")
-    mounts = []
-    for k, (name, place) in enumerate(zip(names, places, strict=True)):
-        stiffness = place.relative_stiffness or table.relative_stiffness
-        if not any(stiffness):
-            raise Refused(
-                f"mounts.places[{k + 1}].relative_stiffness", stiffness, "carries nothing", "give one a value"
-            )
-        x, y, z = place.position
-        mounts.append(Mount(name, (x, y, z), (stiffness[0], stiffness[1], stiffness[2]), _turned(place.turned)))
-    _all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place")
-    _all_different([m.name for m in mounts], "mounts.names", "mounts have one name")
-    return tuple(mounts)
-
-
-def _all_different(things: list[Any], where: str, rule: str) -> None:
+def all_different(things: list[Any], where: str, rule: str) -> None:
+    """Refuse two of the same."""
     for k, thing in enumerate(things):
         if thing in things[:k]:
             raise Refused(f"{where}[{k + 1}]", thing, f"two {rule}", "move or rename one")
-
-
-def _turned(angles: list[float] | None) -> Matrix3:
-    if angles is None:
-        return UPRIGHT
-    (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
-    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    rows = (about_z @ about_y @ about_x).T.tolist()
-    return (tuple(rows[0]), tuple(rows[1]), tuple(rows[2]))
 
 
 def operating_points(file: ProblemFile, folder: Path) -> tuple[OperatingPoint, ...]:
@@ -259,11 +221,27 @@ def operating_points(file: ProblemFile, folder: Path) -> tuple[OperatingPoint, .
     gas = gas_of(file, folder)
     points = []
     for k, table in enumerate(file.operating_points):
-        speed = _speed(table, file.engine.stroke, f"operating_points[{k + 1}]")
-        name = table.name or f"{speed * 30.0 / math.pi:.6g} rpm"
-        points.append(OperatingPoint(name, speed, _loaded(gas, table, k), table.weight))
-    _all_different([p.name for p in points], "operating_points", "operating points have one name")
+        speeds = _speeds(table, file.engine.stroke, f"operating_points[{k + 1}]")
+        for speed in speeds:
+            at = f"{speed * 30.0 / math.pi:.6g} rpm"
+            name = (f"{table.name} {at}" if len(speeds) > 1 else table.name) if table.name else at
+            points.append(OperatingPoint(name, speed, _loaded(gas, table, k), table.weight / len(speeds)))
+    all_different([p.name for p in points], "operating_points", "operating points have one name")
     return tuple(points)
+
+
+def _speeds(table: OperatingPointTable, stroke: float, where: str) -> tuple[float, ...]:
+    """One speed, or equal steps over a range that share the weight."""
+    first = _speed(table, stroke, where)
+    if table.up_to is None and table.steps is None:
+        return (first,)
+    if table.up_to is None or table.steps is None:
+        missing = "up_to" if table.up_to is None else "steps"
+        raise Refused(f"{where}.{missing}", None, "is missing", "give up_to and steps for a range, or neither")
+    if table.up_to <= first:
+        value = units.shown(table.up_to, "rad/s")
+        raise Refused(f"{where}.up_to", value, "does not lie above the first speed", "give a higher one")
+    return tuple(first + (table.up_to - first) * k / (table.steps - 1) for k in range(table.steps))
 
 
 def _speed(table: OperatingPointTable, stroke: float, where: str) -> float:

@@ -7,11 +7,12 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field
 
 from laufruhe.problem import fields as f
+from laufruhe.problem.mount_design import MOUNT_NAMES
 from laufruhe.problem.quantity import MASSES, MEASURES, Subject
 
 LOAD_NAMES = tuple(f"{measure} {s}" for s in Subject if s not in MASSES for measure in MEASURES)
 MASS_NAMES = tuple(str(s) for s in MASSES)
-QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": [*LOAD_NAMES, *MASS_NAMES]})]
+QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": [*LOAD_NAMES, *MASS_NAMES, *MOUNT_NAMES]})]
 Count: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 Place: TypeAlias = Annotated[list[f.Length], Field(min_length=3, max_length=3)]
@@ -96,6 +97,8 @@ class OperatingPointTable(Table):
     mean_piston_speed: f.PistonSpeed | None = None
     imep: f.Pressure | None = Field(default=None, description="In place of that of [gas].")
     motored: bool = False
+    up_to: f.Speed | None = Field(default=None, description="Last speed of a range that starts at speed.")
+    steps: Annotated[int, Field(ge=2, le=1000)] | None = Field(default=None, description="Speeds in the range.")
     weight: f.Positive = 1.0
 
 
@@ -142,24 +145,59 @@ class TraceTable(Table):
 GasTable: TypeAlias = Annotated[SeiligerTable | WiebeTable | TraceTable, Field(discriminator="model")]
 
 
+class BlockTable(Table):
+    """The rigid body that elastic mounts carry."""
+
+    mass: f.PositiveMass = Field(description="Everything that the mounts carry, moving parts included.")
+    centre_of_gravity: Place = Field(default=[0.0, 0.0, 0.0])
+    inertia: Annotated[list[f.Inertia], Field(min_length=3, max_length=3)] = Field(
+        description="About x, y and z through the centre of gravity."
+    )
+    inertia_products: Annotated[list[f.Inertia], Field(min_length=3, max_length=3)] = Field(
+        default=[0.0, 0.0, 0.0], description="Entries xy, xz, yz of the tensor: xy = - integral of x y dm."
+    )
+
+
+class StopTable(Table):
+    """A bump stop along each of the mount's own axes; it acts in run-ups."""
+
+    gap: f.PositiveLength
+    stiffness: f.Stiffness
+
+
 class MountTable(Table):
     """One mount."""
 
     name: Name | None = None
-    position: Place
+    position: Annotated[list[f.OpenLength], Field(min_length=3, max_length=3)] | None = None
     relative_stiffness: Triple | None = Field(default=None, description="Along its own x, y, z; 0 carries nothing.")
-    turned: Annotated[list[f.Angle], Field(min_length=3, max_length=3)] | None = Field(
+    turned: Annotated[list[f.OpenAngle], Field(min_length=3, max_length=3)] | None = Field(
         default=None, description="Turns about x, then y, then z that bring the axes of C2 to its own."
     )
+    stiffness: Annotated[list[f.OpenStiffness], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="Along its own x, y, z."
+    )
+    loss_factor: f.OpenRatio | None = Field(default=None, description="Damping work over deformation work over 2 pi.")
+    damping: Annotated[list[f.OpenDamping], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="Viscous, along its own x, y, z."
+    )
+    like: Name | None = Field(default=None, description="Stiffness, loss and damping follow those of this mount.")
+    mirror_of: Name | None = Field(default=None, description="All follows this mount, mirrored in the plane y = 0.")
+    stop: StopTable | None = None
 
 
 class MountsTable(Table):
     """How the engine is held."""
 
-    kind: Literal["rigid"] = "rigid"
+    kind: Literal["rigid", "elastic"] = "rigid"
     positions: list[Place] = Field(default_factory=list)
     names: list[Name] | None = None
-    relative_stiffness: Triple = Field(default=[0.0, 1.0, 1.0], description="Of every mount that gives none.")
+    relative_stiffness: Triple = Field(default=[0.0, 1.0, 1.0], description="Of every rigid mount that gives none.")
+    stiffness: Annotated[list[f.Stiffness], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="Of every elastic mount that gives none."
+    )
+    loss_factor: f.Ratio = Field(default=0.0, description="Of every elastic mount that gives none.")
+    stop: StopTable | None = None
     places: list[MountTable] = Field(default_factory=list)
 
 
@@ -214,6 +252,10 @@ class QuantityTable(Table):
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     direction_weights: Triple | None = None
+    motions: list[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = Field(
+        default=None, description="That are to have a mode of their own."
+    )
+    frequency: f.Frequency | None = Field(default=None, description="Wanted about the torque-roll axis.")
 
 
 class TermTable(QuantityTable):
@@ -234,7 +276,11 @@ class ConstraintTable(QuantityTable):
     """A limit on a quantity."""
 
     limit: QuantityName
-    max: str = Field(description="With the unit of the quantity.", examples=["6 kg"])
+    max: str | None = Field(default=None, description="With the unit of the quantity.", examples=["6 kg"])
+    min: str | None = Field(default=None, description="Of natural frequencies, decoupling or sag.")
+    outside: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="A band that holds no natural frequency.", examples=[["12 Hz", "20 Hz"]]
+    )
     name: Name | None = None
     of: list[str] | None = Field(default=None, description="Counterweights or balancers whose mass counts.")
 
@@ -257,6 +303,7 @@ class ProblemFile(Table):
     operating_points: list[OperatingPointTable] = Field(min_length=1)
     gas: GasTable | None = None
     mounts: MountsTable | None = None
+    block: BlockTable | None = None
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
     objective: ObjectiveTable | None = None

@@ -139,7 +139,7 @@ class Problem:
         """Decisions of the design as given."""
         return tuple(decision.start for decision in self.decisions)
 
-    def design(self, values: Sequence[complex]) -> Engine:
+    def design(self, values: Sequence[complex], mount_values: Sequence[float] | None = None) -> Engine:
         """The engine with these decisions in place of those it was given with."""
         unbalances = {rotor.name: rotor.unbalance for rotor in self.engine.rotors}
         for decision, value in zip(self.decisions, values, strict=True):
@@ -147,4 +147,5 @@ class Problem:
             for drive in decision.drives:
                 unbalances[drive.rotor] += drive.gain * (change.conjugate() if drive.mirrored else change)
         rotors = tuple(replace(rotor, unbalance=unbalances[rotor.name]) for rotor in self.engine.rotors)
-        return replace(self.engine, rotors=rotors)
+        engine = replace(self.engine, rotors=rotors)
+        return engine if mount_values is None else self.mount_design.applied(engine, mount_values)

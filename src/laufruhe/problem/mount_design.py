@@ -17,7 +17,6 @@ from laufruhe.machine import Engine, Mount
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import (
-    GRAVITY,
     MOTIONS,
     static_motion,
     torque_roll_axis,
@@ -215,8 +214,8 @@ def decoupling_of(energy: Any, motions: Sequence[int]) -> float:
     return float(min(energy[motion].max() for motion in motions))
 
 
-def torque_roll_rows(mounting: ElasticMounting, frequency: float) -> tuple[np.ndarray, np.ndarray]:
-    """What turning about the torque-roll axis would need to be a mode at `frequency` (E14).
+def torque_roll_rows(mounting: ElasticMounting) -> tuple[np.ndarray, np.ndarray]:
+    """What turning about the torque-roll axis would need to be a mode (E14).
 
     Returns
     -------
@@ -231,7 +230,7 @@ def torque_roll_rows(mounting: ElasticMounting, frequency: float) -> tuple[np.nd
 
 def torque_roll_residual(mounting: ElasticMounting, frequency: float) -> float:
     """|R K R' t / w^2 - t|: zero where turning about the torque-roll axis is a mode at `frequency` (E14)."""
-    along, root = torque_roll_rows(mounting, frequency)
+    along, root = torque_roll_rows(mounting)
     square = (2.0 * np.pi * frequency) ** 2
     return float(np.linalg.norm(root @ mounting.stiffness @ root.T @ along / square - along))
 
@@ -240,7 +239,3 @@ def total_stiffness(mounts: Sequence[Mount]) -> float:
     """Sum of all stiffnesses along the mounts' own axes [N/m]."""
     return float(sum(sum(mount.stiffness) for mount in mounts))
 
-
-__all__ = ["GRAVITY", "MOUNT_NAMES", "MountDecision", "MountDesign", "MountDrive", "MountLimit", "MountMeasure",
-           "MountQuantity", "decoupling_of", "mount_of", "mounting_in", "sag_of", "torque_roll_residual",
-           "torque_roll_rows", "total_stiffness"]  # fmt: skip

@@ -13,12 +13,15 @@ from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.physics.shaking_loads import Fidelity
-from laufruhe.problem.assemble_engine import cycle_of, mounts_of, moving_parts, operating_points
+from laufruhe.problem.assemble_engine import cycle_of, moving_parts, operating_points
+from laufruhe.problem.assemble_mounts import mounts_of
 from laufruhe.problem.assemble_rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.problem.complaints import Refused, complaints_of, nearest
 from laufruhe.problem.file_models import LOAD_NAMES, MASS_NAMES, ConstraintTable, ProblemFile, QuantityTable
 from laufruhe.problem.model import Limit, Problem, Term
-from laufruhe.problem.quantity import MEASURES, Quantity, Subject, counted_rotors
+from laufruhe.problem.mount_asked import asked_of_mounts
+from laufruhe.problem.mount_design import MOUNT_NAMES
+from laufruhe.problem.quantity import MEASURES, ON_MOUNTS, Quantity, Subject, counted_rotors
 
 
 def load(path: str | Path) -> Problem:
@@ -72,10 +75,11 @@ def _assembled(file: ProblemFile, path: Path) -> Problem:
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
-    mounts = mounts_of(file.mounts)
-    engine = Engine(file.title, cycle_of(file.engine), cylinders, tuple(collected.rotors), mounts)
+    found = mounts_of(file.mounts, file.block)
+    mounts = found.mounts
+    engine = Engine(file.title, cycle_of(file.engine), cylinders, tuple(collected.rotors), mounts, found.block)
     points = operating_points(file, path.parent)
-    scene = _Scene(mounts, points, tuple(collected.rotors))
+    scene = _Scene(mounts, points, tuple(collected.rotors), found.block is not None)
     return Problem(
         name=path.stem,
         title=file.title,
@@ -83,26 +87,29 @@ def _assembled(file: ProblemFile, path: Path) -> Problem:
         points=points,
         decisions=tuple(collected.decisions),
         objective=_objective(file, scene),
-        limits=tuple(_limit(table, k, scene) for k, table in enumerate(file.constraints)),
+        limits=tuple(_limit(t, k, scene) for k, t in enumerate(file.constraints) if t.limit not in MOUNT_NAMES),
         source=file.source,
         assumptions=tuple(file.assumptions),
         fidelity=Fidelity(file.fidelity.kinematics, file.fidelity.samples),
         tolerance=file.tolerance,
+        mount_design=asked_of_mounts(file, found, scene.points),
     )
 
 
 class _Scene:
     """What quantities may refer to."""
 
-    def __init__(self, mounts: Sequence[Mount], points: Sequence[OperatingPoint], rotors: Sequence[Rotor]) -> None:
+    def __init__(self, mounts: Sequence[Mount], points: Sequence[OperatingPoint], rotors: Sequence[Rotor],
+                 elastic: bool = False) -> None:  # fmt: skip
         self.mounts = [mount.name for mount in mounts]
         self.points = [point.name for point in points]
         self.rotors = rotors
+        self.elastic = elastic
 
     def quantity(self, name: str, table: QuantityTable, where: str, of: list[str] | None = None) -> Quantity:
         """The quantity that a name and its filters mean, checked against the engine."""
         if name not in (*LOAD_NAMES, *MASS_NAMES):
-            raise Refused(where, name, "is no quantity", nearest(name, [*LOAD_NAMES, *MASS_NAMES]))
+            raise Refused(where, name, "is no quantity", nearest(name, [*LOAD_NAMES, *MASS_NAMES, *MOUNT_NAMES]))
         at = where.rsplit(".", 1)[0]
         if name in MASS_NAMES:
             return self._mass(name, table, at, of)
@@ -111,8 +118,13 @@ class _Scene:
             raise Refused(f"{at}.of", of, "goes with masses only", "leave it out")
         if subject == Subject.MOUNT_FORCE and not self.mounts:
             raise Refused(where, name, "needs mounts", "add [mounts], or ask for a shaking force")
-        if subject != Subject.MOUNT_FORCE and (table.mounts or table.direction_weights):
-            raise Refused(f"{at}.mounts", None, "goes with mount forces only", "leave it out")
+        if subject == Subject.MOUNT_TRAVEL and not self.elastic:
+            raise Refused(where, name, "needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]')
+        for key in ("motions", "frequency"):
+            if getattr(table, key) is not None:
+                raise Refused(f"{at}.{key}", None, f"means nothing for a {subject}", "leave it out")
+        if subject not in ON_MOUNTS and (table.mounts or table.direction_weights):
+            raise Refused(f"{at}.mounts", None, "goes with mount forces and travels only", "leave it out")
         self._known(table.mounts, self.mounts, f"{at}.mounts", "mount")
         self._known(table.operating_points, self.points, f"{at}.operating_points", "operating point")
         weights = table.direction_weights
@@ -158,17 +170,26 @@ def _objective(file: ProblemFile, scene: _Scene) -> tuple[Term, ...]:
     if (table.minimise is None) == (not table.terms):
         state = "is missing" if table.minimise is None else "is given twice, also as terms"
         raise Refused("objective.minimise", table.minimise, state, "give minimise or [[objective.terms]], one of them")
+    if table.minimise in MOUNT_NAMES:
+        return ()
     if table.minimise is not None:
         return (Term(scene.quantity(table.minimise, table, "objective.minimise")),)
     return tuple(
         Term(scene.quantity(term.quantity, term, f"objective.terms[{k + 1}].quantity"), term.weight)
         for k, term in enumerate(table.terms)
+        if term.quantity not in MOUNT_NAMES
     )
 
 
 def _limit(table: ConstraintTable, k: int, scene: _Scene) -> Limit:
     where = f"constraints[{k + 1}]"
     quantity = scene.quantity(table.limit, table, f"{where}.limit", table.of)
+    for key in ("min", "outside"):
+        if getattr(table, key) is not None:
+            raise Refused(f"{where}.{key}", None, f"does not go with {quantity.subject}, which has a largest value only",
+                          "give max")  # fmt: skip
+    if table.max is None:
+        raise Refused(f"{where}.max", None, "is missing", "add it")
     try:
         maximum = units.parse(table.max, quantity.unit)
     except units.UnitError as error:

@@ -22,6 +22,10 @@ def solve(problem: Problem) -> Result:
     ModelError
         If the engine as given cannot be evaluated.
     """
+    if problem.mount_design.asked:
+        from laufruhe.solve.mounts import solve_mounts
+
+        return solve_mounts(problem)
     return solve_unbalances(problem) if problem.decisions else state(problem)
 
 
