@@ -8,8 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from laufruhe import units
 from laufruhe.machine import CRANKSHAFT, Cycle, OperatingPoint, PressureTrace, Rod, Shaft, SliderCrank
 from laufruhe.machine.gas import GasModel, Seiliger, Wiebe

@@ -292,6 +292,13 @@ class FidelityTable(Table):
     samples: int = Field(default=1440, ge=48, le=100_000, description="Steps over the working cycle.")
 
 
+class SearchTable(Table):
+    """How many points a search starts from where the problem is not convex."""
+
+    starts: int = Field(default=16, ge=1, le=10_000)
+    seed: int = Field(default=0, ge=0)
+
+
 class ProblemFile(Table):
     """A whole problem file."""
 
@@ -309,3 +316,4 @@ class ProblemFile(Table):
     objective: ObjectiveTable | None = None
     constraints: list[ConstraintTable] = Field(default_factory=list)
     fidelity: FidelityTable = Field(default_factory=FidelityTable)
+    search: SearchTable = Field(default_factory=SearchTable)

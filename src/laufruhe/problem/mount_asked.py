@@ -48,7 +48,9 @@ def asked_of_mounts(file: ProblemFile, found: MountsFound, points: Sequence[str]
         if table.limit in MOUNT_NAMES
     ]
     _check_together(limits)
-    return replace(found.design, terms=tuple(terms), limits=tuple(limits))
+    return replace(
+        found.design, terms=tuple(terms), limits=tuple(limits), starts=file.search.starts, seed=file.search.seed
+    )
 
 
 def _quantity(name: str, table: QuantityTable, where: str, found: MountsFound, points: Sequence[str]) -> MountQuantity:

@@ -156,12 +156,16 @@ class MountDesign:
         Quantities of the objective with their weights.
     limits
         What is forbidden.
+    starts, seed
+        Points that a search starts from where the problem is not convex.
     """
 
     numbers: tuple[tuple[float, ...], ...] = ()
     decisions: tuple[MountDecision, ...] = ()
     terms: tuple[tuple[MountQuantity, float], ...] = ()
     limits: tuple[MountLimit, ...] = ()
+    starts: int = 16
+    seed: int = 0
 
     @property
     def asked(self) -> bool:
@@ -238,4 +242,3 @@ def torque_roll_residual(mounting: ElasticMounting, frequency: float) -> float:
 def total_stiffness(mounts: Sequence[Mount]) -> float:
     """Sum of all stiffnesses along the mounts' own axes [N/m]."""
     return float(sum(sum(mount.stiffness) for mount in mounts))
-

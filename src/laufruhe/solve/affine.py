@@ -132,6 +132,15 @@ class AffineModel:
         limits = tuple((limit.maximum, self._norm(limit.quantity, samples)) for limit in problem.limits)
         return AffineProblem(terms, limits, self.domains, samples)
 
+    def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
+        """Per operating point the wrench of the bare design, and of one unit of every column."""
+        slopes = self._slopes[Subject.SHAKING_FORCE]
+        return [(loads.wrench, tuple(by)) for loads, by in zip(self._bare.loads, slopes, strict=True)]
+
+    def norm(self, quantity: Quantity, samples: int) -> AffineNorm:
+        """A quantity at `samples` steps over the common period."""
+        return self._norm(quantity, samples)
+
     def _norm(self, quantity: Quantity, samples: int) -> AffineNorm:
         if quantity.subject in MASSES:
             bare = mass_rows(quantity, self._bare.engine.rotors)
@@ -175,7 +184,8 @@ def _slope(
     wrench = rotor_loads(rotors, point.speed, engine.cycle)
     if subject is Subject.MOUNT_FORCE and mounting is not None:
         return mounting.forces(wrench, point.speed)
-    return travel_of(mounting, wrench, point.speed) or wrench if subject is Subject.MOUNT_TRAVEL else wrench
+    travel = travel_of(mounting, wrench, point.speed) if subject is Subject.MOUNT_TRAVEL else None
+    return wrench if travel is None else travel
 
 
 def _stacked(bare: Rows, slopes: Sequence[Array]) -> AffineNorm:

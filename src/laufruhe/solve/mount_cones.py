@@ -70,9 +70,7 @@ def solve_cones(program: ConvexProgram) -> tuple[Array, ConvexDuals] | None:
     return x, ConvexDuals(vectors, tuple(price for price, _ in duals), tuple(dual for _, dual in duals))
 
 
-def _over(
-    function: ConvexFunction, y: Any, scale: Array, matrix: Any, unit: float, held: list[Any]
-) -> tuple[Any, Any]:
+def _over(function: ConvexFunction, y: Any, scale: Array, matrix: Any, unit: float, held: list[Any]) -> tuple[Any, Any]:
     """An expression that is the function at the optimum, and the cone whose dual proves it."""
     if isinstance(function, Linear):
         return function.constant + (function.gradient * scale) @ y, None

@@ -228,9 +228,7 @@ def convex_program(problem: Problem) -> ConvexProgram:
     base = root @ given.stiffness @ root.T - np.tensordot(start, slopes.reshape(-1, 6, 6), axes=1)
     matrices = Matrices(base, slopes.reshape(-1, 6, 6))
     terms = tuple((weight, _function(q, matrices, given, problem)) for q, weight in design.terms)
-    limits = [
-        part for k, limit in enumerate(design.limits) for part in _limits(limit, k, matrices, given, problem)
-    ]
+    limits = [part for k, limit in enumerate(design.limits) for part in _limits(limit, k, matrices, given, problem)]
     return ConvexProgram(matrices, lower, upper, terms, tuple(limits))
 
 

@@ -111,5 +111,3 @@ def infeasible_mounts(
         conflict=conflict,
         timing=timing,
     )
-
-

@@ -213,7 +213,7 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         objective=ObjectiveValue(objective_name(problem), value, problem.objective[0].quantity.unit, given),
         certificate=certificate,
         decisions=tuple(
-            entry for domain in optimum.problem.domains for entry in _decision_values(domain, optimum.x, bound.gradient)
+            entry for domain in optimum.problem.domains for entry in decision_values(domain, optimum.x, bound.gradient)
         ),
         limits=limits,
         initial=initial,
@@ -250,7 +250,8 @@ def _limit_value(name: str, unit: str, value: float, maximum: float, price: floa
     return LimitValue(name, value, maximum, unit, active, price if felt else 0.0)
 
 
-def _decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[DecisionValue, ...]:
+def decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[DecisionValue, ...]:
+    """Size and, where open, angle of one decision; the gradient prices its bound."""
     decision = domain.decision
     size, angle = decision.split(domain.complex_value(x))
     given_size, given_angle = decision.split(decision.start)

@@ -1,0 +1,153 @@
+"""The block on its mounts in CasADi symbols: the same kernels as the numbers (E1-E5, E20).
+
+Everything is in coordinates in which the mass matrix is one: q = R' y, so that M -> 1 and
+K -> R K R'. One complex symmetric system per order and operating point is eliminated in
+closed form; its derivatives are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine.block import Block
+from laufruhe.numerics.namespaces import symbols
+from laufruhe.physics.rigid_body import along_axes, carried, point_motion, turned_axes
+from laufruhe.problem.mount_design import DAMPING, LOSS, POSITION, STIFFNESS, TURNED, MountDesign
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SymbolicMounts:
+    """Matrices of the mounts as expressions of the decisions.
+
+    Attributes
+    ----------
+    stiffness, loss, damping
+        R K R', R H R', R C R', shape (6, 6) (E3).
+    travels
+        G R' of all mounts, stacked, shape (3 mounts, 6) (E1).
+    springs, losses, dampers
+        Mount forces per motion, stacked alike (E5).
+    """
+
+    stiffness: Any
+    loss: Any
+    damping: Any
+    travels: Any
+    springs: Any
+    losses: Any
+    dampers: Any
+
+
+def mount_matrices(design: MountDesign, block: Block) -> Any:
+    """A CasADi function from the decisions to the matrices of `SymbolicMounts`, in that order."""
+    lib = symbols()
+    decisions = ca.SX.sym("mounts", len(design.decisions))
+    root = ca.DM(np.linalg.inv(np.linalg.cholesky(block.mass_matrix)))
+    totals = [ca.SX(6, 6) for _ in range(3)]
+    maps: list[list[Any]] = [[], [], [], []]
+    for numbers in design.numbers_at([decisions[k] for k in range(len(design.decisions))]):
+        axes = turned_axes(lib, numbers[TURNED])
+        arm = [p - c for p, c in zip(numbers[POSITION], block.centre_of_gravity, strict=True)]
+        motion = ca.SX(point_motion(lib, arm))
+        spring = along_axes(lib, axes, numbers[STIFFNESS])
+        each = (spring, numbers[LOSS] * spring, along_axes(lib, axes, numbers[DAMPING]))
+        maps[0].append(motion @ root.T)
+        for k, matrix in enumerate(each):
+            totals[k] += carried(motion, matrix)
+            maps[k + 1].append(matrix @ motion @ root.T)
+    stacked = [ca.vertcat(*parts) for parts in maps]
+    return ca.Function("mounts", [decisions], [*(root @ total @ root.T for total in totals), *stacked])
+
+
+def symbolic_mounts(design: MountDesign, block: Block, decisions: Any) -> SymbolicMounts:
+    """Matrices at symbolic decisions."""
+    return SymbolicMounts(*mount_matrices(design, block)(decisions))
+
+
+def elimination() -> Any:
+    """A CasADi function y = (A + i B)^-1 (r + i s), A and B symmetric (E20).
+
+    Inputs A, B (6, 6), r, s (6,); outputs real and imaginary part. Without pivoting:
+    loss or damping keeps every pivot from zero, and without either a pivot is zero at
+    single frequencies only, where the answer is not a number and the search steps aside.
+    """
+    a, b, r, s = ca.SX.sym("A", 6, 6), ca.SX.sym("B", 6, 6), ca.SX.sym("r", 6), ca.SX.sym("s", 6)
+    rows = [[(a[j, k], b[j, k]) for k in range(6)] + [(r[j], s[j])] for j in range(6)]
+    for p in range(6):
+        inverse = _inverse(rows[p][p])
+        for j in range(p + 1, 6):
+            factor = _times(rows[j][p], inverse)
+            for k in range(p + 1, 7):
+                rows[j][k] = _minus(rows[j][k], _times(factor, rows[p][k]))
+    y: list[tuple[Any, Any]] = [(0.0, 0.0)] * 6
+    for p in reversed(range(6)):
+        rest = rows[p][6]
+        for k in range(p + 1, 6):
+            rest = _minus(rest, _times(rows[p][k], y[k]))
+        y[p] = _times(rest, _inverse(rows[p][p]))
+    return ca.Function("eliminate", [a, b, r, s], [ca.vertcat(*(v[0] for v in y)), ca.vertcat(*(v[1] for v in y))])
+
+
+def _times(a: tuple[Any, Any], b: tuple[Any, Any]) -> tuple[Any, Any]:
+    return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
+
+
+def _minus(a: tuple[Any, Any], b: tuple[Any, Any]) -> tuple[Any, Any]:
+    return a[0] - b[0], a[1] - b[1]
+
+
+def _inverse(a: tuple[Any, Any]) -> tuple[Any, Any]:
+    size = a[0] * a[0] + a[1] * a[1]
+    return a[0] / size, -a[1] / size
+
+
+@dataclass(frozen=True, eq=False)
+class SymbolicResponse:
+    """Mount forces and travels of loads at several angular frequencies (E4, E5).
+
+    Attributes
+    ----------
+    force, travel, firm
+        Real and imaginary parts, shape (3 mounts, n); `firm` are the forces if the
+        mounts gave no way (E11).
+    """
+
+    force: tuple[Any, Any]
+    travel: tuple[Any, Any]
+    firm: tuple[Any, Any]
+
+
+def response(mounts: SymbolicMounts, omegas: Array, real: Any, imaginary: Any) -> SymbolicResponse:
+    """Response to loads R w, real and imaginary parts of shape (6, n), at omegas of shape (n,)."""
+    count, one = len(omegas), ca.DM.eye(6)
+    reactance = ca.horzcat(*(mounts.stiffness - float(w) ** 2 * one for w in omegas))
+    lossy = [float(w > 0.0) for w in omegas]
+    resistance = ca.horzcat(
+        *(on * mounts.loss + float(w) * mounts.damping for on, w in zip(lossy, omegas, strict=True))
+    )
+    eliminate = elimination().map(count)
+    yr, yi = eliminate(reactance, resistance, real, imaginary)
+    firm = eliminate(ca.repmat(mounts.stiffness, 1, count), ca.MX(6, 6 * count), real, imaginary)
+    on, speeds = ca.DM(np.tile(lossy, (6, 1))), ca.DM(np.tile(omegas, (6, 1)))
+    force_real = mounts.springs @ yr - mounts.losses @ (yi * on) - mounts.dampers @ (yi * speeds)
+    force_imaginary = mounts.springs @ yi + mounts.losses @ (yr * on) + mounts.dampers @ (yr * speeds)
+    return SymbolicResponse(
+        (force_real, force_imaginary),
+        (mounts.travels @ yr, mounts.travels @ yi),
+        (mounts.springs @ firm[0], mounts.springs @ firm[1]),
+    )
+
+
+def waves(orders: Sequence[float], base: float, samples: int) -> tuple[Any, Any]:
+    """Cosines and sines of orders at equal steps over the period of `base`, shape (n, samples)."""
+    angles = 2.0 * np.pi / base * np.arange(samples) / samples
+    phases = np.outer(orders, angles)
+    return ca.DM(np.cos(phases)), ca.DM(np.sin(phases))
