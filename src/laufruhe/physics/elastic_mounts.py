@@ -79,7 +79,7 @@ class ElasticMounting:
 
     def total(self, each: Array) -> Array:
         """Sum of G' k G over the mounts, shape (6, 6) (E3)."""
-        return np.sum([carried(g, k) for g, k in zip(self.motions, each, strict=True)], axis=0)
+        return np.asarray(sum(carried(g, k) for g, k in zip(self.motions, each, strict=True)))
 
     @cached_property
     def stiffness(self) -> Array:

@@ -15,6 +15,7 @@ from laufruhe.problem.file_models import BlockTable, MountsTable, MountTable, St
 from laufruhe.problem.mount_design import (
     DAMPING,
     LOSS,
+    NOTHING_ASKED,
     NUMBERS_OF_MOUNT,
     POSITION,
     STIFFNESS,
@@ -41,7 +42,7 @@ class MountsFound:
 
     mounts: tuple[Mount, ...] = ()
     block: Block | None = None
-    design: MountDesign = MountDesign()
+    design: MountDesign = NOTHING_ASKED
 
 
 def mounts_of(table: MountsTable | None, block: BlockTable | None) -> MountsFound:

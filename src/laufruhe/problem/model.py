@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.shaking_loads import EXACT, Fidelity
-from laufruhe.problem.mount_design import MountDesign
+from laufruhe.problem.mount_design import NOTHING_ASKED, MountDesign
 from laufruhe.problem.quantity import Quantity
 
 Array = NDArray[np.float64]
@@ -132,7 +132,7 @@ class Problem:
     assumptions: tuple[str, ...] = ()
     fidelity: Fidelity = EXACT
     tolerance: float = 1e-4
-    mount_design: MountDesign = MountDesign()
+    mount_design: MountDesign = NOTHING_ASKED
 
     @property
     def start(self) -> tuple[complex, ...]:

@@ -122,13 +122,10 @@ def _side(text: str, unit: str, where: str) -> float:
 
 def _check_together(limits: Sequence[MountLimit]) -> None:
     """Refuse a least value above a largest one of the same quantity."""
-    for low in limits:
-        for high in limits:
-            if low.quantity == high.quantity and low.minimum is not None and high.maximum is not None:
-                if low.minimum > high.maximum:
-                    names = f"'{low.name}'" if low is high else f"'{low.name}' and '{high.name}'"
-                    raise Refused(
-                        "constraints", None,
-                        f"{names} contradict each other: at least {units.shown(low.minimum, low.quantity.unit)} and at "
-                        f"most {units.shown(high.maximum, high.quantity.unit)}", "let the limits leave room",
-                    )  # fmt: skip
+    pairs = [(low, high) for low in limits for high in limits if low.quantity == high.quantity]
+    for low, high in pairs:
+        if low.minimum is not None and high.maximum is not None and low.minimum > high.maximum:
+            unit = low.quantity.unit
+            names = f"'{low.name}'" if low is high else f"'{low.name}' and '{high.name}'"
+            rule = f"at least {units.shown(low.minimum, unit)} and at most {units.shown(high.maximum, unit)}"
+            raise Refused("constraints", None, f"{names} contradict each other: {rule}", "let the limits leave room")

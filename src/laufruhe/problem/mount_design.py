@@ -242,3 +242,6 @@ def torque_roll_residual(mounting: ElasticMounting, frequency: float) -> float:
 def total_stiffness(mounts: Sequence[Mount]) -> float:
     """Sum of all stiffnesses along the mounts' own axes [N/m]."""
     return float(sum(sum(mount.stiffness) for mount in mounts))
+
+
+NOTHING_ASKED = MountDesign()

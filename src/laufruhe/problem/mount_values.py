@@ -61,11 +61,12 @@ def mount_value(quantity: MountQuantity, evaluation: Evaluation) -> float:
 
 def _transmissibility(quantity: MountQuantity, evaluation: Evaluation) -> float:
     firm = rigid_mounting(evaluation.engine.mounts)
-    ratios = [0.0]
-    for loads in evaluation.loads:
-        if (quantity.points is None or loads.point.name in quantity.points) and loads.mount_forces is not None:
-            ratios.append(transmitted(loads.mount_forces, firm.forces(loads.wrench), quantity.orders))
-    return max(ratios)
+    ratios = [
+        transmitted(loads.mount_forces, firm.forces(loads.wrench), quantity.orders)
+        for loads in evaluation.loads
+        if (quantity.points is None or loads.point.name in quantity.points) and loads.mount_forces is not None
+    ]
+    return max(ratios, default=0.0)
 
 
 def limit_value(limit: MountLimit, evaluation: Evaluation) -> tuple[float, float]:

@@ -186,8 +186,8 @@ def _limit(table: ConstraintTable, k: int, scene: _Scene) -> Limit:
     quantity = scene.quantity(table.limit, table, f"{where}.limit", table.of)
     for key in ("min", "outside"):
         if getattr(table, key) is not None:
-            raise Refused(f"{where}.{key}", None, f"does not go with {quantity.subject}, which has a largest value only",
-                          "give max")  # fmt: skip
+            rule = f"does not go with {quantity.subject}, which has a largest value only"
+            raise Refused(f"{where}.{key}", None, rule, "give max")
     if table.max is None:
         raise Refused(f"{where}.max", None, "is missing", "add it")
     try:

@@ -49,9 +49,7 @@ def solve_cones(program: ConvexProgram) -> tuple[Array, ConvexDuals] | None:
         top, cone = _over(term, y, scale, matrix, unit, held)
         tops.append(weight * top / size)
         cones.append(cone)
-    limits = []
-    for limit in program.limits:
-        limits.append(_limited(limit.function, limit.maximum, y, scale, matrix, unit, held))
+    limits = [_limited(each.function, each.maximum, y, scale, matrix, unit, held) for each in program.limits]
     least = cp.Problem(cp.Minimize(sum(tops) if tops else 0), held)
     with warnings.catch_warnings():
         # an inaccurate answer is judged by its certificate, not by a warning

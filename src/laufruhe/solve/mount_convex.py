@@ -105,7 +105,7 @@ class Compliance:
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:  # noqa: ARG002
         """The tangent at x, which lies under it everywhere (E16)."""
-        y = np.linalg.solve(self.matrices.at(x), self.load)
+        y = np.asarray(np.linalg.solve(self.matrices.at(x), self.load), dtype=np.float64)
         constant, gradient = self.matrices.between(y, y)
         return self.factor * (2.0 * float(y @ self.load) - constant), -self.factor * gradient
 
@@ -123,7 +123,7 @@ class Eigenvalue:
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
         """sign <V, A(x)> with V from the dual matrix, or from the eigenvector at x."""
-        values, vectors = np.linalg.eigh(self.sign * self.matrices.at(x))
+        _, vectors = np.linalg.eigh(self.sign * self.matrices.at(x))
         weights, columns = np.eye(6)[-1], vectors
         if dual is not None:
             found, columns = np.linalg.eigh(0.5 * (dual + dual.T))

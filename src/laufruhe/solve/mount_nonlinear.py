@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
-from laufruhe.problem.mount_design import MountDesign
+from laufruhe.problem.mount_design import NOTHING_ASKED
 from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.solve.certificate import Certificate, Proof
 from laufruhe.solve.domain import Domain, domains_of
@@ -84,7 +84,7 @@ def _balanced(problem: Problem) -> list[complex] | None:
     """Unbalances that are best on the mounts as given, where that is convex."""
     if not problem.decisions or not problem.objective:
         return None
-    result = solve_unbalances(replace(problem, mount_design=MountDesign()))
+    result = solve_unbalances(replace(problem, mount_design=NOTHING_ASKED))
     return _unbalances_of(problem, result) if result.decisions else None
 
 
@@ -174,7 +174,7 @@ def _rebalanced(problem: Problem, design: _Design) -> tuple[_Design, float] | No
         # transmissibility depends on what excites
         return None
     held = problem.mount_design.applied(problem.engine, design.mounts)
-    result = solve_unbalances(replace(problem, engine=held, mount_design=MountDesign()))
+    result = solve_unbalances(replace(problem, engine=held, mount_design=NOTHING_ASKED))
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return None
     values = _unbalances_of(problem, result)

@@ -44,7 +44,7 @@ from laufruhe.solve.nonlinear import NonlinearProgram, softened_lengths
 
 Array = NDArray[np.float64]
 
-KEPT_SHARE = 1e-5
+KEPT_SHARE = 1e-4
 LEAST_SAMPLES = 32
 SAMPLES_PER_ORDER = 4
 SOFTNESS = (1e-2, 1e-4, 1e-7)
@@ -56,6 +56,7 @@ class _Point:
 
     name: str
     weight: float
+    base: float
     orders: Array
     response: SymbolicResponse
 
@@ -177,11 +178,12 @@ class JointProgram:
             size = np.abs(loads[0]).max(axis=1, initial=0.0)
             size += (np.abs(loads[1:]).max(axis=2, initial=0.0) * scales[:, None]).sum(axis=0)
             kept = np.flatnonzero(size > KEPT_SHARE * size.max(initial=0.0))
-            orders = kept * float(base)
+            orders: Array = np.asarray(kept, dtype=float) * float(base)
             real, imaginary = (self._load_columns(part[:, kept]) for part in (loads.real, loads.imag))
-            found.append(
-                _Point(point.name, point.weight, orders, response(self._mounts, orders * point.speed, real, imaginary))
-            )
+            answer = response(self._mounts, orders * point.speed, real, imaginary)
+            # one period of what is left is enough
+            period = float(common_base([int(k) * base for k in kept if k > 0] or [base]))
+            found.append(_Point(point.name, point.weight, period, orders, answer))
         return found
 
     def _load_columns(self, loads: Array) -> Any:
@@ -199,7 +201,6 @@ class JointProgram:
         chosen = [p for p in self._points if quantity.points is None or p.name in quantity.points]
         mounts = [k for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts]
         whole = sum(point.weight for point in chosen)
-        base = float(self.problem.engine.cycle.base_order)
         blocks, weights = [], []
         for point in chosen:
             signal = point.response.force if quantity.subject is Subject.MOUNT_FORCE else point.response.travel
@@ -208,8 +209,8 @@ class JointProgram:
                 if quantity.orders is None or any(abs(order - o) < 5e-4 for o in quantity.orders)
             ]  # fmt: skip
             highest = float(point.orders.max(initial=0.0))
-            samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * highest / base))
-            cosine, sine = waves(point.orders[counted].tolist(), base, samples)
+            samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * highest / point.base))
+            cosine, sine = waves(point.orders[counted].tolist(), point.base, samples)
             values = signal[0][:, counted] @ cosine - signal[1][:, counted] @ sine
             for k in mounts:
                 rows = values[3 * k : 3 * k + 3, :].T
@@ -309,9 +310,8 @@ class JointProgram:
             for group in groups:
                 if group:
                     force, firm = point.response.force, point.response.firm
-                    pairs.append(
-                        (sum(ca.sumsqr(part[:, group]) for part in force), sum(ca.sumsqr(part[:, group]) for part in firm))
-                    )  # fmt: skip
+                    over, under = (sum(ca.sumsqr(part[:, group]) for part in parts) for parts in (force, firm))
+                    pairs.append((over, under))
         return pairs
 
     def _hold_modes(self) -> None:

@@ -1,0 +1,300 @@
+"""The block on its mounts in the time domain: judge of the frequency domain, and run-up (E25-E28).
+
+    M q'' + C q' + K q + stops(q) = w(t)                                                (E25)
+
+Hysteretic loss has no law in time. It is replaced by viscous damping that loses the same
+work in each mode at its own natural frequency (E26); away from resonance, where damping
+hardly matters, the two differ. A bump stop adds its stiffness along the own axes of a
+mount beyond its gap (E27).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from laufruhe.errors import ModelError, SolverError
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.rigid_body import moved_wrench
+
+Array = NDArray[np.float64]
+
+STEPS_PER_PERIOD = 24
+MOST_SHOTS = 60
+CLOSED = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class TimeModel:
+    """Matrices of E25 in coordinates in which the mass is one, q = R' y.
+
+    Attributes
+    ----------
+    stiffness, damping
+        Shape (6, 6).
+    load
+        From a wrench about the origin to y, shape (6, 6).
+    travels
+        From y to travel along the own axes of the mounts, shape (3 mounts, 6).
+    forces, drag
+        From y and y' to the mount forces in the axes of C2, shape (3 mounts, 6).
+    gaps, stops
+        Of the bump stops along every own axis, shape (3 mounts,).
+    turns
+        Own axes of the mounts, shape (mounts, 3, 3).
+    """
+
+    stiffness: Array
+    damping: Array
+    load: Array
+    travels: Array
+    forces: Array
+    drag: Array
+    gaps: Array
+    stops: Array
+    turns: Array
+
+    @property
+    def has_stops(self) -> bool:
+        """Whether any bump stop can be met."""
+        return bool(np.any((self.stops > 0.0) & np.isfinite(self.gaps)))
+
+    def stop_forces(self, y: Array) -> Array:
+        """Forces of the stops along the own axes, shape (3 mounts, n) of y (6, n) (E27)."""
+        travel = self.travels @ y
+        gaps = self.gaps[:, None]
+        return np.asarray(self.stops[:, None] * (travel - np.clip(travel, -gaps, gaps)))
+
+    def mount_forces(self, y: Array, rate: Array) -> Array:
+        """Forces of the engine on its mounts, shape (n, mounts, 3) of y, y' (6, n)."""
+        linear = (self.forces @ y + self.drag @ rate).T.reshape(-1, len(self.turns), 3)
+        if not self.has_stops:
+            return linear
+        own = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
+        return np.asarray(linear + np.einsum("nma,mab->nmb", own, self.turns))
+
+    def accelerations(self, y: Array, rate: Array, load: Array) -> Array:
+        """y'' of columns (6, n)."""
+        out = load - self.stiffness @ y - self.damping @ rate
+        return out - self.travels.T @ self.stop_forces(y) if self.has_stops else out
+
+
+def time_model(mounting: ElasticMounting) -> TimeModel:
+    """E25 of a mounting, hysteretic loss as the viscous damping of E26.
+
+    A mount's loss in a mode becomes its loss over that mode's natural frequency, so each
+    mode keeps the loss factor that the mounts give it, and forces and motion agree.
+    """
+    modes = mounting.modes
+    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
+    vectors = np.linalg.solve(root.T, modes.shapes)
+    motions = mounting.motions @ root.T
+    turns = np.array([mount.orientation for mount in mounting.mounts])
+    own = np.einsum("mab,mbj->maj", turns, motions)
+    spread = np.where(modes.squares > 0.0, 1.0 / np.sqrt(np.where(modes.squares > 0.0, modes.squares, 1.0)), 0.0)
+    lossy = (mounting.losses @ (mounting.motions @ modes.shapes) * spread) @ vectors.T
+    drag = mounting.dampers @ motions + lossy
+    mounts = len(mounting.mounts)
+    return TimeModel(
+        stiffness=root @ mounting.stiffness @ root.T,
+        damping=np.einsum("mai,maj->ij", motions, drag),
+        load=root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
+        travels=own.reshape(3 * mounts, 6),
+        forces=(mounting.springs @ motions).reshape(3 * mounts, 6),
+        drag=drag.reshape(3 * mounts, 6),
+        gaps=np.repeat([mount.stop_gap for mount in mounting.mounts], 3),
+        stops=np.repeat([mount.stop_stiffness for mount in mounting.mounts], 3),
+        turns=turns,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyState:
+    """One period of the motion that repeats itself.
+
+    Attributes
+    ----------
+    angles
+        Crank angles at equal steps [rad], shape (n,).
+    forces
+        On the mounts, shape (n, mounts, 3) [N].
+    travels
+        Along the own axes of the mounts, shape (n, mounts, 3) [m].
+    mismatch
+        Distance between end and start of the period, over its size.
+    """
+
+    angles: Array
+    forces: Array
+    travels: Array
+    mismatch: float
+
+
+def periodic_state(
+    mounting: ElasticMounting, wrench: Spectrum, speed: float, samples: int = 360, tolerance: float = 1e-11
+) -> SteadyState:
+    """Steady state by integration over one period, shot until it closes (E28).
+
+    The start that repeats itself is found by Newton's method; the columns of its matrix
+    are integrated beside the motion itself.
+
+    Raises
+    ------
+    ModelError
+        At standstill.
+    SolverError
+        If no motion repeats itself within 60 shots.
+    """
+    if not speed > 0.0:
+        raise ModelError(f"a steady state in time needs a speed above zero, not {speed:g} rad/s")
+    model = time_model(mounting)
+    period = 2.0 * np.pi / (float(wrench.base) * speed)
+    loads = wrench.coefficients @ model.load.T
+    orders = wrench.orders
+
+    def rates(t: float, state: Array, columns: int) -> Array:
+        y, rate = state.reshape(12, columns)[:6], state.reshape(12, columns)[6:]
+        load = (np.exp(1j * orders * speed * t) @ loads).real[:, None]
+        return np.concatenate([rate, model.accelerations(y, rate, load)]).reshape(-1)
+
+    def run(start: Array, times: Array | None = None) -> Array:
+        columns = start.shape[1]
+        scale = float(np.abs(start).max(initial=0.0)) or 1e-6
+        found = solve_ivp(
+            rates, (0.0, period), start.reshape(-1), "DOP853", t_eval=times, args=(columns,), rtol=tolerance,
+            atol=tolerance * min(scale, 1e-3), max_step=period / 64,
+        )  # fmt: skip
+        return np.asarray(found.y if times is not None else found.y[:, -1].reshape(12, columns))
+
+    size = _static_size(model, loads)
+    start, step = np.zeros(12), size * 1e-4
+    for _ in range(MOST_SHOTS):
+        ends = run(start[:, None] + np.column_stack([np.zeros(12), step * np.eye(12)]))
+        slope = (ends[:, 1:] - ends[:, :1]) / step
+        gap = ends[:, 0] - start
+        change = np.linalg.solve(np.eye(12) - slope, gap)
+        start = start + change
+        if np.abs(change).max() <= CLOSED * max(np.abs(start).max(), size):
+            break
+    else:
+        raise SolverError("the bump stops let no motion repeat itself in one period; integrate a run-up instead")
+    times = np.arange(samples + 1) * (period / samples)
+    states = run(start[:, None], np.minimum(times, period))
+    y, rate = states[:6, :-1], states[6:, :-1]
+    mismatch = float(np.abs(states[:, -1] - start).max() / max(np.abs(states).max(), 1e-300))
+    travels = (model.travels @ y).T.reshape(samples, -1, 3)
+    return SteadyState(np.asarray(times[:-1] * speed, dtype=float), model.mount_forces(y, rate), travels, mismatch)
+
+
+def _static_size(model: TimeModel, loads: NDArray[np.complex128]) -> float:
+    """A size of the motion that is not zero."""
+    stiffness = float(np.linalg.norm(model.stiffness)) or 1.0
+    return float(np.abs(loads).max(initial=0.0)) / stiffness or 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class RunUp:
+    """Run-up or shut-down through resonance.
+
+    Attributes
+    ----------
+    speeds
+        Crank speed at the end of every stretch [rad/s], shape (n,).
+    force, travel
+        Largest on any mount within the stretch, shape (n,) [N], [m].
+    worst_force, worst_travel
+        Over the whole run.
+    """
+
+    speeds: Array
+    force: Array
+    travel: Array
+
+    @property
+    def worst_force(self) -> float:
+        """Largest force on any mount [N]."""
+        return float(self.force.max())
+
+    @property
+    def worst_travel(self) -> float:
+        """Largest travel at any mount [m]."""
+        return float(self.travel.max())
+
+
+def run_through(
+    mounting: ElasticMounting,
+    inertia: Spectrum,
+    gas: Spectrum | None,
+    first: float,
+    last: float,
+    duration: float,
+    stretches: int = 200,
+    method: Literal["DOP853", "RK45"] = "DOP853",
+    tolerance: float = 1e-6,
+) -> RunUp:
+    """Run-up (or shut-down) at constant acceleration, from rest at `first` (E28).
+
+    Parameters
+    ----------
+    mounting
+        Block and mounts, bump stops included.
+    inertia
+        Wrench per square of crank speed [N s2, N m s2].
+    gas
+        Wrench that does not depend on speed; none for a motored engine.
+    first, last
+        Crank speeds [rad/s].
+    duration
+        Of the run [s].
+    stretches
+        Into which the run is cut for its envelope.
+    method, tolerance
+        Of the integration.
+
+    Raises
+    ------
+    ModelError
+        If the run has no duration.
+    """
+    if not duration > 0.0 or first < 0.0 or last < 0.0:
+        raise ModelError("a run-up needs a duration and speeds that are not negative")
+    model = time_model(mounting)
+    gain = (last - first) / duration
+    bases = [(inertia.orders, inertia.coefficients @ model.load.T)]
+    if gas is not None:
+        bases.append((gas.orders, gas.coefficients @ model.load.T))
+
+    def load(t: float) -> Array:
+        speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
+        orders, coefficients = bases[0]
+        total = speed * speed * (np.exp(1j * orders * angle) @ coefficients).real
+        for orders, coefficients in bases[1:]:
+            total = total + (np.exp(1j * orders * angle) @ coefficients).real
+        return np.asarray(total)[:, None]
+
+    def rates(t: float, state: Array) -> Array:
+        y, rate = state[:6, None], state[6:, None]
+        return np.concatenate([rate[:, 0], model.accelerations(y, rate, load(t))[:, 0]])
+
+    fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in bases))
+    state, edges = np.zeros(12), np.linspace(0.0, duration, stretches + 1)
+    force, travel = np.zeros(stretches), np.zeros(stretches)
+    scale = _static_size(model, bases[0][1] * max(first, last) ** 2)
+    for k, (start, end) in enumerate(pairwise(edges)):
+        count = max(int(STEPS_PER_PERIOD * fastest * (end - start) / (2.0 * np.pi)) + 1, 16)
+        times = np.linspace(start, end, min(count, 4000))
+        found = solve_ivp(
+            rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=1e-3 * tolerance * scale
+        )
+        y, rate = found.y[:6], found.y[6:]
+        force[k] = np.linalg.norm(model.mount_forces(y, rate), axis=-1).max()
+        travel[k] = np.linalg.norm((model.travels @ y).T.reshape(len(times), -1, 3), axis=-1).max()
+        state = found.y[:, -1]
+    return RunUp(first + gain * edges[1:], force, travel)

@@ -1,0 +1,117 @@
+"""Integration in time against the frequency domain, and what only time can tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from laufruhe.errors import ModelError
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.elastic_mounts import elastic_mounting
+from laufruhe.physics.run_up import periodic_state, run_through, time_model
+from mounts.powertrain import powertrain, random_mounting, wrench
+
+RPM = np.pi / 30.0
+
+
+@pytest.mark.parametrize("rpm", [120.0, 605.0, 3000.0])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_viscous_steady_state_is_that_of_the_frequency_domain(rpm, seed):
+    mounting = random_mounting(seed, loss=0.0, damping=400.0)
+    load = wrench(seed)
+    steady = periodic_state(mounting, load, rpm * RPM)
+    expected = mounting.forces(load, rpm * RPM).values(steady.angles)
+    assert steady.mismatch < 1e-9
+    assert np.abs(steady.forces - expected).max() <= 1e-6 * np.abs(expected).max()
+
+
+def test_light_damping_near_resonance_too():
+    mounting = powertrain(damping=20.0)
+    speed = 2 * np.pi * mounting.modes.frequencies[1] * 1.001
+    load = wrench(3, orders=1)
+    steady = periodic_state(mounting, load, speed)
+    expected = mounting.forces(load, speed).values(steady.angles)
+    assert np.abs(expected).max() > 10 * np.abs(mounting.forces(load, 0.2 * speed).sample(64)).max()
+    assert np.abs(steady.forces - expected).max() <= 1e-6 * np.abs(expected).max()
+
+
+def test_equal_loss_keeps_every_modes_loss_factor():
+    mounting = powertrain(loss=0.12)
+    model = time_model(mounting)
+    rates = np.sort(np.linalg.eigvalsh(model.damping))
+    assert rates == pytest.approx(np.sort(0.12 * 2 * np.pi * mounting.modes.frequencies), rel=1e-12)
+
+
+def test_hysteretic_resonance_peak_is_that_of_the_frequency_domain():
+    # at a natural frequency the viscous stand-in loses the same work, so one mode agrees there
+    mounting = powertrain(loss=0.05)
+    omega, shape = 2 * np.pi * mounting.modes.frequencies[3], mounting.modes.shapes[:, 3]
+    drive = np.linalg.solve(mounting.modes.shapes.T, np.eye(6)[3]) * 100.0
+    load = Spectrum(wrench().base, np.array([np.zeros(6), drive], dtype=complex))
+    assert np.abs(mounting.modes.shapes.T @ drive)[3] == pytest.approx(100.0)
+    steady = periodic_state(mounting, load, omega)
+    expected = mounting.forces(load, omega).values(steady.angles)
+    assert np.abs(steady.forces - expected).max() <= 1e-6 * np.abs(expected).max()
+    assert shape.shape == (6,)
+
+
+def test_a_stop_that_is_never_met_changes_nothing_and_one_that_is_met_limits_travel():
+    load, speed = wrench(2, orders=2), 560.0 * RPM
+    free = periodic_state(powertrain(damping=300.0), load, speed)
+    reach = np.abs(free.travels).max()
+    far = powertrain(damping=300.0, stop_gap=2.0 * reach, stop_stiffness=5e6)
+    assert np.abs(periodic_state(far, load, speed).forces - free.forces).max() <= 1e-6 * np.abs(free.forces).max()
+    near = periodic_state(powertrain(damping=300.0, stop_gap=0.5 * reach, stop_stiffness=2e6), load, speed)
+    assert np.abs(near.travels).max() < 0.9 * reach
+    assert near.mismatch < 1e-7
+
+
+def test_run_up_passes_resonance_with_less_than_the_steady_peak_and_slow_ones_reach_it():
+    mounting = powertrain(loss=0.15)
+    unit = Spectrum(wrench().base, np.array([np.zeros(6), [0, 0, 0.02, 0, 0, 0]], dtype=complex))
+    top = 2 * np.pi * 20.0
+    speeds = np.linspace(1.0, top, 600)
+    peaks = []
+    for speed in speeds:
+        load = Spectrum(unit.base, unit.coefficients * speed**2)
+        peaks.append(np.linalg.norm(mounting.forces(load, speed).sample(64), axis=-1).max())
+    quick = run_through(mounting, unit, None, 0.0, top, 0.6, stretches=60)
+    slow = run_through(mounting, unit, None, 0.0, top, 12.0, stretches=120)
+    below = speeds < 2 * np.pi * 14.0
+    steady = np.max(np.array(peaks)[below])
+
+    def resonance(run):
+        return run.force[run.speeds < 2 * np.pi * 14.0].max()
+
+    assert resonance(quick) < 0.97 * steady
+    assert resonance(slow) == pytest.approx(steady, rel=0.05)
+
+
+def test_shut_down_meets_the_same_resonance():
+    mounting = powertrain(loss=0.15)
+    unit = Spectrum(wrench().base, np.array([np.zeros(6), [0, 0, 0.02, 0, 0, 0]], dtype=complex))
+    up = run_through(mounting, unit, None, 0.0, 2 * np.pi * 15.0, 6.0, stretches=60)
+    down = run_through(mounting, unit, None, 2 * np.pi * 15.0, 0.0, 6.0, stretches=60)
+    assert down.speeds[-1] == pytest.approx(0.0, abs=1e-9)
+    assert down.worst_travel == pytest.approx(up.worst_travel, rel=0.15)
+
+
+def test_free_vibration_keeps_its_energy_without_damping_and_forces_balance_inertia():
+    mounting = random_mounting(5, loss=0.2, damping=100.0)
+    model = time_model(mounting)
+    generator = np.random.default_rng(0)
+    y, rate, load = generator.normal(size=(6, 1)), generator.normal(size=(6, 1)), generator.normal(size=(6, 1))
+    forces = model.mount_forces(y, rate)[0]
+    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
+    pulled = root @ np.einsum("mai,ma->i", mounting.motions, forces)
+    assert model.accelerations(y, rate, load)[:, 0] == pytest.approx(load[:, 0] - pulled, rel=1e-9, abs=1e-9)
+
+
+def test_standstill_and_runs_without_duration_are_refused():
+    with pytest.raises(ModelError, match="speed above zero"):
+        periodic_state(powertrain(), wrench(), 0.0)
+    with pytest.raises(ModelError, match="duration"):
+        run_through(powertrain(), wrench(), None, 0.0, 1.0, 0.0)
+    assert elastic_mounting(powertrain().block, [replace(m, stop_gap=0.01) for m in powertrain().mounts])
