@@ -11,6 +11,9 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
 
+# SI; squares and products of what is smaller stay finite.
+LARGEST = 1e12
+
 
 @dataclass(frozen=True)
 class Open:
@@ -97,6 +100,8 @@ class Quantity:
         return value
 
     def _bounded(self, value: float) -> float:
+        if abs(value) > LARGEST:
+            raise _complaint(f"is beyond any engine; {units._advice(self.unit)}")
         if value <= self.above:
             raise _complaint(f"must be more than {units.shown(self.above, self.unit)}; {units._advice(self.unit)}")
         if value < self.least:
@@ -143,7 +148,7 @@ Angle: TypeAlias = Annotated[float, Quantity("rad", plain=_DEG)]
 OpenAngle: TypeAlias = Annotated[float | Open, Quantity("rad", plain=_DEG, openable=True)]
 Speed: TypeAlias = Annotated[float, Quantity("rad/s", above=0.0)]
 PistonSpeed: TypeAlias = Annotated[float, Quantity("m/s", above=0.0)]
-Number: TypeAlias = Annotated[float, Quantity("")]
+Ratio: TypeAlias = Annotated[float, Quantity("", least=-100.0, most=100.0)]
 NonNegative: TypeAlias = Annotated[float, Quantity("", least=0.0)]
 Positive: TypeAlias = Annotated[float, Quantity("", above=0.0)]
 Fraction: TypeAlias = Annotated[float | Open, Quantity("", least=-10.0, most=10.0, openable=True)]

@@ -38,7 +38,7 @@ class ShaftTable(Table):
     """A crankshaft of a free list of parts."""
 
     name: Name
-    ratio: f.Number = 1.0
+    ratio: f.Ratio = 1.0
     position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
 
 
@@ -240,7 +240,7 @@ class BalancerShaftTable(Table):
     """A balancer shaft."""
 
     name: Name
-    ratio: f.Number
+    ratio: f.Ratio
     position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
     unbalances: list[UnbalanceTable] = Field(min_length=1)
 

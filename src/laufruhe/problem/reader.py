@@ -45,7 +45,7 @@ def load(path: str | Path) -> Problem:
 
 def _parsed(path: Path) -> ProblemFile:
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = path.read_bytes().decode("utf-8-sig")
         tables = tomllib.loads(text)
     except IsADirectoryError:
         raise _unreadable(path, "is a folder", "name a problem file in it") from None

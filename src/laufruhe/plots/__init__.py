@@ -1,0 +1,23 @@
+"""Pictures of a result, as PNG files; they read results and never call a solver."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from laufruhe.plots import bars, polar, spectrum
+from laufruhe.plots.style import save
+from laufruhe.solve.result import Result
+
+
+def draw(result: Result, folder: Path) -> tuple[str, ...]:
+    """Every picture that this result fills, in the order of a report.
+
+    Returns
+    -------
+    File names in `folder`.
+    """
+    makers = {"polar.png": polar.figure, "bars.png": bars.figure} if result.problem.engine.mounts else {}
+    makers["spectrum.png"] = spectrum.figure
+    for name, figure in makers.items():
+        save(figure(result), folder / name)
+    return tuple(makers)
