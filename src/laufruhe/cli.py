@@ -187,7 +187,8 @@ def _written(request: _Request, answer: Callable[[Problem], Result], say: Callab
         option, folder = ("--out", request.out) if request.out is not None else ("results", _default_folder(problem))
         stage = places.enter_context(files.staged(folder, option))
         json_file = _json_file(request, places)
-        say(f"deciding {len(problem.decisions)} unbalance(s)" if problem.decisions else "evaluating")
+        open_numbers = len(problem.decisions) + len(problem.mount_design.decisions)
+        say(f"deciding {open_numbers} open number(s)" if open_numbers else "evaluating")
         result = answer(problem)
         pictures: tuple[str, ...] = ()
         if request.pictures:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from laufruhe.plots import bars, polar, spectrum
+from laufruhe.plots import bars, mounting, polar, spectrum
 from laufruhe.plots.style import save
+from laufruhe.report.mounting import is_elastic
 from laufruhe.solve.result import Result
 
 
@@ -18,6 +19,8 @@ def draw(result: Result, folder: Path) -> tuple[str, ...]:
     """
     makers = {"polar.png": polar.figure, "bars.png": bars.figure} if result.problem.engine.mounts else {}
     makers["spectrum.png"] = spectrum.figure
+    if is_elastic(result.final):
+        makers |= mounting.FIGURES
     for name, figure in makers.items():
         save(figure(result), folder / name)
     return tuple(makers)

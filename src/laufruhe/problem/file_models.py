@@ -177,7 +177,9 @@ class MountTable(Table):
     stiffness: Annotated[list[f.OpenStiffness], Field(min_length=3, max_length=3)] | None = Field(
         default=None, description="Along its own x, y, z."
     )
-    loss_factor: f.OpenRatio | None = Field(default=None, description="Damping work over deformation work over 2 pi.")
+    loss_factor: f.OpenLossFactor | None = Field(
+        default=None, description="Damping work over deformation work over 2 pi."
+    )
     damping: Annotated[list[f.OpenDamping], Field(min_length=3, max_length=3)] | None = Field(
         default=None, description="Viscous, along its own x, y, z."
     )
@@ -196,7 +198,7 @@ class MountsTable(Table):
     stiffness: Annotated[list[f.Stiffness], Field(min_length=3, max_length=3)] | None = Field(
         default=None, description="Of every elastic mount that gives none."
     )
-    loss_factor: f.Ratio = Field(default=0.0, description="Of every elastic mount that gives none.")
+    loss_factor: f.LossFactor = Field(default=0.0, description="Of every elastic mount that gives none.")
     stop: StopTable | None = None
     places: list[MountTable] = Field(default_factory=list)
 

@@ -69,40 +69,40 @@ def _transmissibility(quantity: MountQuantity, evaluation: Evaluation) -> float:
     return max(ratios, default=0.0)
 
 
-def limit_value(limit: MountLimit, evaluation: Evaluation) -> tuple[float, float]:
-    """Value and the side that it is nearest to breaking, or breaks (E15).
+def limit_value(limit: MountLimit, evaluation: Evaluation) -> tuple[float, float, str]:
+    """Value, and the side that it is nearest to breaking, or breaks: where it lies and what it says (E15).
 
     Of natural frequencies these are the frequency and the edge with the least room.
     """
-    if limit.quantity.measure is MountMeasure.FREQUENCIES:
-        frequencies = mounting_in(evaluation.engine).modes.frequencies
-        rooms = [(_room(limit, f), f) for f in frequencies]
-        (_, edge), worst = min(rooms, key=lambda pair: pair[0][0])
-        return float(worst), edge
-    value = mount_value(limit.quantity, evaluation)
-    return value, _room(limit, value)[1]
-
-
-def _room(limit: MountLimit, value: float) -> tuple[float, float]:
-    """Relative distance inside the nearest side, negative outside, and that side."""
-    sides = []
-    if limit.minimum is not None:
-        sides.append((value - limit.minimum, limit.minimum))
-    if limit.maximum is not None:
-        sides.append((limit.maximum - value, limit.maximum))
-    if limit.outside is not None:
-        low, high = limit.outside
-        below, above = low - value, value - high
-        sides.append((below, low) if below >= above else (above, high))
-    return min(((room / (abs(edge) or 1.0), edge) for room, edge in sides), default=(math.inf, math.inf))
+    value, (_, edge, side) = _worst(limit, evaluation)
+    return value, edge, side
 
 
 def excess(limit: MountLimit, evaluation: Evaluation) -> float:
     """Relative excess over the worst side of a limit; zero or less inside."""
+    return -_worst(limit, evaluation)[1][0]
+
+
+def _worst(limit: MountLimit, evaluation: Evaluation) -> tuple[float, tuple[float, float, str]]:
     if limit.quantity.measure is MountMeasure.FREQUENCIES:
-        frequencies = mounting_in(evaluation.engine).modes.frequencies
-        return -min(_room(limit, f)[0] for f in frequencies)
-    return -_room(limit, mount_value(limit.quantity, evaluation))[0]
+        values = [float(f) for f in mounting_in(evaluation.engine).modes.frequencies]
+    else:
+        values = [mount_value(limit.quantity, evaluation)]
+    return min(((value, _room(limit, value)) for value in values), key=lambda pair: pair[1][0])
+
+
+def _room(limit: MountLimit, value: float) -> tuple[float, float, str]:
+    """Relative distance inside the nearest side, negative outside; that side, and its sense."""
+    sides = []
+    if limit.minimum is not None:
+        sides.append((value - limit.minimum, limit.minimum, "at least"))
+    if limit.maximum is not None:
+        sides.append((limit.maximum - value, limit.maximum, "at most"))
+    if limit.outside is not None:
+        low, high = limit.outside
+        below, above = (low - value, low, "at most"), (value - high, high, "at least")
+        sides.append(max(below, above))
+    return min(((room / (abs(edge) or 1.0), edge, side) for room, edge, side in sides), default=(math.inf, 0.0, ""))
 
 
 def whole_objective(problem: Problem, evaluation: Evaluation) -> float:

@@ -13,7 +13,9 @@ from laufruhe.errors import Complaint, InputError
 
 RESULT = "result.json"
 REPORT = "report.md"
-PICTURES = ("polar.png", "bars.png", "spectrum.png")
+PICTURES = (
+    "polar.png", "bars.png", "spectrum.png", "transmissibility.png", "campbell.png", "modes.png", "run_up.png",
+)  # fmt: skip
 RESULT_FILES = (RESULT, REPORT, *PICTURES)
 
 

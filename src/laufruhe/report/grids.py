@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.report.grid import Grid
 from laufruhe.report.measures import (
     changed,
     hardest_point,
@@ -18,6 +18,7 @@ from laufruhe.report.measures import (
     padded,
     shaking_orders,
 )
+from laufruhe.report.mode_grids import mode_grids
 from laufruhe.report.wording import DASH, aligned, is_nothing, number, percent, readable, trimmed, with_unit
 from laufruhe.solve.result import DecisionValue, LimitValue, Result
 
@@ -27,20 +28,9 @@ ORDERS_SHOWN = 8
 ORDER_SHARE = 0.005
 
 
-@dataclass(frozen=True)
-class Grid:
-    """A table: the first `left` columns are text, the others numbers."""
-
-    title: str
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    left: int = 1
-    note: str = ""
-
-
 def grids_of(result: Result) -> list[Grid]:
     """Every table that this result fills."""
-    candidates = [_decisions(result), _limits(result), _mounts(result), _orders(result)]
+    candidates = [_decisions(result), _limits(result), _mounts(result), *mode_grids(result), _orders(result)]
     return [grid for grid in candidates if grid.rows]
 
 
@@ -54,7 +44,7 @@ def _decisions(result: Result) -> Grid:
 def _decision_row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str, ...]:
     name, factor = readable(d.unit)
     bounds = f"{trimmed(d.lower * factor)} to {trimmed(d.upper * factor)} {name}".rstrip()
-    is_angle = d.unit == "rad" and before is not None
+    is_angle = d.name.endswith(".angle") and before is not None
     if is_angle and before is not None and is_nothing(before):
         return d.name, _given_angle(before, d), DASH, bounds, DASH, DASH
     given = _given_angle(before, d) if is_angle and before is not None else with_unit(d.initial, d.unit)
@@ -86,7 +76,8 @@ def _limits(result: Result) -> Grid:
     note = (
         "Shadow price: by how much the objective falls for each unit by which the limit is relaxed." if priced else ""
     )
-    head = ("limit", "value", "at most", "state", "shadow price")
+    sides = {limit.side for limit in limits_of(result)}
+    head = ("limit", "value", sides.pop() if len(sides) == 1 else "bound", "state", "shadow price")
     return Grid("Limits" if changed(result) else "Limits, and the design as given", head, rows, note=note)
 
 
@@ -95,7 +86,8 @@ def _limit_row(limit: LimitValue, unit: str) -> tuple[str, ...]:
     state = "broken" if not is_met(limit) else "active" if limit.active else "slack"
     price = f"{number(limit.shadow_price / factor)} {per(unit, name)}" if limit.shadow_price else DASH
     value = f"{number(limit.value * factor, scale=limit.limit * factor)} {name}"
-    return limit.name, value, with_unit(limit.limit, limit.unit), state, price
+    side = "" if limit.side == "at most" else f"{limit.side} "
+    return limit.name, value, side + with_unit(limit.limit, limit.unit), state, price
 
 
 def _mounts(result: Result) -> Grid:

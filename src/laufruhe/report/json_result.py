@@ -20,6 +20,7 @@ from laufruhe.report.measures import (
     mount_samples,
     shaking_orders,
 )
+from laufruhe.report.mounting import is_elastic, modes_as_dict
 from laufruhe.report.versions import versions
 from laufruhe.solve.result import Result
 
@@ -50,6 +51,7 @@ def as_dict(result: Result) -> dict[str, Any]:
         "mounts": _all_points(result, [point["mounts"] for point in points]),
         "shaking": _largest([point["shaking"] for point in points]),
         "points": [{key: point[key] for key in own} for point in points],
+        **({"modes": modes_as_dict(result.final)} if is_elastic(result.final) else {}),
         "firing_intervals": list(engine.firing_intervals),
         "fidelity": {
             "kinematics": problem.fidelity.kinematics,
@@ -115,6 +117,7 @@ def _constraints(result: Result) -> list[dict[str, Any]]:
             "name": limit.name,
             "value": limit.value,
             "limit": limit.limit,
+            "side": limit.side,
             "unit": limit.unit,
             "active": limit.active,
             "met": is_met(limit),

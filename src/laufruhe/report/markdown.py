@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from laufruhe.report.grids import Grid, grids_of
+from laufruhe.report.grid import Grid
+from laufruhe.report.grids import grids_of
 from laufruhe.report.versions import versions
 from laufruhe.report.wording import explained, headline
 from laufruhe.solve.result import Result
@@ -14,6 +15,10 @@ _CAPTIONS = {
     "polar.png": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",
     "bars.png": "Mean and maximum of each mount's force over one cycle.",
     "spectrum.png": "What orders of crank speed the loads are made of.",
+    "transmissibility.png": "Force on the elastic mounts over that on the same mounts if they gave no way.",
+    "campbell.png": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
+    "modes.png": "Share of each motion in the kinetic energy of each natural mode.",
+    "run_up.png": "Largest force and travel on any mount while the engine runs up and is shut down.",
 }
 
 

@@ -11,6 +11,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures, order_amplitude
 from laufruhe.problem.evaluation import Evaluation, PointLoads, over
 from laufruhe.problem.model import Limit
+from laufruhe.solve.mount_result import mount_limits
 from laufruhe.solve.result import LimitValue, Result
 
 Array = NDArray[np.float64]
@@ -79,12 +80,14 @@ def limits_of(result: Result) -> tuple[LimitValue, ...]:
     """Limits as solved, or how an evaluated design stands to those of its problem."""
     if result.limits:
         return result.limits
-    return tuple(_stated(limit, result.final.value(limit.quantity)) for limit in result.problem.limits)
+    stated = tuple(_stated(limit, result.final.value(limit.quantity)) for limit in result.problem.limits)
+    return (*stated, *mount_limits(result.problem, result.final))
 
 
 def is_met(limit: LimitValue) -> bool:
     """Whether the design keeps a limit, up to the rounding of a solver."""
-    return limit.value <= limit.limit * (1.0 + 1e-6) + 1e-12
+    sign = 1.0 if limit.side == "at most" else -1.0
+    return sign * (limit.value - limit.limit) <= abs(limit.limit) * 1e-6 + 1e-12
 
 
 def changed(result: Result) -> bool:

@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from laufruhe.report.grids import Grid, grids_of
+from laufruhe.report.grid import Grid
+from laufruhe.report.grids import grids_of
 from laufruhe.report.wording import explained, headline
 from laufruhe.solve.result import Result, Status
 

@@ -7,7 +7,7 @@ import math
 from laufruhe.machine import Cycle
 from laufruhe.problem.model import Problem
 from laufruhe.report.measures import changed
-from laufruhe.solve.certificate import Certificate
+from laufruhe.solve.certificate import Certificate, Proof
 from laufruhe.solve.result import DecisionValue, Result, Status
 
 DASH = "-"
@@ -73,9 +73,10 @@ def one_line(problem: Problem) -> str:
         f"{len(engine.slider_cranks)} cylinder(s), {stroke}",
         f"{len(engine.mounts)} mount(s)",
         f"{len(problem.points)} operating point(s)",
-        f"{len(problem.limits)} constraint(s)",
+        f"{len(problem.limits) + len(problem.mount_design.limits)} constraint(s)",
     ]
     names = [decision.name + ("" if decision.fixed_angle else " and angle") for decision in problem.decisions]
+    names += [decision.name for decision in problem.mount_design.decisions]
     return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
 
 
@@ -122,6 +123,12 @@ def explained(result: Result) -> str:
         )
     if c is None or o is None:
         return "Nothing was decided, so there is nothing to prove."
+    if c.kind is Proof.LOCAL:
+        return (
+            f"The best of the local optima found ({c.method}), with {number(o.value, 6)} {o.unit}. "
+            f"The optimality conditions, taken anew, hold with a residual of {c.kkt_residual:.1e}; "
+            f"that nothing better exists is proven only down to {number(c.lower_bound, 6)} {o.unit}."
+        )
     return (
         f"No design within the bounds and limits has less than {number(c.lower_bound, 6)} {o.unit}; "
         f"this one has {number(o.value, 6)} {o.unit}, a gap of {gap_text(c)} (proof: {c.kind}). "

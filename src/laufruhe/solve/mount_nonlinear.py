@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
-from laufruhe.problem.mount_design import NOTHING_ASKED
+from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
 from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.solve.certificate import Certificate, Proof
 from laufruhe.solve.domain import Domain, domains_of
@@ -192,18 +192,35 @@ def _unbalances_of(problem: Problem, result: Result) -> list[complex]:
     return values
 
 
-def _bound(problem: Problem) -> float:
-    """What the convex part alone proves: the problem without the limits that are not convex."""
+def _convex_part(problem: Problem) -> Problem | None:
+    """The problem without all that is not convex in the stiffnesses; None where more than these is open."""
     design = problem.mount_design
-    stiffness = all(decision.is_stiffness for decision in design.decisions)
-    if problem.objective or not stiffness or not all(q.measure in CONVEX for q, _ in design.terms):
-        return 0.0
+    if not design.decisions or not all(decision.is_stiffness for decision in design.decisions):
+        return None
+    alone = replace(problem, objective=(), decisions=(), limits=())
+    terms = tuple(term for term in design.terms if term[0].measure in CONVEX) or (
+        (MountQuantity(MountMeasure.TOTAL_STIFFNESS), 1.0),
+    )
     limits = tuple(
-        limit for limit in design.limits
-        if is_convex(replace(problem, decisions=(), limits=(), mount_design=replace(design, limits=(limit,))))
-    )  # fmt: skip
-    relaxed = replace(problem, decisions=(), limits=(), mount_design=replace(design, limits=limits))
-    certificate = solve_convex_mounts(relaxed).certificate
+        limit
+        for limit in design.limits
+        if is_convex(replace(alone, mount_design=replace(design, terms=terms, limits=(limit,))))
+    )
+    return replace(alone, mount_design=replace(design, terms=terms, limits=limits))
+
+
+def _proven_conflict(problem: Problem) -> tuple[str, ...]:
+    """Limits that no stiffness within the bounds meets together, where the convex part proves it."""
+    convex = _convex_part(problem)
+    return () if convex is None else solve_convex_mounts(convex).conflict
+
+
+def _bound(problem: Problem) -> float:
+    """What the convex part alone proves of the objective; zero where it says nothing."""
+    convex = _convex_part(problem)
+    if convex is None or problem.objective or convex.mount_design.terms != problem.mount_design.terms:
+        return 0.0
+    certificate = solve_convex_mounts(convex).certificate
     return certificate.lower_bound if certificate is not None else 0.0
 
 
@@ -252,9 +269,10 @@ def _result(
 def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design, float] | None) -> str:
     usable = [o for o in optima if o.usable]
     apart = distinct(optima, scale)
-    text = f"IPOPT from {len(optima)} starts, {len(usable)} at {len(apart)} different optima"
-    if len(apart) > 1:
-        text += f" up to {apart[-1].value / apart[0].value if apart[0].value else float('inf'):.3g} times the best"
+    text = f"IPOPT from {len(optima)} starts, {len(usable)} of which ended at "
+    text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
+    if len(apart) > 1 and apart[0].value > 0.0:
+        text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
     if proven is not None:
         text += f"; balance on these mounts proven within {proven[1]:.0e}"
     return text
@@ -274,15 +292,18 @@ def _load_limits(problem: Problem, design: _Design, joint: JointProgram, best: L
 def _none(
     problem: Problem, joint: JointProgram, initial: Evaluation, optima: Sequence[LocalOptimum], timing: dict[str, float]
 ) -> Result:
-    """No start ended at a design within the limits: not a proof, and said so."""
-    result = infeasible_mounts(problem, initial, (), timing)
+    """No start ended at a design within the limits: not a proof, unless the convex limits alone contradict."""
+    conflict = _proven_conflict(problem)
+    result = infeasible_mounts(problem, initial, conflict, timing)
+    if conflict:
+        return result
     nearest = min(optima, key=lambda o: o.violation)
     names = _broken(joint, nearest)
     message = (
         f"no design found: from {len(optima)} starts none meets {names or 'the limits'} "
         f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
     )
-    return replace(result, status=Status.INFEASIBLE, message=message, conflict=())
+    return replace(result, status=Status.FAILED, message=message)
 
 
 def _broken(joint: JointProgram, optimum: LocalOptimum) -> str:

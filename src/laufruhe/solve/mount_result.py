@@ -56,13 +56,16 @@ def mount_decisions(
     return tuple(out)
 
 
-def mount_limits(problem: Problem, evaluation: Evaluation, prices: Sequence[float]) -> tuple[LimitValue, ...]:
+def mount_limits(
+    problem: Problem, evaluation: Evaluation, prices: Sequence[float] | None = None
+) -> tuple[LimitValue, ...]:
     """How a design stands to the limits on mounts and modes (E15)."""
     out = []
+    prices = [0.0] * len(problem.mount_design.limits) if prices is None else prices
     for limit, price in zip(problem.mount_design.limits, prices, strict=True):
-        value, edge = limit_value(limit, evaluation)
-        active = excess(limit, evaluation) >= -ACTIVE
-        out.append(LimitValue(limit.name, value, edge, limit.quantity.unit, active, price if active else 0.0))
+        value, edge, side = limit_value(limit, evaluation)
+        active = bool(excess(limit, evaluation) >= -ACTIVE)
+        out.append(LimitValue(limit.name, value, edge, limit.quantity.unit, active, price if active else 0.0, side))
     return tuple(out)
 
 
@@ -104,7 +107,7 @@ def infeasible_mounts(
         objective=None,
         certificate=None,
         decisions=(),
-        limits=mount_limits(problem, initial, [0.0] * len(problem.mount_design.limits)),
+        limits=mount_limits(problem, initial),
         initial=initial,
         final=initial,
         message=f"no design exists: {names} {verb}",

@@ -48,6 +48,8 @@ class LimitValue:
     ----------
     shadow_price
         Fall of the objective per unit by which the limit is relaxed.
+    side
+        "at most" or "at least".
     """
 
     name: str
@@ -56,6 +58,7 @@ class LimitValue:
     unit: str
     active: bool
     shadow_price: float
+    side: str = "at most"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,106 @@
+"""Mount forces and transmissibility over a range of speeds, in one pass (E11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.shaking_loads import EXACT, Fidelity, gas_loads, shaking_loads
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> tuple[Spectrum, Spectrum | None]:
+    """Wrench per square of crank speed, and that of the gas, which speed does not change.
+
+    Returns
+    -------
+    Inertia [N s2, N m s2] and gas [N, N m], both of shape (n, 6).
+    """
+    inertia = shaking_loads(engine, replace(point, speed=1.0, gas=None), fidelity)
+    return inertia, None if point.gas is None else gas_loads(engine, point.gas, fidelity)
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedMap:
+    """Field over speed and order.
+
+    Attributes
+    ----------
+    speeds
+        Crank speeds [rad/s], shape (s,).
+    orders
+        That the loads hold, shape (n,).
+    forces
+        Complex mount forces, shape (s, n, mounts, 3) [N].
+    firm
+        The same if the mounts gave no way.
+    """
+
+    speeds: Array
+    orders: Array
+    forces: ComplexArray
+    firm: ComplexArray
+
+    @property
+    def transmissibility(self) -> Array:
+        """Per speed and order, shape (s, n); zero where nothing excites (E11)."""
+        over, under = (np.sqrt(np.sum(np.abs(f) ** 2, axis=(2, 3))) for f in (self.forces, self.firm))
+        floor = 1e-12 * under.max(initial=0.0)
+        return np.asarray(np.where(under > floor, over / np.where(under > floor, under, 1.0), 0.0))
+
+    @property
+    def total(self) -> Array:
+        """All orders above zero together, shape (s,) (E11)."""
+        dynamic = self.orders > 0.0
+        over, under = (np.sqrt(np.sum(np.abs(f[:, dynamic]) ** 2, axis=(1, 2, 3))) for f in (self.forces, self.firm))
+        return np.asarray(np.where(under > 0.0, over / np.where(under > 0.0, under, 1.0), 0.0))
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square over cycle and mounts of what is not steady, shape (s,) [N]."""
+        dynamic = self.forces[:, self.orders > 0.0]
+        return np.asarray(np.sqrt(0.5 * np.sum(np.abs(dynamic) ** 2, axis=(1, 2, 3)) / dynamic.shape[2]))
+
+
+def speed_map(
+    mounting: ElasticMounting, inertia: Spectrum, gas: Spectrum | None, speeds: Array, least: float = 1e-9
+) -> SpeedMap:
+    """Mount forces at many speeds, all orders and speeds solved together.
+
+    Parameters
+    ----------
+    mounting
+        Block and mounts.
+    inertia, gas
+        As from `split_loads`.
+    speeds
+        Crank speeds [rad/s].
+    least
+        Orders under this share of the largest, at every speed, are left out.
+    """
+    spectra = [inertia] if gas is None else [inertia, gas]
+    base = common_base([spectrum.base for spectrum in spectra])
+    columns = [spectrum.rebased(base).coefficients for spectrum in spectra]
+    longest = max(len(c) for c in columns)
+    padded = [np.pad(c, ((0, longest - len(c)), (0, 0))) for c in columns]
+    loads = np.asarray(speeds)[:, None, None] ** 2 * padded[0]
+    for steady in padded[1:]:
+        loads = loads + steady
+    size = np.abs(loads).max(axis=(0, 2), initial=0.0)
+    kept = np.flatnonzero(size > least * size.max(initial=0.0))
+    orders: Array = np.asarray(kept, dtype=float) * float(base)
+    loads = loads[:, kept]
+    omegas = np.outer(speeds, orders).reshape(-1)
+    flat = loads.reshape(-1, 6)
+    forces = mounting.mount_forces(omegas, mounting.responses(omegas, flat))
+    shape = (len(speeds), len(orders), len(mounting.mounts), 3)
+    firm = np.einsum("mij,snj->snmi", rigid_mounting(mounting.mounts).maps, loads)
+    return SpeedMap(np.asarray(speeds, dtype=float), orders, forces.reshape(shape), firm)

@@ -1,0 +1,56 @@
+"""Tables of natural modes and of the mounts themselves."""
+
+from __future__ import annotations
+
+import math
+
+from laufruhe.physics.modes import MOTIONS
+from laufruhe.report.grid import Grid
+from laufruhe.report.measures import changed
+from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of, is_elastic
+from laufruhe.report.wording import DASH, number, trimmed
+from laufruhe.solve.result import Result
+
+
+def mode_grids(result: Result) -> list[Grid]:
+    """Modes before and after, and the mounts as they are now; none for rigid mounts."""
+    if not is_elastic(result.final):
+        return []
+    before = facts_of(result.initial)
+    if not changed(result):
+        return [_modes(before, "Natural modes"), _mounts(result, before)]
+    after = facts_of(result.final)
+    return [_modes(before, "Natural modes as given"), _modes(after, "Natural modes as decided"), _mounts(result, after)]
+
+
+def _modes(facts: MountingFacts, title: str) -> Grid:
+    order = facts.orders[0] if facts.orders else 0.0
+    rows = []
+    for j, (name, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies, strict=True)):
+        driven = j in facts.excited
+        critical = critical_speed(frequency, order) * 30.0 / math.pi if order and driven else 0.0
+        shares = [f"{100.0 * share:.1f}" for share in facts.modes.energy[:, j]]
+        rows.append(
+            (name, number(frequency), "yes" if driven else "no", number(critical) if critical else DASH, *shares)
+        )
+    still = sum(j not in facts.excited for j in range(6))
+    note = "Kinetic energy in %; " + (
+        f"{still} of 6 modes are not excited in this scene and not computed." if still else "every mode is excited."
+    )
+    head = ("mode", "Hz", "excited", f"order {order:g} at rpm" if order else "critical rpm", *MOTIONS)
+    return Grid(title, head, tuple(rows), note=note)
+
+
+def _mounts(result: Result, facts: MountingFacts) -> Grid:
+    rows = []
+    for mount, sag in zip(result.final.engine.mounts, facts.mount_sag, strict=True):
+        stiffness = " / ".join(trimmed(1e-3 * k) for k in mount.stiffness)
+        place = ", ".join(trimmed(1e3 * c) for c in mount.position)
+        rows.append((mount.name, place, stiffness, trimmed(mount.loss_factor), number(1e3 * sag)))
+    axis = ", ".join(f"{c:.3f}" for c in facts.torque_roll_axis)
+    note = (
+        f"The centre of gravity sags {number(1e3 * facts.sag)} mm; the mean torque moves a mount by at most "
+        f"{number(1e3 * facts.torque_travel)} mm. Torque-roll axis ({axis}), coupling {facts.torque_roll_coupling:.3f}."
+    )
+    head = ("mount", "place [mm]", "stiffness along own axes [N/mm]", "loss factor", "sag [mm]")
+    return Grid("Mounts", head, tuple(rows), left=3, note=note)

@@ -1,0 +1,126 @@
+"""What a report says of a block on its mounts: modes, what excites them, critical speeds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.modes import (
+    MOTIONS,
+    Modes,
+    static_motion,
+    torque_roll_axis,
+    torque_roll_coupling,
+    weight_wrench,
+)
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.mount_design import mounting_in, sag_of
+
+Array = NDArray[np.float64]
+
+MAIN_SHARE = 0.1
+MOST_ORDERS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class MountingFacts:
+    """Modes of one design and what its scene does to them.
+
+    Attributes
+    ----------
+    modes
+        Natural modes.
+    excited
+        Indices of those that any operating point drives (E12).
+    orders
+        Orders that make most of the load, the strongest first.
+    sag
+        Of the centre of gravity under its own weight [m].
+    mount_sag
+        At every mount, downwards [m].
+    torque_travel
+        Largest displacement of any mount under the mean torque [m].
+    torque_roll_axis
+        Unit vector (E8).
+    torque_roll_coupling
+        Zero where turning about that axis is a mode (E8).
+    """
+
+    modes: Modes
+    excited: tuple[int, ...]
+    orders: tuple[float, ...]
+    sag: float
+    mount_sag: Array
+    torque_travel: float
+    torque_roll_axis: Array
+    torque_roll_coupling: float
+
+    @property
+    def excited_names(self) -> tuple[str, ...]:
+        """Names of the modes that are driven."""
+        return tuple(self.modes.names[j] for j in self.excited)
+
+
+def is_elastic(evaluation: Evaluation) -> bool:
+    """Whether a design has a block on elastic mounts."""
+    return evaluation.engine.block is not None and bool(evaluation.engine.mounts)
+
+
+def facts_of(evaluation: Evaluation) -> MountingFacts:
+    """Of a design on elastic mounts."""
+    mounting = mounting_in(evaluation.engine)
+    excited = sorted({j for loads in evaluation.loads for j in mounting.excited(loads.wrench)})
+    weight = static_motion(mounting.modes, weight_wrench(mounting.block))
+    travels = [np.abs(np.linalg.norm(loads.mount_travel.coefficients[0], axis=-1)).max()
+               for loads in evaluation.loads if loads.mount_travel is not None]  # fmt: skip
+    return MountingFacts(
+        modes=mounting.modes,
+        excited=tuple(excited),
+        orders=main_orders(evaluation, mounting),
+        sag=sag_of(mounting),
+        mount_sag=np.asarray(-(mounting.motions @ weight)[:, 2]),
+        torque_travel=float(max(travels, default=0.0)),
+        torque_roll_axis=torque_roll_axis(mounting.block),
+        torque_roll_coupling=torque_roll_coupling(mounting.block, mounting.stiffness),
+    )
+
+
+def main_orders(evaluation: Evaluation, mounting: ElasticMounting) -> tuple[float, ...]:
+    """Orders above zero whose drive of the modes is at least a tenth of the strongest."""
+    found: dict[float, float] = {}
+    for loads in evaluation.loads:
+        drive = np.linalg.norm(mounting.drives(loads.wrench.coefficients), axis=1)
+        for order, size in zip(loads.wrench.orders[1:], drive[1:], strict=True):
+            found[float(order)] = max(found.get(float(order), 0.0), float(size))
+    top = max(found.values(), default=0.0)
+    strong = sorted((order for order, size in found.items() if size > MAIN_SHARE * top > 0.0), key=lambda o: -found[o])
+    return tuple(strong[:MOST_ORDERS])
+
+
+def critical_speed(frequency: float, order: float) -> float:
+    """Crank speed at which an order meets a natural frequency [rad/s]."""
+    return math.tau * frequency / order
+
+
+def modes_as_dict(evaluation: Evaluation) -> dict[str, object]:
+    """The `modes` entry of `result.json`."""
+    facts = facts_of(evaluation)
+    return {
+        "frequencies": facts.modes.frequencies.tolist(),
+        "names": list(facts.modes.names),
+        "loss_factors": facts.modes.loss.tolist(),
+        "excited": [bool(j in facts.excited) for j in range(6)],
+        "motions": list(MOTIONS),
+        "energy": facts.modes.energy.T.tolist(),
+        "shapes": facts.modes.shapes.T.tolist(),
+        "main_orders": list(facts.orders),
+        "static_sag": facts.sag,
+        "mount_sag": facts.mount_sag.tolist(),
+        "mean_torque_travel": facts.torque_travel,
+        "torque_roll_axis": facts.torque_roll_axis.tolist(),
+        "torque_roll_coupling": facts.torque_roll_coupling,
+    }
