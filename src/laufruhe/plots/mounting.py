@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -33,7 +34,8 @@ SPEEDS = 400
 REACH = 1.25
 LIMIT = "#D55E00"
 # styles tell orders apart in print as well
-_STYLES = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
+_STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
+_RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
 _RPM = 30.0 / math.pi
 RUN_SECONDS = 3.0
 
@@ -100,6 +102,13 @@ def transmissibility(result: Result) -> Figure:
     return drawn.figure
 
 
+def _order_lines(facts: MountingFacts, colour: str) -> list[Artist]:
+    return [
+        Line2D([], [], color=colour, linestyle=_STYLES[k], label=f"order {order:g}")
+        for k, order in enumerate(facts.orders)
+    ]
+
+
 def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:
     """Limits of the problem, over the speeds that they hold at."""
     found = False
@@ -121,9 +130,8 @@ def _points(axes: Axes, result: Result, height: float) -> None:
     for k, point in enumerate(points):
         axes.axvline(point.speed * _RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)
         if len(points) <= 5 or k in (0, len(points) - 1):
-            axes.text(
-                point.speed * _RPM, height, f" {point.name}", size=7.5, color=FAINT, va="bottom", rotation=90, ha="right"
-            )  # fmt: skip
+            words = {"size": 7.5, "color": FAINT, "va": "bottom", "ha": "right", "rotation": 90}
+            axes.text(point.speed * _RPM, height, f" {point.name}", **words)
 
 
 def campbell(result: Result) -> Figure:
@@ -133,7 +141,7 @@ def campbell(result: Result) -> Figure:
     drawn = page(1, 1, (6.2, 4.2))
     axes = drawn.panels[0]
     frequencies = facts.modes.frequencies
-    reach = 1.35 * float(frequencies.max(initial=0.0)) or 1.0
+    reach = 1.1 * max(float(frequencies.max(initial=0.0)), *_edges(result), 1e-9)
     bands = _bands(axes, result)
     for k, order in enumerate(facts.orders):
         axes.plot([0.0, top * _RPM], [0.0, order * top / math.tau], color=AFTER, linestyle=_STYLES[k], linewidth=1.4)
@@ -150,9 +158,7 @@ def campbell(result: Result) -> Figure:
         axes.text(1.01, height / reach, text, size=7.5, color=INK, va="center", transform=axes.transAxes)
     _points(axes, result, 0.02 * reach)
     axes.set(xlim=(0.0, top * _RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
-    legend: list[Artist] = [
-        Line2D([], [], color=AFTER, linestyle=_STYLES[k], label=f"order {o:g}") for k, o in enumerate(facts.orders)
-    ]
+    legend = _order_lines(facts, AFTER)
     legend.append(Line2D([], [], color=AFTER, marker="o", linestyle="none", markersize=4.5, label="critical speed"))
     figure = drawn.figure
     wide, high = figure.get_size_inches()
@@ -175,6 +181,12 @@ def _apart(heights: list[float], least: float) -> list[float]:
     return out
 
 
+def _edges(result: Result) -> list[float]:
+    """Every frequency that a limit names."""
+    limits = [m for m in result.problem.mount_design.limits if m.quantity.measure is MountMeasure.FREQUENCIES]
+    return [0.0, *(e for m in limits for e in (m.minimum, m.maximum, *(m.outside or ())) if e is not None)]
+
+
 def _bands(axes: Axes, result: Result) -> list[Artist]:
     """Bands that are to hold no natural frequency, and ends that none may pass."""
     drawn = False
@@ -186,7 +198,7 @@ def _bands(axes: Axes, result: Result) -> list[Artist]:
             drawn = True
         for edge in (limit.minimum, limit.maximum):
             if edge is not None:
-                axes.axhline(edge, color=LIMIT, linewidth=1.2, linestyle=(0, (4, 2)))
+                axes.axhline(edge, color=LIMIT, linewidth=2.4, alpha=0.5, zorder=4)
                 drawn = True
     return [Line2D([], [], color=LIMIT, linewidth=2.0, label="limit")] if drawn else []
 
@@ -235,7 +247,7 @@ def run_up(result: Result) -> Figure:
     most = [0.0, 0.0]
     for design, colour in zip(_designs(result), colours_of(result), strict=True):
         inertia, gas = split_loads(design.engine, point, design.fidelity)
-        for style, (first, end) in zip(("-", (0, (4, 1.5))), ((0.0, last), (last, 0.0)), strict=True):
+        for (style, _), (first, end) in zip(_RUNS, ((0.0, last), (last, 0.0)), strict=True):
             run = _run(design, inertia, gas, first, end)
             for k, (axes, values, factor) in enumerate(
                 zip(drawn.panels, (run.force, run.travel), (1.0, 1e3), strict=True)
@@ -250,9 +262,7 @@ def run_up(result: Result) -> Figure:
         Line2D([], [], color=colour, linewidth=2.0, label=name)
         for colour, name in zip(colours_of(result), names_of(result), strict=True)
     ]
-    legend += [
-        Line2D([], [], color=INK, linestyle=s, label=n) for s, n in (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
-    ]
+    legend += [Line2D([], [], color=INK, linestyle=style, label=name) for style, name in _RUNS]
     lines = f"On any mount, in {RUN_SECONDS:g} s at constant acceleration; loads of {point.name}."
     heading(drawn.figure, "Through resonance", lines, legend, source_line(result))
     return drawn.figure
@@ -261,9 +271,7 @@ def run_up(result: Result) -> Figure:
 def _run(design: Evaluation, inertia: Spectrum, gas: Spectrum | None, first: float, last: float) -> RunUp:
     # gas torque orders beyond these shake the block by less than a line's width
     kept = None if gas is None else gas.kept(12.0)
-    return run_through(
-        mounting_in(design.engine), inertia.kept(12.0), kept, first, last, RUN_SECONDS, 120, "RK45", 1e-4
-    )
+    return run_through(mounting_in(design.engine), inertia.kept(12.0), kept, first, last, RUN_SECONDS, 60, "RK45", 1e-4)
 
 
 FIGURES: Mapping[str, Callable[[Result], Figure]] = {
