@@ -130,7 +130,7 @@ def _points(axes: Axes, result: Result, height: float) -> None:
     for k, point in enumerate(points):
         axes.axvline(point.speed * _RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)
         if len(points) <= 5 or k in (0, len(points) - 1):
-            words = {"size": 7.5, "color": FAINT, "va": "bottom", "ha": "right", "rotation": 90}
+            words: Any = {"size": 7.5, "color": FAINT, "va": "bottom", "ha": "right", "rotation": 90}
             axes.text(point.speed * _RPM, height, f" {point.name}", **words)
 
 

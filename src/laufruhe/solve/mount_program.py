@@ -39,7 +39,7 @@ from laufruhe.problem.mount_design import (
 from laufruhe.problem.mount_values import whole_objective
 from laufruhe.problem.quantity import ON_MOUNTS, Quantity, Subject
 from laufruhe.solve.affine import AffineModel
-from laufruhe.solve.mount_symbols import SymbolicResponse, response, symbolic_mounts, waves
+from laufruhe.solve.mount_symbols import SymbolicResponse, elimination, response, symbolic_mounts, waves
 from laufruhe.solve.nonlinear import NonlinearProgram, softened_lengths
 
 Array = NDArray[np.float64]
@@ -98,8 +98,8 @@ class JointProgram:
         self._mounting = mounting_in(problem.engine)
         design = problem.mount_design
         self._count = len(design.decisions)
-        self._columns = sum(domain.width for domain in self.model.domains)
-        self._d, self._u = ca.MX.sym("mounts", self._count), ca.MX.sym("unbalances", self._columns)
+        self.columns = sum(domain.width for domain in self.model.domains)
+        self._d, self._u = ca.MX.sym("mounts", self._count), ca.MX.sym("unbalances", self.columns)
         self._e = ca.MX.sym("softness")
         self._along, self._root = torque_roll_rows(self._mounting)
         self._mounts = symbolic_mounts(design, self._mounting.block, self._d)
@@ -143,6 +143,7 @@ class JointProgram:
             objective_scale=self._unit,
             parameters=self._e,
             stages=tuple((share,) for share in SOFTNESS),
+            expand=True,
         )
 
     def _bounds(self) -> tuple[Array, Array]:
@@ -177,7 +178,9 @@ class JointProgram:
             loads = np.array([np.pad(c, ((0, longest - len(c)), (0, 0))) for c in spectra]) @ moved.T
             size = np.abs(loads[0]).max(axis=1, initial=0.0)
             size += (np.abs(loads[1:]).max(axis=2, initial=0.0) * scales[:, None]).sum(axis=0)
-            kept = np.flatnonzero(size > KEPT_SHARE * size.max(initial=0.0))
+            # above resonance an order counts by its load over the square of its frequency
+            felt = size / np.maximum(np.arange(longest), 1.0) ** 2
+            kept = np.flatnonzero((size > KEPT_SHARE * size.max(initial=0.0)) & (felt > KEPT_SHARE * felt.max()))
             orders: Array = np.asarray(kept, dtype=float) * float(base)
             real, imaginary = (self._load_columns(part[:, kept]) for part in (loads.real, loads.imag))
             answer = response(self._mounts, orders * point.speed, real, imaginary)
@@ -190,7 +193,7 @@ class JointProgram:
         """Loads (1 + columns, n, 6) as an expression of the unbalances, shape (6, n)."""
         count = loads.shape[1]
         total = ca.MX(ca.DM(loads[0].T.copy()))
-        if self._columns:
+        if self.columns:
             flat = loads[1:].transpose(1, 2, 0).reshape(6 * count, -1)
             total += ca.reshape(ca.DM(flat) @ self._u, 6, count)
         return total
@@ -227,7 +230,7 @@ class JointProgram:
         affine = self.model.norm(quantity, self.model.full_samples)
         k, d = affine.constant.shape
         rows = ca.MX(ca.DM(affine.constant))
-        if self._columns:
+        if self.columns:
             rows += ca.reshape(ca.DM(affine.slope.transpose(1, 0, 2).reshape(k * d, -1)) @ self._u, k, d)
         return rows, affine.weights, affine.norm
 
@@ -278,10 +281,10 @@ class JointProgram:
         """A quantity of mounts and modes, where it is one expression."""
         mounts = self._mounts
         if quantity.measure is MountMeasure.SAG:
-            weight = self._root @ weight_wrench(self._mounting.block)
-            return ca.dot(ca.DM(weight), ca.solve(mounts.stiffness, ca.DM(weight))) / (
-                -weight_wrench(self._mounting.block)[2]
-            )
+            weight = weight_wrench(self._mounting.block)
+            load = ca.DM(self._root @ weight)
+            settled, _ = elimination()(mounts.stiffness, ca.MX(6, 6), load, ca.DM.zeros(6))
+            return ca.dot(load, settled) / -weight[2]
         if quantity.measure is MountMeasure.TORQUE_ROLL:
             square = (math.tau * quantity.frequency) ** 2
             rows = mounts.stiffness @ ca.DM(self._along) / square - ca.DM(self._along)
@@ -369,7 +372,7 @@ class JointProgram:
         """Decisions about mounts and about unbalances."""
         design = self.problem.mount_design
         mounts = [float(np.clip(v, d.lower, d.upper)) for v, d in zip(x[: self._count], design.decisions, strict=True)]
-        columns = x[self._count : self._count + self._columns].copy()
+        columns = x[self._count : self._count + self.columns].copy()
         for domain in self.model.domains:
             columns[domain.columns] = domain.project(columns)
         return mounts, [domain.complex_value(columns) for domain in self.model.domains]
