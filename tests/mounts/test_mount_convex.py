@@ -1,0 +1,151 @@
+"""Stiffness decided with proof: closed forms, other solvers, and certificates that can fail."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear, minimize
+
+from laufruhe.physics.modes import sag_for_critical_speed
+from laufruhe.problem.mount_design import MountMeasure, mounting_in
+from laufruhe.problem.reader import load
+from laufruhe.solve.certificate import Proof
+from laufruhe.solve.mount_convex import ConvexDuals, convex_program, dual_bound, is_convex, solve_convex_mounts
+from laufruhe.solve.mounts import solve_mounts
+from laufruhe.solve.result import Status
+from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+RPM = np.pi / 30.0
+
+
+@pytest.mark.parametrize(("name", "order", "printed"), [("", 2, 1.4e-3), ("-first-order", 1, 5.6e-3)])
+def test_the_studys_sag_comes_out_and_is_proven(name, order, printed):
+    result = solve_mounts(load(PROBLEMS / f"study-soft-mounts{name}.toml"))
+    assert result.status is Status.OPTIMAL
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value == pytest.approx(sag_for_critical_speed(400.0 * RPM, order), rel=2e-5)
+    assert result.objective.value == pytest.approx(printed, abs=0.05e-3)
+    (limit,) = result.limits
+    assert limit.active
+    assert limit.side == "at most"
+
+
+def test_shadow_price_of_a_frequency_is_the_slope_of_the_sag(tmp_path):
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
+    price = solve_mounts(problem).limits[0].shadow_price
+    design, step = problem.mount_design, 0.02
+    moved = replace(design, limits=(replace(design.limits[0], maximum=design.limits[0].maximum + step),))
+    further = solve_mounts(replace(problem, mount_design=moved)).objective.value
+    assert (solve_mounts(problem).objective.value - further) / step == pytest.approx(price, rel=2e-2)
+
+
+def least_squares(tmp_path):
+    """Torque-roll residual in box bounds alone: a bounded least-squares problem."""
+    text = MOUNTS.replace('"120 N/mm", "120 N/mm"', '{ between = ["30 N/mm", "300 N/mm"] }, "120 N/mm"', 1)
+    block = BLOCK + 'inertia_products = ["2 kg m^2", "-3 kg m^2", "1 kg m^2"]\n'
+    asked = '[objective]\nminimise = "torque-roll residual"\nfrequency = "9 Hz"\n'
+    return problem_of(tmp_path, ENGINE, block, text, asked)
+
+
+def test_bounded_least_squares_agrees_with_scipy(tmp_path):
+    problem = least_squares(tmp_path)
+    result, program = solve_mounts(problem), convex_program(problem)
+    (_, residual), = program.terms  # fmt: skip
+    zero, unit = np.zeros(len(program.lower)), 1e5
+    rows = np.column_stack([residual.rows(unit * e) - residual.rows(zero) for e in np.eye(len(zero))])
+    other = lsq_linear(rows, -residual.rows(zero), (program.lower / unit, program.upper / unit), tol=1e-14)
+    assert result.objective.value == pytest.approx(np.sqrt(2.0 * other.cost), rel=1e-8)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value > 1e-3
+
+
+def test_least_stiff_design_agrees_with_a_search(tmp_path):
+    asked = """
+    [objective]
+    minimise = "total stiffness"
+    [[constraints]]
+    limit = "static sag"
+    max = "3 mm"
+    [[constraints]]
+    limit = "natural frequencies"
+    min = "4.2 Hz"
+    """
+    problem = problem_of(tmp_path, ENGINE, BLOCK.replace('["0 mm", "0 mm"', '["60 mm", "0 mm"'), MOUNTS, asked)
+    result = solve_mounts(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+
+    def design(x):
+        return mounting_in(problem.design((), [float(v) * 1e5 for v in x]))
+
+    from laufruhe.problem.mount_design import sag_of, total_stiffness
+
+    found = minimize(
+        lambda x: total_stiffness(design(x).mounts) / 1e6, [5.0, 5.0], method="SLSQP", bounds=[(0.2, 40.0)] * 2,
+        constraints=[{"type": "ineq", "fun": lambda x: (3e-3 - sag_of(design(x))) * 1e3},
+                     {"type": "ineq", "fun": lambda x: design(x).modes.frequencies[0] - 4.2}],
+        options={"ftol": 1e-13},
+    )  # fmt: skip
+    assert found.success
+    assert result.objective.value == pytest.approx(found.fun * 1e6, rel=1e-6)
+
+
+def test_any_duals_give_a_bound_and_wrong_ones_a_worse_one(tmp_path):
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
+    program, best = convex_program(problem), solve_mounts(problem).objective.value
+    generator = np.random.default_rng(0)
+    for _ in range(50):
+        x = generator.uniform(program.lower, program.upper)
+        root = generator.normal(size=(6, 6))
+        price = 10.0 ** generator.uniform(-12, -4)
+        bound, _ = dual_bound(program, x, ConvexDuals((None,), (price,), (root @ root.T,)))
+        assert bound <= best * (1 + 1e-9)
+
+
+def test_every_minorant_lies_under_its_function(tmp_path):
+    problem = least_squares(tmp_path)
+    program = convex_program(problem)
+    sag = convex_program(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG))
+    generator = np.random.default_rng(1)
+    functions = [(program, program.terms[0][1]), (sag, sag.terms[0][1]), (sag, sag.limits[0].function)]
+    for owner, function in functions:
+        for _ in range(20):
+            at, other = generator.uniform(owner.lower, owner.upper, (2, len(owner.lower)))
+            constant, gradient = function.minorant(at, None)
+            assert constant + gradient @ at == pytest.approx(function.value(at), rel=1e-9)
+            assert constant + gradient @ other <= function.value(other) * (1 + 1e-9) + 1e-12
+
+
+def test_limits_that_cannot_be_met_together_are_named(tmp_path):
+    extra = '[[constraints]]\nlimit = "static sag"\nmax = "1 mm"\n'
+    extra += '[[constraints]]\nlimit = "total stiffness"\nmin = "1 N/m"\n'
+    result = solve_mounts(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG, extra))
+    assert result.status is Status.INFEASIBLE
+    assert set(result.conflict) == {"natural frequencies", "static sag"}
+    assert result.message == "no design exists: 'natural frequencies' and 'static sag' contradict each other"
+
+
+def test_what_is_not_convex_is_not_called_so(tmp_path):
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
+    assert is_convex(problem)
+    band = changed(SAG, ('max = "40/3 Hz"', 'outside = ["12 Hz", "20 Hz"]'))
+    assert not is_convex(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, band))
+    moved = MOUNTS.replace('"300 mm", "200 mm"', '{ between = ["250 mm", "300 mm"] }, "200 mm"')
+    assert not is_convex(problem_of(tmp_path, ENGINE, BLOCK, moved, SAG))
+    assert problem.mount_design.terms[0][0].measure is MountMeasure.SAG
+
+
+def test_a_solver_that_lies_is_found_out(tmp_path, monkeypatch):
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
+    from laufruhe.solve import mount_cones
+
+    honest = mount_cones.solve_cones
+    monkeypatch.setattr(mount_cones, "solve_cones", lambda program: (0.9 * honest(program)[0], honest(program)[1]))
+    result = solve_convex_mounts(problem)
+    assert result.certificate.kind is not Proof.GLOBAL
+    assert result.status is Status.FEASIBLE
+    monkeypatch.setattr(mount_cones, "solve_cones", lambda program: (1.1 * honest(program)[0], honest(program)[1]))
+    assert solve_convex_mounts(problem).status is Status.FAILED
