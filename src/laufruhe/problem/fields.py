@@ -88,14 +88,14 @@ class Quantity:
 
     def _number(self, given: Any) -> float:
         if isinstance(given, bool) or not isinstance(given, int | float | str):
-            raise _complaint(f"is no {'number' if not self.unit else 'number with a unit'}; {units._advice(self.unit)}")
+            raise _complaint(f"is no {'number' if not self.unit else 'number with a unit'}; {units.advice(self.unit)}")
         if isinstance(given, str):
             try:
                 return units.parse(given, self.unit)
             except units.UnitError as error:
                 raise _complaint(str(error)) from None
         if self.unit and self.plain is None:
-            raise _complaint(f"has no unit, {units.dimension_name(self.unit)} needs one; {units._advice(self.unit)}")
+            raise _complaint(f"has no unit, {units.dimension_name(self.unit)} needs one; {units.advice(self.unit)}")
         try:
             value = float(given) * (self.plain if self.plain is not None else 1.0)
         except OverflowError:
@@ -106,9 +106,9 @@ class Quantity:
 
     def _bounded(self, value: float) -> float:
         if abs(value) > LARGEST:
-            raise _complaint(f"is beyond any engine; {units._advice(self.unit)}")
+            raise _complaint(f"is beyond any engine; {units.advice(self.unit)}")
         if value <= self.above:
-            raise _complaint(f"must be more than {units.shown(self.above, self.unit)}; {units._advice(self.unit)}")
+            raise _complaint(f"must be more than {units.shown(self.above, self.unit)}; {units.advice(self.unit)}")
         if value < self.least:
             raise _complaint(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
         if value > self.most:
