@@ -165,6 +165,9 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
         raise Refused("engine.slider_cranks", None, "is missing", "list at least one [[engine.slider_cranks]]")
     shafts = {"crankshaft": CRANKSHAFT}
     for k, shaft in enumerate(table.shafts):
+        if shaft.name in shafts:
+            rule = "is the name of another shaft"
+            raise Refused(f"engine.shafts[{k + 1}].name", shaft.name, rule, "give each its own name")
         with blamed_on(f"engine.shafts[{k + 1}]"):
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
     return tuple(_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks))

@@ -81,7 +81,8 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
                 raise Refused(f"{where}.{key}", None, 'goes with kind = "elastic"', "leave it out, or set the kind")
         stiffness = place.relative_stiffness or table.relative_stiffness
         if not any(stiffness):
-            raise Refused(f"{where}.relative_stiffness", stiffness, "carries nothing", "give one a value")
+            own = f"places[{k + 1}]." if place.relative_stiffness else ""
+            raise Refused(f"mounts.{own}relative_stiffness", stiffness, "carries nothing", "give one a value")
         mounts.append(Mount(name, (0.0, 0.0, 0.0), (stiffness[0], stiffness[1], stiffness[2])))
         numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0]
         for key in ("position", "turned"):
