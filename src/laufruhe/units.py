@@ -38,7 +38,7 @@ def _factor(unit: str, wanted: str) -> float:
     registry = _registry()
     if wanted == "Hz" and "Hz" not in unit:
         # radians have no dimension, so rpm would be taken for a frequency 2 pi too high
-        raise UnitError(f"'{unit}' is no frequency in Hz; {_advice(wanted)}")
+        raise UnitError(f"'{unit}' is no frequency in Hz; {advice(wanted)}")
     try:
         parsed = registry.parse_units(unit)
         one = registry.Quantity(1.0, parsed)

@@ -367,8 +367,11 @@ def _run_apart(task: _Task, points: Sequence[tuple[int, Array]], count: int) -> 
             )  # fmt: skip
             children.append(child)
             assert child.stdin is not None
-            pickle.dump((task, points[k::count]), child.stdin)
-            child.stdin.close()
+            try:
+                pickle.dump((task, points[k::count]), child.stdin)
+                child.stdin.close()
+            except BrokenPipeError:
+                raise SolverError("a process of the nonlinear solver could not start; try one worker") from None
         found: list[LocalOptimum] = []
         for child in children:
             assert child.stdout is not None
