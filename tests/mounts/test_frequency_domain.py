@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from laufruhe.errors import ModelError, UncarriedLoadError
-from laufruhe.machine import Block, Mount
+from laufruhe.machine import Block, Mount, Seiliger
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError, elastic_mounting, single_transmissibility
 from laufruhe.physics.modes import (
@@ -24,6 +24,11 @@ from laufruhe.physics.modes import (
     weight_wrench,
 )
 from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.physics.speed_map import speed_map, split_loads
+from laufruhe.problem.mount_design import mounting_in
+from mounts.files import BLOCK as BLOCK_TABLE
+from mounts.files import ENGINE, MOUNTS, SAG, problem_of
 from mounts.powertrain import BLOCK, powertrain, random_mounting, wrench
 
 FREQUENCIES = (7.50256052, 8.63234374, 10.05518987, 11.68909221, 20.44918424, 26.45129889)
@@ -326,3 +331,28 @@ def test_blocks_and_mounts_that_cannot_be_are_refused():
         Mount("bad", (0.0, 0.0, 0.0), loss_factor=-0.1)
     with pytest.raises(ModelError, match="no mount has a stiffness"):
         elastic_mounting(CUBE, [Mount("none", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))])
+
+
+# many speeds at once
+
+
+def test_a_map_of_speeds_is_the_single_calls_side_by_side(tmp_path):
+    problem = problem_of(tmp_path, ENGINE, BLOCK_TABLE, MOUNTS, SAG)
+    engine, point = problem.engine, problem.points[0]
+    gas = Seiliger(80e5, 5.5e5)
+    engine = replace(engine, slider_cranks=tuple(replace(c, bore=0.1) for c in engine.slider_cranks))
+    loaded = replace(point, gas=gas)
+    mounting = mounting_in(engine)
+    speeds = np.array([40.0, 111.0, 260.0])
+    field = speed_map(mounting, *split_loads(engine, loaded), speeds)
+    for k, speed in enumerate(speeds):
+        load = shaking_loads(engine, replace(loaded, speed=speed))
+        forces, firm = mounting.forces(load, speed), rigid_mounting(engine.mounts).forces(load)
+        size = np.abs(forces.coefficients).max()
+        for j, order in enumerate(field.orders):
+            assert np.abs(field.forces[k, j] - forces.at(order)).max() <= 1e-10 * size
+            assert np.abs(field.firm[k, j] - firm.at(order)).max() <= 1e-10 * np.abs(firm.coefficients).max()
+        left = [j for j, order in enumerate(forces.orders) if not np.any(np.isclose(field.orders, order))]
+        assert np.abs(forces.coefficients[left]).max(initial=0.0) <= 1e-6 * size
+        whole = np.linalg.norm(forces.coefficients[1:]) / np.linalg.norm(firm.coefficients[1:])
+        assert field.total[k] == pytest.approx(whole, rel=1e-6)

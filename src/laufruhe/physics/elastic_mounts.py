@@ -153,7 +153,10 @@ class ElasticMounting:
         UncarriedLoadError
             If a steady load drives a free mode.
         """
-        drive = self.drives(wrenches)
+        return self.driven(omegas, self.drives(wrenches))
+
+    def driven(self, omegas: Array, drive: ComplexArray) -> ComplexArray:
+        """As `responses`, of drives of the modes that are known already, shape (n, 6) (E4)."""
         kept = list(self._reached(drive))
         out = np.zeros(drive.shape, dtype=complex)
         if not kept:
@@ -207,13 +210,15 @@ class ElasticMounting:
 
     def mount_forces(self, omegas: Array, amplitudes: ComplexArray) -> ComplexArray:
         """Mount forces of modal amplitudes (n, 6), shape (n, mounts, 3) (E5)."""
-        elastic, lossy, viscous = self._force_maps
-        out = np.einsum("mij,nj->nmi", elastic, amplitudes)
-        if np.any(lossy):
-            out += 1j * np.einsum("mij,nj->nmi", lossy, amplitudes * (omegas > 0.0)[:, None])
+        elastic, lossy, viscous = (matrix.reshape(-1, 6).T for matrix in self._force_maps)
+        out = amplitudes @ (elastic + 1j * lossy)
+        still = omegas == 0.0
+        if np.any(still):
+            # hysteretic loss needs motion
+            out[still] = amplitudes[still] @ elastic
         if np.any(viscous):
-            out += 1j * np.einsum("mij,nj->nmi", viscous, amplitudes * omegas[:, None])
-        return np.asarray(out)
+            out += (1j * omegas)[:, None] * (amplitudes @ viscous)
+        return np.asarray(out.reshape(len(omegas), -1, 3))
 
     def _modal_motion(self, wrench: Spectrum, speed: float) -> ComplexArray:
         loaded = np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1))

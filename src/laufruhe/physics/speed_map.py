@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,14 +42,21 @@ class SpeedMap:
         That the loads hold, shape (n,).
     forces
         Complex mount forces, shape (s, n, mounts, 3) [N].
-    firm
-        The same if the mounts gave no way.
+    growth, parts
+        Of inertia and gas over speed, shape (s,) each, and the mount forces of both if
+        the mounts gave no way, shape (n, mounts, 3) each.
     """
 
     speeds: Array
     orders: Array
     forces: ComplexArray
-    firm: ComplexArray
+    growth: tuple[Array, ...]
+    parts: tuple[ComplexArray, ...]
+
+    @cached_property
+    def firm(self) -> ComplexArray:
+        """Mount forces if the mounts gave no way, shape (s, n, mounts, 3) [N]."""
+        return _over_speeds(self.growth, self.parts)
 
     @property
     def transmissibility(self) -> Array:
@@ -71,7 +80,7 @@ class SpeedMap:
 
 
 def speed_map(
-    mounting: ElasticMounting, inertia: Spectrum, gas: Spectrum | None, speeds: Array, least: float = 1e-9
+    mounting: ElasticMounting, inertia: Spectrum, gas: Spectrum | None, speeds: Array, least: float = 1e-7
 ) -> SpeedMap:
     """Mount forces at many speeds, all orders and speeds solved together.
 
@@ -91,16 +100,24 @@ def speed_map(
     columns = [spectrum.rebased(base).coefficients for spectrum in spectra]
     longest = max(len(c) for c in columns)
     padded = [np.pad(c, ((0, longest - len(c)), (0, 0))) for c in columns]
-    loads = np.asarray(speeds)[:, None, None] ** 2 * padded[0]
-    for steady in padded[1:]:
-        loads = loads + steady
-    size = np.abs(loads).max(axis=(0, 2), initial=0.0)
-    kept = np.flatnonzero(size > least * size.max(initial=0.0))
+    # inertia grows with the square of speed, gas does not
+    growth = [np.asarray(speeds, dtype=float) ** 2, np.ones(len(speeds))][: len(spectra)]
+    size = sum(np.abs(c).max(axis=1) * g.max(initial=0.0) for c, g in zip(padded, growth, strict=True))
+    kept = np.flatnonzero(size > least * np.max(size, initial=0.0))
     orders: Array = np.asarray(kept, dtype=float) * float(base)
-    loads = loads[:, kept]
+    parts = [c[kept] for c in padded]
     omegas = np.outer(speeds, orders).reshape(-1)
-    flat = loads.reshape(-1, 6)
-    forces = mounting.mount_forces(omegas, mounting.responses(omegas, flat))
+    drive = _over_speeds(growth, [mounting.drives(c) for c in parts]).reshape(-1, 6)
+    forces = mounting.mount_forces(omegas, mounting.driven(omegas, drive))
     shape = (len(speeds), len(orders), len(mounting.mounts), 3)
-    firm = np.einsum("mij,snj->snmi", rigid_mounting(mounting.mounts).maps, loads)
-    return SpeedMap(np.asarray(speeds, dtype=float), orders, forces.reshape(shape), firm)
+    maps = rigid_mounting(mounting.mounts).maps
+    firm = [np.einsum("mij,nj->nmi", maps, c) for c in parts]
+    return SpeedMap(np.asarray(speeds, dtype=float), orders, forces.reshape(shape), tuple(growth), tuple(firm))
+
+
+def _over_speeds(growth: Sequence[Array], parts: Sequence[ComplexArray]) -> ComplexArray:
+    """Sum of parts, each with its growth over speed, shape (speeds, ...)."""
+    total = np.multiply.outer(growth[0], parts[0])
+    for grown, part in zip(growth[1:], parts[1:], strict=True):
+        total += np.multiply.outer(grown, part)
+    return np.asarray(total)
