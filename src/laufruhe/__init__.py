@@ -1,1 +1,62 @@
-"""Laufruhe."""
+"""Laufruhe: the balance of piston engines, designed by optimisation and proven.
+
+>>> import laufruhe
+>>> problem = laufruhe.load("problems/tractor-four-lanchester.toml")
+>>> laufruhe.solve(problem)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from laufruhe.machine import Engine, OperatingPoint
+    from laufruhe.problem.model import Problem
+    from laufruhe.solve.result import Result
+
+__version__ = "0.1.0"
+__all__ = ["__version__", "evaluate", "load", "solve"]
+
+
+def load(path: str | Path) -> Problem:
+    """Read and check a problem file.
+
+    Raises
+    ------
+    laufruhe.errors.InputError
+        With one line for everything wrong: file, key, value, rule, remedy.
+    """
+    from laufruhe.problem.reader import load as read
+
+    return read(path)
+
+
+def solve(problem: Problem) -> Result:
+    """Decide what a problem leaves open; the result says what of it is proven."""
+    from laufruhe.solve import solve as decide
+
+    return decide(problem)
+
+
+def evaluate(design: Problem | Engine, points: Sequence[OperatingPoint] = ()) -> Result:
+    """Evaluate a design as given.
+
+    Parameters
+    ----------
+    design
+        A problem, or an engine with the operating points beside it.
+    points
+        Of an engine that stands in no problem.
+    """
+    from laufruhe.numerics.mixed_norms import Norm
+    from laufruhe.problem.model import Problem, Term
+    from laufruhe.problem.quantity import Quantity, Subject
+    from laufruhe.solve import state
+
+    if isinstance(design, Problem):
+        return state(design)
+    subject = Subject.MOUNT_FORCE if design.mounts else Subject.SHAKING_FORCE
+    wanted = (Term(Quantity(subject, Norm.SUM)),)
+    return state(Problem(design.name, design.name, design, tuple(points), objective=wanted))

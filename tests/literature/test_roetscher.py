@@ -112,13 +112,15 @@ def test_misprints_are_errors_of_the_print() -> None:
 
 
 def test_table_112_needs_the_rod() -> None:
-    """Without the finite rod (eqs. 289 and 295) 10 deg and 60 deg of every row would be missed by far more than a digit."""
+    """Without the finite rod (eqs. 289 and 295) 10 and 60 deg of every row would be missed by far more than a digit."""
     for ratio in RATIOS:
         assert abs(math.cos(math.radians(10)) - ACCELERATION[ratio][1]) > 100 * HALF_DIGIT
         assert abs(math.sin(math.radians(60)) - VELOCITY[ratio][6]) > 100 * HALF_DIGIT
 
 
-@pytest.mark.parametrize(("ratio", "printed", "tolerance"), [(1 / 5, 1.02, 0.005), (1 / 4.5, 1.025, 0.001), (1 / 4, 1.031, 0.001)])
+@pytest.mark.parametrize(
+    ("ratio", "printed", "tolerance"), [(1 / 5, 1.02, 0.005), (1 / 4.5, 1.025, 0.001), (1 / 4, 1.031, 0.001)]
+)
 def test_largest_piston_speed(ratio: float, printed: float, tolerance: float) -> None:
     """Text below Fig. 1049: c_max = 1.02 v, 1.025 v, 1.031 v. The figure is a drawing: a unit of the third digit."""
     found = minimize_scalar(lambda phi: -_speed(ratio, phi), bounds=(1.0, 1.57), method="bounded")

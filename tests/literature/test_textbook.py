@@ -124,8 +124,8 @@ class TestFiveCylinders:
         layout = inline(5, self.spacing)
         mechanism = Mechanism(self.radius, self.radius / self.ratio, 10.0, rod_rotating_mass=14.0)
         throws = even_throws(Cycle.FOUR_STROKE, layout, (1, 2, 4, 5, 3))
-        cylinders, rotors = build(Cycle.FOUR_STROKE, layout, mechanism, throws, (1, 2, 4, 5, 3))
-        return Engine("five", Cycle.FOUR_STROKE, cylinders, rotors)
+        cylinders, _ = build(Cycle.FOUR_STROKE, layout, mechanism, throws, (1, 2, 4, 5, 3))
+        return Engine("five", Cycle.FOUR_STROKE, cylinders)
 
     def test_forces_of_one_cylinder(self) -> None:
         """F_r = 13 900, F_I = 9900, F_II = 2475 N."""
@@ -137,7 +137,14 @@ class TestFiveCylinders:
         assert abs(moving.at(2)[2]) == pytest.approx(2475, abs=self.ratio * self.rounding)
 
     @pytest.mark.parametrize(
-        ("number", "printed"), [(1, (8340, 5940, 1485)), (2, (4170, 2970, 743)), (3, (0, 0, 0)), (4, (4170, 2970, 743)), (5, (8340, 5940, 1485))]
+        ("number", "printed"),
+        [
+            (1, (8340, 5940, 1485)),
+            (2, (4170, 2970, 743)),
+            (3, (0, 0, 0)),
+            (4, (4170, 2970, 743)),
+            (5, (8340, 5940, 1485)),
+        ],
     )
     def test_couples_of_each_cylinder(self, number: int, printed: tuple[float, float, float]) -> None:
         """M_r, M_I, M_II of each cylinder about the middle; the print's rounded force times its arm."""
@@ -149,7 +156,7 @@ class TestFiveCylinders:
             assert abs(couple) == pytest.approx(value, abs=arm * self.rounding * force_rounding + 0.5)
 
     def test_all_resultant_forces_are_zero(self) -> None:
-        """"All resultants are zero": exactly, turning, of first and of second order."""
+        """ "All resultants are zero": exactly, turning, of first and of second order."""
         moving = reciprocating_loads(self.engine, self.speed, TWO_ORDER)
         for coefficient in (rotating_loads(self.engine, self.speed).at(1), moving.at(1), moving.at(2)):
             assert (coefficient[:3] == 0.0).all()
@@ -195,17 +202,17 @@ class TestTwoPistonsOnAHalfTurnCrank:
         return down, up
 
     def test_largest_speed_at_75_degrees(self) -> None:
-        """"The position of maximum speed (75 deg for the downgoing piston ...)": where the acceleration is zero."""
+        """ "The position of maximum speed (75 deg for the downgoing piston ...)": where the acceleration is zero."""
         zero = brentq(lambda degrees: self.forces(degrees)[0], 60, 90)
         assert zero == pytest.approx(75, abs=0.5)
 
     @pytest.mark.parametrize("degrees", [76, 90, 104])
     def test_both_forces_are_negative_between_75_and_105_degrees(self, degrees: float) -> None:
-        """"Between 75 deg and 105 deg all forces are negative"; a degree inside, the angles being rounded."""
+        """ "Between 75 deg and 105 deg all forces are negative"; a degree inside, the angles being rounded."""
         assert max(self.forces(degrees)) < 0.0
 
     def test_resultant_changes_sign_at_45_degrees(self) -> None:
-        """"During the first 45 deg ... a positive resultant force. Beyond 45 deg the negative forces are dominant."
+        """ "During the first 45 deg ... a positive resultant force. Beyond 45 deg the negative forces are dominant."
 
         Of even orders alone; the fourth shifts it by under a degree at this rod.
         """

@@ -90,6 +90,12 @@ class Engine:
             double = [name for name, count in names.items() if count > 1]
             if double:
                 raise ModelError(f"two {kind.replace('_', '-')} are called '{double[0]}'; give each its own name")
+        places: dict[object, str] = {}
+        for part in self.slider_cranks:
+            place = (part.shaft, part.x, as_turn(part.bank) % 1)
+            if place in places:
+                raise ModelError(f"{part.name} stands in the place of {places[place]}; move one of them")
+            places[place] = part.name
         for shaft in self.shafts:
             self._check_period(shaft)
         for part in self.slider_cranks:

@@ -2,31 +2,46 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from laufruhe.errors import ModelError
+
 AMBIENT_PRESSURE = 101_325.0
+MAX_COMPRESSION_RATIO = 1000.0
+MAX_EXPONENT = 5.0
+MAX_HEAT_RATIO = 1.7
+MAX_SHAPE = 20.0
 
 
 @dataclass(frozen=True)
 class Seiliger:
-    """Mixed cycle: heat at constant volume up to the peak pressure, then at constant
-    pressure up to the cut-off that gives the indicated mean pressure wanted.
+    """Mixed cycle, its heat given at constant volume and then at constant pressure.
+
+    Constant volume goes up to the peak pressure, constant pressure up to the cut-off that
+    gives the indicated mean pressure wanted.
 
     Attributes
     ----------
     peak_pressure
         Absolute [Pa].
     imep
-        Indicated mean effective pressure of the whole cycle [Pa].
+        Indicated mean effective pressure of the whole cycle, gas exchange included [Pa].
     compression_ratio
         Largest over smallest volume.
     compression_exponent, expansion_exponent
         Polytropic exponents.
     intake_pressure, exhaust_pressure
-        Absolute [Pa]; of the gas exchange and the start of compression.
+        Absolute [Pa]; of the gas exchange and the start of compression. A two-stroke
+        cycle has no exhaust stroke and makes no use of the exhaust pressure.
     crankcase_pressure
         Absolute [Pa], on the underside of the piston.
+
+    Raises
+    ------
+    ModelError
+        If a value is out of its range.
     """
 
     peak_pressure: float
@@ -38,6 +53,17 @@ class Seiliger:
     exhaust_pressure: float = AMBIENT_PRESSURE
     crankcase_pressure: float = AMBIENT_PRESSURE
 
+    def __post_init__(self) -> None:
+        _check_pressures(self, "peak_pressure", "intake_pressure", "exhaust_pressure", "crankcase_pressure")
+        _check_charge(self.imep, self.compression_ratio)
+        for name in ("compression_exponent", "expansion_exponent"):
+            exponent = getattr(self, name)
+            if not 0.0 < exponent <= MAX_EXPONENT:
+                raise ModelError(
+                    f"{name} {exponent:g} must be over 0 and at most {MAX_EXPONENT:g}; "
+                    "1.2 to 1.4 is usual, 1 is a constant temperature"
+                )
+
 
 @dataclass(frozen=True)
 class Wiebe:
@@ -46,15 +72,29 @@ class Wiebe:
     Attributes
     ----------
     imep
-        Wanted [Pa]; the heat released is solved for it.
+        Wanted of the whole cycle, gas exchange included [Pa]; the heat released is
+        solved for it.
     start, duration
         Of combustion, crank angle from the firing dead centre [rad].
     shape
         Exponent m.
     completeness
         Fraction burnt at the end; a = -ln(1 - completeness).
+    compression_ratio
+        Largest over smallest volume.
     heat_ratio
-        Ratio of specific heats of the charge while it burns.
+        Ratio of specific heats of the charge, from the start of compression to the end
+        of expansion.
+    intake_pressure, exhaust_pressure
+        Absolute [Pa]; of the gas exchange and the start of compression. A two-stroke
+        cycle has no exhaust stroke and makes no use of the exhaust pressure.
+    crankcase_pressure
+        Absolute [Pa], on the underside of the piston.
+
+    Raises
+    ------
+    ModelError
+        If a value is out of its range.
     """
 
     imep: float
@@ -68,6 +108,31 @@ class Wiebe:
     exhaust_pressure: float = AMBIENT_PRESSURE
     crankcase_pressure: float = AMBIENT_PRESSURE
 
+    def __post_init__(self) -> None:
+        _check_pressures(self, "intake_pressure", "exhaust_pressure", "crankcase_pressure")
+        _check_charge(self.imep, self.compression_ratio)
+        self._check_burn()
+        if not 0.0 <= self.shape <= MAX_SHAPE:
+            raise ModelError(f"shape {self.shape:g} must be between 0 and {MAX_SHAPE:g}; 0.5 to 3 is usual")
+        if not 0.0 < self.completeness < 1.0:
+            raise ModelError(f"completeness {self.completeness:g} must be between 0 and 1; 0.999 is usual")
+        if not 1.0 < self.heat_ratio <= MAX_HEAT_RATIO:
+            raise ModelError(
+                f"heat_ratio {self.heat_ratio:g} must be over 1 and at most {MAX_HEAT_RATIO:g}; 1.3 to 1.4 is usual"
+            )
+
+    def _check_burn(self) -> None:
+        first, last = math.degrees(self.start), math.degrees(self.start + self.duration)
+        if not math.isfinite(self.start):
+            raise ModelError(f"start {self.start} must be finite; give a crank angle from the firing dead centre")
+        if not self.duration > 0.0:
+            raise ModelError(f"duration {math.degrees(self.duration):g} deg must be positive; 30 to 70 deg is usual")
+        if first < -180.0 or last > 180.0:
+            raise ModelError(
+                f"the burn from {first:g} to {last:g} deg must lie between -180 and 180 deg about the firing dead "
+                "centre; move start or shorten duration"
+            )
+
 
 @dataclass(frozen=True)
 class PressureTrace:
@@ -76,16 +141,68 @@ class PressureTrace:
     Attributes
     ----------
     angles
-        Crank angles after the firing dead centre [rad], ascending, one cycle.
+        Crank angles after the firing dead centre [rad], ascending, one cycle; it may
+        begin anywhere, and name its end as well as its beginning.
     pressures
         Absolute [Pa].
     crankcase_pressure
         Absolute [Pa].
+
+    Raises
+    ------
+    ModelError
+        If there are fewer than four points, angles do not ascend, or a pressure is not
+        positive.
     """
 
     angles: tuple[float, ...]
     pressures: tuple[float, ...]
     crankcase_pressure: float = AMBIENT_PRESSURE
 
+    def __post_init__(self) -> None:
+        _check_pressures(self, "crankcase_pressure")
+        if len(self.angles) != len(self.pressures):
+            raise ModelError(
+                f"the trace has {len(self.angles)} angles and {len(self.pressures)} pressures; give a pair a point"
+            )
+        if len(self.angles) < 4:
+            raise ModelError(
+                f"the trace has {len(self.angles)} points, too few for a cycle; give one every few degrees"
+            )
+        for k, (angle, pressure) in enumerate(zip(self.angles, self.pressures, strict=True)):
+            self._check_point(k, angle, pressure)
+
+    def _check_point(self, k: int, angle: float, pressure: float) -> None:
+        where = f"point {k + 1} of the trace"
+        if not math.isfinite(angle):
+            raise ModelError(f"{where} has the angle {angle}, which must be finite; remove the point")
+        if k > 0 and angle <= self.angles[k - 1]:
+            raise ModelError(
+                f"{where} at {math.degrees(angle):g} deg must come after the one before it at "
+                f"{math.degrees(self.angles[k - 1]):g} deg; sort the trace and keep one point an angle"
+            )
+        if not 0.0 < pressure < math.inf:
+            raise ModelError(
+                f"{where} has the pressure {pressure * 1e-5:g} bar, which must be positive and finite; "
+                "give absolute pressures"
+            )
+
 
 GasModel: TypeAlias = Seiliger | Wiebe | PressureTrace
+
+
+def _check_pressures(gas: GasModel, *names: str) -> None:
+    for name in names:
+        pressure = getattr(gas, name)
+        if not 0.0 < pressure < math.inf:
+            raise ModelError(f"{name} {pressure * 1e-5:g} bar must be positive and finite; give an absolute pressure")
+
+
+def _check_charge(imep: float, compression_ratio: float) -> None:
+    if not math.isfinite(imep):
+        raise ModelError(f"imep {imep} must be finite; give the mean pressure wanted")
+    if not 1.0 < compression_ratio <= MAX_COMPRESSION_RATIO:
+        raise ModelError(
+            f"compression_ratio {compression_ratio:g} must be over 1 and at most {MAX_COMPRESSION_RATIO:g}; "
+            "give the largest over the smallest volume"
+        )

@@ -29,7 +29,8 @@ MAX_ORDER = 20_000
 def _poles(rod_ratio: float, offset_ratio: float) -> tuple[float, float, float]:
     """(q1, q2, q1 - q2) of K7, the difference without loss of digits."""
     k1, k2 = rod_ratio / (1.0 + offset_ratio), rod_ratio / (1.0 - offset_ratio)
-    c1, c2 = math.sqrt((1.0 - k1) * (1.0 + k1)), math.sqrt((1.0 - k2) * (1.0 + k2))
+    c1 = _complement(rod_ratio, offset_ratio)
+    c2 = _complement(rod_ratio, -offset_ratio)
     q1, q2 = k1 / (1.0 + c1), k2 / (1.0 + c2)
     gap = -2.0 * offset_ratio * rod_ratio / ((1.0 - offset_ratio) * (1.0 + offset_ratio))
     both = k1 * c2 + k2 * c1
@@ -39,6 +40,13 @@ def _poles(rod_ratio: float, offset_ratio: float) -> tuple[float, float, float]:
     half_gap = sine_gap / math.sqrt(2.0 * (1.0 + cosine_gap))
     difference = half_gap * math.sqrt((1.0 + q1 * q1) * (1.0 + q2 * q2))
     return q1, q2, difference
+
+
+def _complement(rod_ratio: float, offset_ratio: float) -> float:
+    """sqrt(1 - k^2) of k = lambda / (1 + epsilon), from sums taken exactly: near locking 1 - k is all rounding."""
+    low = math.fsum((1.0, offset_ratio, -rod_ratio))
+    high = math.fsum((1.0, offset_ratio, rod_ratio))
+    return math.sqrt(low * high) / (1.0 + offset_ratio)
 
 
 def _power_series(power: float, q1: float, q2: float, difference: float, terms: int) -> ComplexArray:

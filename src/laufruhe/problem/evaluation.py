@@ -8,11 +8,14 @@ from fractions import Fraction
 from functools import cached_property
 
 from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import Fidelity, shaking_loads
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES, Quantity, Rows, Subject, load_rows, mass_rows
+
+PEAK_REFINEMENT = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +45,24 @@ class PointLoads:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Everything known of one design at every operating point."""
+    """Everything known of one design at every operating point.
+
+    Attributes
+    ----------
+    engine
+        The design.
+    fidelity
+        What of the physics was kept.
+    loads
+        Per operating point.
+    samples
+        Steps over the cycle at which measures are taken.
+    """
 
     engine: Engine
     fidelity: Fidelity
     loads: tuple[PointLoads, ...]
+    samples: int
 
     @cached_property
     def mount_names(self) -> list[str]:
@@ -63,12 +79,13 @@ class Evaluation:
             [loads.point for loads in self.loads],
             over(self.engine.cycle.base_order, signals),
             self.mount_names,
-            samples or self.fidelity.samples,
+            samples or self.samples,
         )
 
     def value(self, quantity: Quantity) -> float:
-        """A quantity of this design [SI]."""
-        return self.rows(quantity).value
+        """A quantity of this design [SI]; a maximum is sought between the samples too."""
+        finer = PEAK_REFINEMENT if quantity.norm is Norm.MAXIMUM else 1
+        return self.rows(quantity, finer * self.samples).value
 
 
 def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
@@ -77,7 +94,7 @@ def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
     return [signal.rebased(finest) for signal in signals]
 
 
-def evaluate(problem: Problem, engine: Engine | None = None) -> Evaluation:
+def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None = None) -> Evaluation:
     """Loads of a design by the exact model.
 
     Parameters
@@ -86,6 +103,9 @@ def evaluate(problem: Problem, engine: Engine | None = None) -> Evaluation:
         Operating points and fidelity.
     engine
         The design; that of the problem as given when left out.
+    samples
+        Steps over the cycle at which measures are taken; those of the fidelity when
+        left out.
 
     Raises
     ------
@@ -100,7 +120,7 @@ def evaluate(problem: Problem, engine: Engine | None = None) -> Evaluation:
     for point in problem.points:
         wrench = shaking_loads(engine, point, problem.fidelity)
         loads.append(PointLoads(point, wrench, mounting.forces(wrench) if mounting else None))
-    return Evaluation(engine, problem.fidelity, tuple(loads))
+    return Evaluation(engine, problem.fidelity, tuple(loads), samples or problem.fidelity.samples)
 
 
 def objective_value(problem: Problem, evaluation: Evaluation) -> float:

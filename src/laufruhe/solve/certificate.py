@@ -170,6 +170,9 @@ def kkt_residual(problem: AffineProblem, x: Array, bound: Bound) -> float:
         steps.append(float(np.abs((domain.project(moved) - x[part]) / scales[part]).max(initial=0.0)))
     prices = bound.multipliers.shadow_prices(problem)
     whole = problem.objective(x) or 1.0
+    for (weight, norm), z in zip(problem.terms, bound.multipliers.terms, strict=True):
+        # the dual row of an optimum points along its row: <Z, V> = norm(V)
+        steps.append(weight * (norm.value(x) - float(np.vdot(z, norm.rows(x)))) / whole)
     for (maximum, norm), price in zip(problem.limits, prices, strict=True):
         value = norm.value(x)
         steps.append(max(0.0, value - maximum) / (maximum or 1.0))

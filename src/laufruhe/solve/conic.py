@@ -23,6 +23,9 @@ from laufruhe.solve.domain import Domain
 
 Array = NDArray[np.float64]
 
+# flat optima need a small gap before their decisions are digits one can build
+_TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
+
 
 @dataclass(frozen=True, eq=False)
 class ConicSolution:
@@ -129,7 +132,7 @@ class ConicProgram:
             # an inaccurate answer is judged by its certificate, not by a warning
             warnings.simplefilter("ignore")
             try:
-                self._program.solve(solver=cp.CLARABEL)
+                self._program.solve(solver=cp.CLARABEL, **_TIGHT)
             except cp.error.SolverError as error:
                 raise SolverError(f"the cone solver gave up ({error})") from None
         return self._answer(problem)

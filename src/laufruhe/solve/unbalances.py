@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES
 from laufruhe.solve.affine import AffineModel, AffineProblem
@@ -19,7 +20,8 @@ from laufruhe.solve.result import DecisionValue, LimitValue, ObjectiveValue, Res
 
 Array = NDArray[np.float64]
 
-MOST_DOUBLINGS = 2
+MOST_DOUBLINGS = 4
+MOST_MARGINS = 3
 MOST_ROWS = 60_000
 NEGLIGIBLE = 1e-9
 FEASIBLE = 1e-6
@@ -30,10 +32,21 @@ SAME_LOAD = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class _Optimum:
+    """A design, the bound that meets it, and how far it is from being allowed.
+
+    Attributes
+    ----------
+    problem
+        Rows on the grid that the bound holds on.
+    excess
+        Largest relative excess over a limit, sought between the angles too.
+    """
+
     x: Array
     bound: Bound
     problem: AffineProblem
     gap: float
+    excess: float
     samples: int
 
 
@@ -60,30 +73,68 @@ def solve_unbalances(problem: Problem) -> Result:
     if optimum is None:
         return _infeasible(problem, model, initial, timing)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
-    final = evaluate(problem, problem.design(values))
+    cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
+    final = evaluate(problem, problem.design(values), cycle_samples)
+    initial = replace(initial, samples=cycle_samples)
     result = _result(problem, optimum, initial, final)
     return replace(result, timing={**timing, "evaluate": time.perf_counter() - solved})
 
 
 def _refine(problem: Problem, model: AffineModel, initial: float) -> _Optimum | None:
     """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6)."""
-    from laufruhe.solve.conic import ConicProgram
-
-    samples = model.full_samples
-    for doubling in range(MOST_DOUBLINGS + 1):
-        coarse, fine = model.at(samples), model.at(2 * samples)
-        solution = ConicProgram(coarse).solve()
-        if solution.x is None:
+    samples, best = model.full_samples, None
+    for _ in range(MOST_DOUBLINGS + 1):
+        found = _allowed(problem, model, samples, initial)
+        if found is None:
             # fewer angles ask for less: what they cannot meet, all cannot
-            return None
-        x = _settled(problem, fine, solution.x)
-        bound = best_bound(fine, coarse, x, solution.multipliers)
-        gap = (fine.objective(x) - bound.value) / _measure(fine.objective(x), initial)
-        proven = gap <= problem.tolerance and _excess(fine, x) <= FEASIBLE
-        if proven or doubling == MOST_DOUBLINGS or len(fine.terms[0][1].weights) > MOST_ROWS:
+            return best
+        best = found
+        rows = len(best.problem.terms[0][1].weights)
+        if (best.gap <= problem.tolerance and best.excess <= FEASIBLE) or rows > MOST_ROWS:
             break
         samples *= 2
-    return _Optimum(x, bound, fine, max(gap, 0.0), samples)
+    return best
+
+
+def _allowed(problem: Problem, model: AffineModel, samples: int, initial: float) -> _Optimum | None:
+    """An optimum at `samples` angles that keeps its limits between them too.
+
+    A peak between the angles breaks its limit by a little; the next attempt asks for
+    that little less at the angles.
+    """
+    found = _attempt(problem, model, samples, initial, 0.0)
+    margin = 0.0
+    for _ in range(MOST_MARGINS):
+        if found is None or found.excess <= FEASIBLE:
+            break
+        margin += 1.05 * found.excess
+        found = _attempt(problem, model, samples, initial, margin) or found
+    return found
+
+
+def _attempt(problem: Problem, model: AffineModel, samples: int, initial: float, margin: float) -> _Optimum | None:
+    from laufruhe.solve.conic import ConicProgram
+
+    coarse, fine = model.at(samples), model.at(2 * samples)
+    solution = ConicProgram(_tightened(coarse, margin)).solve()
+    if solution.x is None:
+        return None
+    x = _settled(problem, fine, solution.x)
+    bound = best_bound(fine, coarse, x, solution.multipliers)
+    judge = model.at(PEAK_REFINEMENT * samples) if _has_peaks(problem) else fine
+    value = judge.objective(x)
+    gap = (value - bound.value) / _measure(value, initial)
+    return _Optimum(x, bound, fine, max(gap, 0.0), _excess(judge, x), samples)
+
+
+def _has_peaks(problem: Problem) -> bool:
+    quantities = [term.quantity for term in problem.objective] + [limit.quantity for limit in problem.limits]
+    return any(quantity.norm is Norm.MAXIMUM for quantity in quantities)
+
+
+def _tightened(affine: AffineProblem, margin: float) -> AffineProblem:
+    limits = tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits)
+    return replace(affine, limits=limits) if margin else affine
 
 
 def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
@@ -151,7 +202,7 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         _limit_value(limit.name, limit.quantity.unit, final.value(limit.quantity), limit.maximum, price, value)
         for limit, price in zip(problem.limits, prices, strict=True)
     )
-    feasible = all(limit.value <= limit.limit * (1.0 + FEASIBLE) + 1e-12 for limit in limits)
+    feasible = all(limit.value <= limit.limit * (1.0 + 10.0 * FEASIBLE) + 1e-12 for limit in limits)
     return Result(
         problem=problem,
         status=Status.OPTIMAL
@@ -181,7 +232,7 @@ def objective_name(problem: Problem) -> str:
 
 def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
     """Relative change of the objective when every second angle is left out."""
-    samples = evaluation.fidelity.samples
+    samples = evaluation.samples
     whole = objective_value(problem, evaluation)
     if samples % 2 or not whole:
         return 0.0

@@ -1,0 +1,204 @@
+"""Free forces and couples of common engines, as handbooks tabulate them for the choice of a crankshaft.
+
+Such tables give couples about the middle of the engine in units of F_I a and F_II a: F_I = m r w^2 and
+F_II = lambda F_I of one cylinder, a the distance of neighbouring throws. They are known to four digits after the point,
+which makes the tolerance half of the last; most are radicals, and are asked for to rounding as well. What a star
+cancels is zero and not a small number.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from laufruhe.machine import Cycle, Engine, OperatingPoint
+from laufruhe.machine.layouts import Layout, Mechanism, build, even_throws, inline, vee
+from laufruhe.physics.order_coefficients import piston_acceleration_orders
+from laufruhe.physics.shaking_loads import EXACT, Fidelity, rotating_loads, shaking_loads
+
+TWO_ORDER = Fidelity(kinematics="two-order")
+HALF_DIGIT = 0.00005
+MASS, RADIUS, LENGTH, SPACING, SPEED = 1.25, 0.060, 0.230, 0.125, 261.8
+UNIT_FORCE = MASS * RADIUS * SPEED**2
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table: printed couples of first and second order, in closed form where there is one."""
+
+    name: str
+    cycle: Cycle
+    layout: Layout
+    firing_order: tuple[int, ...] | None
+    throws: tuple[float, ...]
+    first: float
+    second: float
+    closed: tuple[float | None, float | None]
+    directions: int
+
+    def engine(self, offset: float = 0.0) -> Engine:
+        mechanism = Mechanism(RADIUS, LENGTH, MASS, rod_rotating_mass=MASS, offset=offset)
+        cylinders, _ = build(self.cycle, self.layout, mechanism, self.throws, self.firing_order)
+        return Engine(self.name, self.cycle, cylinders)
+
+
+def _inline(
+    cycle: Cycle,
+    firing_order: tuple[int, ...],
+    first: float,
+    second: float,
+    closed: tuple[float | None, float | None],
+    directions: int,
+) -> Row:
+    layout = inline(len(firing_order), SPACING)
+    throws = even_throws(cycle, layout, firing_order)
+    name = f"inline {'-'.join(map(str, firing_order))} {cycle.name.lower()}"
+    return Row(name, cycle, layout, firing_order, throws, first, second, closed, directions)
+
+
+def _vee(
+    name: str,
+    throws_deg: tuple[int, ...],
+    first: float,
+    second: float,
+    closed: tuple[float | None, float | None],
+    directions: int,
+) -> Row:
+    layout = vee(2 * len(throws_deg), SPACING, 0.5 * math.pi)
+    throws = tuple(math.tau * degrees / 360 for degrees in throws_deg)
+    return Row(name, Cycle.FOUR_STROKE, layout, None, throws, first, second, closed, directions)
+
+
+FOUR, TWO = Cycle.FOUR_STROKE, Cycle.TWO_STROKE
+INLINE = [
+    _inline(FOUR, (1, 3, 2), 1.7321, 1.7321, (math.sqrt(3), math.sqrt(3)), 3),
+    _inline(FOUR, (1, 2, 4, 5, 3), 0.4490, 4.9798, (None, None), 5),
+    _inline(FOUR, (1, 5, 3, 6, 2, 4), 0.0, 0.0, (0.0, 0.0), 3),
+    _inline(TWO, (1, 5, 3, 4, 2, 6), 0.0, 3.4641, (0.0, 2 * math.sqrt(3)), 6),
+    _inline(TWO, (1, 7, 2, 5, 4, 3, 6), 0.2673, 1.0056, (None, None), 7),
+]
+V6 = _vee("V6 90 deg", (0, 240, 120), 1.7321, 2.4495, (math.sqrt(3), math.sqrt(6)), 3)
+V8 = _vee("V8 90 deg cross-plane", (0, 90, 270, 180), 3.1623, 0.0, (math.sqrt(10), 0.0), 4)
+ROWS = [*INLINE, V6, V8]
+by_name = pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
+by_fidelity = pytest.mark.parametrize("fidelity", [EXACT, TWO_ORDER], ids=lambda fidelity: fidelity.kinematics)
+
+
+def _loads(row: Row, order: int, fidelity: Fidelity = EXACT, offset: float = 0.0) -> NDArray[np.complex128]:
+    """Wrench of the reciprocating masses alone, for one order."""
+    engine = row.engine(offset)
+    total = shaking_loads(engine, OperatingPoint("speed", SPEED), fidelity).at(order)
+    return np.asarray(total - rotating_loads(engine, SPEED).at(order))
+
+
+def _cylinder_force(order: int, fidelity: Fidelity) -> float:
+    """Amplitude of one cylinder's force, F_I or F_II; of the exact mechanism or to first order in lambda."""
+    truncated = {1: 1.0, 2: RADIUS / LENGTH}
+    exact = abs(piston_acceleration_orders(RADIUS / LENGTH, 0.0, order)[order])
+    return UNIT_FORCE * (exact if fidelity is EXACT else truncated[order])
+
+
+def _extremes(vector: NDArray[np.complex128]) -> tuple[float, float]:
+    """Largest and smallest length of Re c e^{ix} over a turn of x: the half axes of its ellipse."""
+    largest, smallest = np.linalg.svd(np.array([vector.real, vector.imag]), compute_uv=False)
+    return float(largest), float(smallest)
+
+
+def _couples(row: Row, order: int, fidelity: Fidelity) -> tuple[float, float]:
+    largest, smallest = _extremes(_loads(row, order, fidelity)[4:])
+    unit = _cylinder_force(order, fidelity) * SPACING
+    return largest / unit, smallest / unit
+
+
+@by_fidelity
+@by_name
+def test_couples_as_printed(row: Row, fidelity: Fidelity) -> None:
+    for order, printed, closed in ((1, row.first, row.closed[0]), (2, row.second, row.closed[1])):
+        largest, _ = _couples(row, order, fidelity)
+        assert largest == pytest.approx(printed, abs=HALF_DIGIT)
+        if closed is not None:
+            assert largest == pytest.approx(closed, rel=1e-13, abs=0.0)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.012])
+@by_name
+def test_cancelled_forces_are_exactly_zero(row: Row, offset: float) -> None:
+    """A star of n even directions leaves no force of orders other than n, 2 n, ...; with an offset too."""
+    loads = shaking_loads(row.engine(offset), OperatingPoint("speed", SPEED))
+    for order in range(1, 15):
+        if order % row.directions:
+            assert (loads.at(order)[:3] == 0.0).all(), f"order {order}"
+
+
+@by_name
+def test_forces_that_the_star_does_not_cancel_remain(row: Row) -> None:
+    """Order n of n even directions adds up, unless a vee's two banks cancel it; odd orders need an offset."""
+    order = row.directions
+    cylinders = len(row.layout.positions)
+    one = abs(piston_acceleration_orders(RADIUS / LENGTH, 0.012 / LENGTH, order)[order]) * UNIT_FORCE
+    force = np.linalg.norm(_loads(row, order, offset=0.012)[1:3])
+    assert force > 0.5 * cylinders * one
+    if order % 2:
+        assert (_loads(row, order)[:3] == 0.0).all()
+
+
+@pytest.mark.parametrize("row", INLINE, ids=lambda row: row.name)
+def test_couples_of_inline_engines_lie_in_one_plane(row: Row) -> None:
+    """Upright cylinders shake in their own plane: My only, and no lateral force."""
+    for order in range(1, 9):
+        loads = _loads(row, order)
+        assert loads[1] == 0.0
+        assert loads[5] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("row", "orders"),
+    [(INLINE[2], range(1, 15)), (INLINE[3], (1, 3, 5, 7, 9)), (V8, (2, 6, 10))],
+    ids=lambda v: getattr(v, "name", ""),
+)
+def test_cancelled_couples_are_exactly_zero(row: Row, orders: tuple[int, ...]) -> None:
+    """A crankshaft with mirror symmetry has none; the two-stroke six none of odd orders, the V8 none of 2, 6, 10."""
+    for order in orders:
+        assert (_loads(row, order, offset=0.012 if row is INLINE[2] else 0.0)[4:] == 0.0).all(), f"order {order}"
+
+
+@by_fidelity
+def test_v6_first_order_is_constant_and_second_goes_through_zero(fidelity: Fidelity) -> None:
+    """V6 of 90 deg: the first-order couple keeps its length as it turns, the second oscillates about z alone."""
+    largest, smallest = _couples(V6, 1, fidelity)
+    assert smallest == pytest.approx(largest, rel=1e-14)
+    assert _loads(V6, 2, fidelity)[4] == 0.0
+    assert _couples(V6, 2, fidelity)[1] == 0.0
+
+
+@by_fidelity
+def test_v8_first_order_turns_with_the_crank(fidelity: Fidelity) -> None:
+    """Cross-plane V8: it turns with the crank and keeps its length, so that weights on the crank remove it."""
+    couple = _loads(V8, 1, fidelity)
+    assert abs(couple[4] - 1j * couple[5]) == pytest.approx(2 * math.sqrt(10) * UNIT_FORCE * SPACING, rel=1e-13)
+    assert abs(couple[4] + 1j * couple[5]) <= 1e-14 * abs(couple[4])
+
+
+@pytest.mark.parametrize("row", INLINE, ids=lambda row: row.name)
+def test_turning_couple_has_the_star_of_the_first_order(row: Row) -> None:
+    """Rotating masses make the first-order couple of the table, of constant length; their forces cancel exactly."""
+    turning = rotating_loads(row.engine(), SPEED).at(1)
+    assert (turning[:4] == 0.0).all()
+    largest, smallest = _extremes(turning[4:])
+    assert largest / (UNIT_FORCE * SPACING) == pytest.approx(row.first, abs=HALF_DIGIT)
+    assert smallest == pytest.approx(largest, rel=1e-14)
+
+
+def test_higher_orders_and_offset_tell() -> None:
+    """The second-order couple is 1.7 % over lambda F_I here, and an offset adds odd orders: leaving them out shows."""
+    row = INLINE[0]
+    exact, truncated = (abs(_loads(row, 2, fidelity)[4]) for fidelity in (EXACT, TWO_ORDER))
+    assert exact / truncated - 1 == pytest.approx(0.25 * (RADIUS / LENGTH) ** 2, rel=0.05)
+    assert abs(_loads(row, 4)[4]) > 1e-3 * truncated
+    assert _loads(row, 4, TWO_ORDER)[4] == 0.0
+    assert _loads(row, 3)[2] == 0.0
+    assert abs(_loads(row, 3, offset=0.012)[2]) > 1e-3 * UNIT_FORCE

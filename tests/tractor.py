@@ -1,0 +1,82 @@
+"""Small problems that solver tests share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, OperatingPoint, Role, Rotor, Seiliger, Shaft
+from laufruhe.machine.layouts import Mechanism, build, inline
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.physics.shaking_loads import Fidelity
+from laufruhe.problem.model import Drive, Limit, Problem, Term, UnbalanceDecision
+from laufruhe.problem.quantity import Quantity, Subject
+
+RADIUS, LAMBDA, MASS, SPACING = 0.06, 0.26, 1.25, 0.125
+SPEED = 2500 * math.pi / 30
+TWO_ORDER = Fidelity("two-order", 720)
+GAS = Seiliger(peak_pressure=78.5e5, imep=5.4e5)
+MEAN_MOUNT_FORCE = Quantity(Subject.MOUNT_FORCE, Norm.SUM)
+
+
+def mounts(cylinders: int) -> tuple[Mount, ...]:
+    """The study's long mounting: (z + 7) a apart, 504 mm across."""
+    front = 0.5 * (cylinders + 1) * SPACING
+    rear = front - (cylinders + 7) * SPACING
+    return tuple(
+        Mount(f"{end} {side}", (x, y, 0.0))
+        for end, x in (("front", front), ("rear", rear))
+        for side, y in (("left", 0.252), ("right", -0.252))
+    )
+
+
+def engine(
+    throws_deg: Sequence[float],
+    rotors: Sequence[Rotor] = (),
+    cycle: Cycle = Cycle.FOUR_STROKE,
+    firing_order: Sequence[int] | None = None,
+) -> Engine:
+    """The tractor engine with these throws."""
+    mechanism = Mechanism(RADIUS, RADIUS / LAMBDA, MASS, bore=0.1)
+    layout = inline(len(throws_deg), SPACING)
+    cylinders, _ = build(cycle, layout, mechanism, [math.radians(t) for t in throws_deg], firing_order)
+    return Engine("tractor", cycle, cylinders, tuple(rotors), mounts(len(throws_deg)))
+
+
+def free_unbalance(rotor: str, upper: float = 0.3) -> UnbalanceDecision:
+    """Size and angle of one rotor open."""
+    return UnbalanceDecision(f"{rotor}.unbalance", "kg m", 0.0, upper, (0.0, math.tau), 0j, (Drive(rotor, 1.0),))
+
+
+def shaft_rotor(name: str, ratio: float, x: float, y: float = 0.0, z: float = 0.0) -> Rotor:
+    """A balancer without unbalance yet."""
+    return Rotor(name, x, 0j, Shaft(name.split(".")[0], ratio, y, z), Role.BALANCER, 0.02)
+
+
+def web(name: str, x: float) -> Rotor:
+    """A counterweight without unbalance yet."""
+    return Rotor(name, x, 0j, CRANKSHAFT, Role.COUNTERWEIGHT, 0.08)
+
+
+def problem(
+    machine: Engine,
+    open_rotors: Sequence[str],
+    gas: Seiliger | None = None,
+    objective: Sequence[Term] = (Term(MEAN_MOUNT_FORCE),),
+    limits: Sequence[Limit] = (),
+    fidelity: Fidelity = TWO_ORDER,
+    tolerance: float = 1e-4,
+    upper: float = 0.3,
+) -> Problem:
+    """One operating point, the named rotors free."""
+    return Problem(
+        "test",
+        "test",
+        machine,
+        (OperatingPoint("rated", SPEED, gas),),
+        tuple(free_unbalance(name, upper) for name in open_rotors),
+        tuple(objective),
+        tuple(limits),
+        fidelity=fidelity,
+        tolerance=tolerance,
+    )
