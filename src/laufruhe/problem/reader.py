@@ -19,6 +19,7 @@ from laufruhe.problem.complaints import Refused, complaints_of, nearest
 from laufruhe.problem.file_models import LOAD_NAMES, MASS_NAMES, ConstraintTable, ProblemFile, QuantityTable
 from laufruhe.problem.model import Limit, Problem, Term
 from laufruhe.problem.quantity import MEASURES, Quantity, Subject, counted_rotors
+from laufruhe.problem.read_phasing import is_open, opened
 
 
 def load(path: str | Path) -> Problem:
@@ -32,6 +33,8 @@ def load(path: str | Path) -> Problem:
     path = Path(path)
     file = _parsed(path)
     try:
+        if is_open(file):
+            return opened(file, lambda closed: _assembled(closed, path))
         return _assembled(file, path)
     except Refused as refused:
         raise InputError(str(path), (refused.complaint,)) from None
