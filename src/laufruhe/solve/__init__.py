@@ -22,6 +22,10 @@ def solve(problem: Problem) -> Result:
     ModelError
         If the engine as given cannot be evaluated.
     """
+    if problem.phasing is not None:
+        from laufruhe.solve.phasing import solve_phasing
+
+        return solve_phasing(problem)
     return solve_unbalances(problem) if problem.decisions else state(problem)
 
 

@@ -13,10 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from laufruhe.numerics import mixed_norms
 from laufruhe.physics.crank_stars import Array, Stars
+from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.phasing import ShaftChoice
 from laufruhe.solve.affine import AffineNorm, AffineProblem
 from laufruhe.solve.certificate import Multipliers, best_bound, lower_bound
@@ -146,7 +147,7 @@ def search_designs(
     infeasible = 0
     complete = True
     while open_.any():
-        values = sorted(s.value for s in solved)
+        values = distinct_values(model.space, solved)
         target = values[count - 1] if len(values) >= count else float("inf")
         waiting = np.where(open_, bounds, np.inf)
         at = int(np.argmin(waiting))
@@ -175,6 +176,20 @@ def search_designs(
     return CutsFound(
         tuple(solved), least, beyond, complete, bounds.size, infeasible, time.perf_counter() - started
     )  # fmt: skip
+
+
+def distinct_values(space: StarSpace, solved: Sequence[Solved]) -> list[float]:
+    """Objectives in ascending order, images of one star that are worth the same counted once (S2)."""
+    if not solved:
+        return []
+    whole = replace(space, mirror=True, reflect=True)
+    stars = whole.canonical(np.array([s.star for s in solved], dtype=np.uint8))
+    seen: list[tuple[bytes, tuple[int, ...], float]] = []
+    for star, s in sorted(zip(stars, solved, strict=True), key=lambda pair: pair[1].value):
+        key = star.tobytes(), s.built
+        if not any(key == (a, b) and abs(v - s.value) <= 1e-6 * max(v, s.value) for a, b, v in seen):
+            seen.append((*key, s.value))
+    return [value for _, _, value in seen]
 
 
 def solve_design(
@@ -297,6 +312,21 @@ class Cut:
             chosen = [d for d, own in enumerate(owners) if own < 0 or own in built]
             out[:, column] = total + (least[:, chosen].sum(axis=1) if chosen else 0.0)
         return np.maximum(out, 0.0)
+
+    def least(self, space: StarSpace) -> float:
+        """A bound of every star: the best assignment of throws to steps; never under zero."""
+        if self.turns is not None:
+            return 0.0
+        rest = sum(domain.least(self.gradient) for domain in self.domains)
+        values = []
+        for pattern in space.patterns:
+            places = np.repeat(np.arange(space.phases), pattern)
+            # the first throw stands on step 0
+            places = np.delete(places, 0)
+            cost = self.moves[1:][:, places]
+            rows, columns = linear_sum_assignment(cost)
+            values.append(self.moves[0, 0] + float(cost[rows, columns].sum()))
+        return max(0.0, self.constant + rest + min(values))
 
     def _least(self, stars: Stars) -> Array:
         """min g . x of every decision, shape (stars, decisions)."""

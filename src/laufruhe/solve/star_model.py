@@ -190,10 +190,10 @@ def _compressed(norm: StarNorm) -> StarNorm:
     parts = [
         (norm.constant * scaled).reshape(1, -1),
         (norm.moves * scaled).reshape(throws * steps, -1),
-        np.moveaxis(norm.slope * scaled[..., None], -1, 0).reshape(columns, -1),
+        np.moveaxis(norm.slope * scaled[..., None], -1, 0).reshape(columns, k * d),
     ]
     if norm.turns is not None:
-        parts.append(np.moveaxis(norm.turns * scaled[..., None], -1, 2).reshape(throws * steps * columns, -1))
+        parts.append(np.moveaxis(norm.turns * scaled[..., None], -1, 2).reshape(throws * steps * columns, k * d))
     matrix = np.concatenate(parts).T
     if len(matrix) <= matrix.shape[1]:
         return norm
