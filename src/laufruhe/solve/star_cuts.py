@@ -326,7 +326,7 @@ class Cut:
             cost = self.moves[1:][:, places]
             rows, columns = linear_sum_assignment(cost)
             values.append(self.moves[0, 0] + float(cost[rows, columns].sum()))
-        return max(0.0, self.constant + rest + min(values))
+        return float(max(0.0, self.constant + rest + min(values)))
 
     def _least(self, stars: Stars) -> Array:
         """min g . x of every decision, shape (stars, decisions)."""
