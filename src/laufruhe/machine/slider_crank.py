@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
@@ -120,7 +121,7 @@ class SliderCrank:
         """epsilon = e / l."""
         return self.offset / self.rod_length
 
-    @property
+    @cached_property
     def star_turn(self) -> Turn:
         """theta - beta as a part of a turn: the local crank angle at phi = 0 (C5)."""
         return as_turn(self.throw) - as_turn(self.bank)

@@ -23,6 +23,7 @@ _EPS = float(np.finfo(float).eps)
 Turn: TypeAlias = Fraction | float
 
 
+@lru_cache(maxsize=4096)
 def as_turn(angle: float) -> Turn:
     """Angle in radians as a part of a turn, exact where it is a rounded rational.
 
@@ -39,6 +40,7 @@ def angle_of(turn: Turn) -> float:
     return math.tau * float(turn)
 
 
+@lru_cache(maxsize=4096)
 def cis(turn: Turn) -> complex:
     """e^{2 pi i turn}, with every symmetry of the circle kept to the last bit.
 

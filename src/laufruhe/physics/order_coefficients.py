@@ -60,6 +60,7 @@ def _power_series(power: float, q1: float, q2: float, difference: float, terms: 
     return series
 
 
+@lru_cache(maxsize=1024)
 def orders_needed(rod_ratio: float, offset_ratio: float = 0.0) -> int:
     """Order beyond which every coefficient is under 1e-18 of the first, times its order squared.
 

@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -256,5 +257,6 @@ def _spread(load: NDArray[np.complex128], step: int, cycle: Cycle) -> Spectrum:
     return Spectrum(cycle.base_order, out)
 
 
+@lru_cache(maxsize=1024)
 def _index(cycle: Cycle, order: float) -> int:
     return int(Fraction(order).limit_denominator(1000) / cycle.base_order)

@@ -44,7 +44,8 @@ class AffineNorm:
 
     def rows(self, x: Array) -> Array:
         """V0 + B x, shape (k, d)."""
-        return self.constant + self.slope @ x
+        moved = self.slope.reshape(-1, self.slope.shape[-1]) @ x
+        return self.constant + moved.reshape(self.constant.shape)
 
     def value(self, x: Array) -> float:
         """The norm at x."""
@@ -182,4 +183,4 @@ def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
     if keep_all or not used.any():
         used[:] = keep_all
         used[:1] = True
-    return AffineNorm(bare.norm, bare.vectors[:, used], slope[:, used], bare.weights)
+    return AffineNorm(bare.norm, bare.vectors[:, used], np.ascontiguousarray(slope[:, used]), bare.weights)

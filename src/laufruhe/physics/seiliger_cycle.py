@@ -1,0 +1,128 @@
+"""Mixed cycle, its cut-off solved for the indicated mean pressure wanted."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import Cycle, Seiliger, SliderCrank
+from laufruhe.physics.cylinder_volume import ChargedCylinder, dead_centres, gas_exchange_pressure, in_bar
+
+FloatArray: TypeAlias = NDArray[np.float64]
+
+_ROUNDING = 1e-12
+
+
+def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: FloatArray) -> FloatArray:
+    """Pressure of the mixed cycle (G4, G5).
+
+    Parameters
+    ----------
+    gas
+        Model with the indicated mean pressure wanted.
+    part
+        The slider-crank whose piston the gas works on.
+    cycle
+        Two- or four-stroke.
+    angles
+        Shape (n,), crank angles gamma [rad].
+
+    Returns
+    -------
+    Shape (n,) [Pa].
+
+    Raises
+    ------
+    ModelError
+        If the peak pressure is below the end of compression, or no cut-off gives the
+        indicated mean pressure.
+    """
+    cylinder = ChargedCylinder(part, cycle, gas.compression_ratio)
+    top, _ = dead_centres(part)
+    cut_off = cylinder.smallest * seiliger_cut_off(gas, cycle)
+
+    def closed(local: FloatArray) -> FloatArray:
+        volume = cylinder.volume(local)
+        compression = gas.intake_pressure * (cylinder.largest / volume) ** gas.compression_exponent
+        expansion = gas.peak_pressure * np.minimum(1.0, cut_off / volume) ** gas.expansion_exponent
+        return np.where(local < top, compression, expansion)
+
+    return cylinder.pressure(gas, closed, angles)
+
+
+def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
+    """Volume at the cut-off over the smallest volume, solved for the indicated mean pressure (G6).
+
+    The mean pressure rises with the cut-off all the way, from heat at constant volume
+    alone (1) to constant pressure down the whole stroke (the compression ratio).
+
+    Raises
+    ------
+    ModelError
+        With the range that can be reached.
+    """
+    # late, for it takes longer than all the rest of a small problem
+    from scipy.optimize import brentq
+
+    end = compression_end_pressure(gas)
+    if gas.peak_pressure < end * (1.0 - _ROUNDING):
+        raise ModelError(
+            f"peak_pressure {in_bar(gas.peak_pressure)} is below the {in_bar(end)} at the end of compression "
+            f"(ratio {gas.compression_ratio:g}, exponent {gas.compression_exponent:g}, "
+            f"from {in_bar(gas.intake_pressure)}); raise peak_pressure or lower compression_ratio"
+        )
+    least, most = seiliger_imep(gas, cycle, 1.0), seiliger_imep(gas, cycle, gas.compression_ratio)
+    slack = _ROUNDING * gas.peak_pressure
+    if not least - slack <= gas.imep <= most + slack:
+        remedy = "raise peak_pressure" if gas.imep > most else "lower peak_pressure"
+        raise ModelError(
+            f"imep {in_bar(gas.imep)} cannot be reached with peak_pressure {in_bar(gas.peak_pressure)}: from no to "
+            f"full cut-off it is between {in_bar(least)} and {in_bar(most)}; {remedy} or change imep"
+        )
+    if gas.imep <= least:
+        return 1.0
+    if gas.imep >= most:
+        return gas.compression_ratio
+    return float(
+        brentq(
+            lambda ratio: seiliger_imep(gas, cycle, ratio) - gas.imep,
+            1.0,
+            gas.compression_ratio,
+            xtol=1e-15,
+            rtol=1e-15,
+        )
+    )
+
+
+def compression_end_pressure(gas: Seiliger) -> float:
+    """Pressure at the smallest volume before heat comes [Pa] (G4)."""
+    return float(gas.intake_pressure * gas.compression_ratio**gas.compression_exponent)
+
+
+def seiliger_imep(gas: Seiliger, cycle: Cycle, cut_off_ratio: float) -> float:
+    """Indicated mean pressure of the mixed cycle for a cut-off, in closed form [Pa] (G6).
+
+    Parameters
+    ----------
+    gas
+        Model; its own imep is not used.
+    cycle
+        Two- or four-stroke.
+    cut_off_ratio
+        Volume at the cut-off over the smallest volume, 1 to the compression ratio.
+    """
+    whole = gas.compression_ratio
+    compression = compression_end_pressure(gas) * _polytropic_work(whole, gas.compression_exponent)
+    expansion = cut_off_ratio * _polytropic_work(whole / cut_off_ratio, gas.expansion_exponent)
+    burning = gas.peak_pressure * (cut_off_ratio - 1.0 + expansion)
+    return (burning - compression) / (whole - 1.0) + gas_exchange_pressure(gas, cycle)
+
+
+def _polytropic_work(ratio: float, exponent: float) -> float:
+    """Work of an expansion by a volume ratio, over p V at its small end; any exponent, 1 included."""
+    power, log = exponent - 1.0, math.log(ratio)
+    return -math.expm1(-power * log) / power if power != 0.0 else log

@@ -1,0 +1,109 @@
+"""Start-up, solve and re-solve, each beside something that a reader knows, in one run.
+
+Writes results/benchmarks/solve.md. Ratios are what counts; the times are this machine's.
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from laufruhe import load
+from laufruhe.problem.model import Problem
+from laufruhe.solve.affine import AffineModel, AffineProblem
+from laufruhe.solve.conic import ConicProgram
+
+ROOT = Path(__file__).resolve().parents[2]
+PROBLEM = ROOT / "problems" / "tractor-four-lanchester.toml"
+OUT = ROOT / "results" / "benchmarks" / "solve.md"
+
+Row = tuple[str, float, str, float]
+
+
+def seconds(command: list[str]) -> float:
+    """Wall time of a command in an empty folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        subprocess.run(command, check=True, cwd=folder, capture_output=True)
+        return time.perf_counter() - start
+
+
+def in_turns(own: Callable[[], float], other: Callable[[], float], repeats: int) -> tuple[float, float]:
+    """Medians of two things measured in turns, so that both see the same machine."""
+    own(), other()
+    pairs = [(own(), other()) for _ in range(repeats)]
+    return statistics.median(a for a, _ in pairs), statistics.median(b for _, b in pairs)
+
+
+def command_rows() -> list[Row]:
+    """Whole commands against bare imports."""
+    python, laufruhe = sys.executable, str(Path(sys.executable).with_name("laufruhe"))
+    pairs = [
+        ([laufruhe, "--help"], "import numpy"),
+        ([laufruhe, "solve", str(PROBLEM)], "import cvxpy, matplotlib.pyplot"),
+    ]
+    rows = []
+    for command, imports in pairs:
+        a, b = in_turns(lambda c=command: seconds(c), lambda i=imports: seconds([python, "-c", i]), 7)
+        rows.append((" ".join(Path(word).name for word in command), a, imports, b))
+    return rows
+
+
+def resolve_rows() -> list[Row]:
+    """Re-solves of a sweep over speed against the cone solver's own time on the same programs."""
+    problem = load(PROBLEM)
+    rows = []
+    for samples in (72, 180, 720):
+        sweep = [at_speed(problem, samples, factor) for factor in np.linspace(0.6, 1.0, 25)]
+        program = ConicProgram(sweep[-1], reusable=True)
+        program.solve(sweep[0])
+        start = time.perf_counter()
+        inside = sum(program.solve(affine).solver_seconds for affine in sweep)
+        whole = time.perf_counter() - start
+        rows.append((f"re-solve at {samples} angles", whole / 25, "Clarabel alone", inside / 25))
+    return rows
+
+
+def at_speed(problem: Problem, samples: int, factor: float) -> AffineProblem:
+    """The problem at another speed in forces over speed squared, so that only constants change."""
+    point = replace(problem.points[0], speed=factor * problem.points[0].speed)
+    rated = AffineModel(problem).at(samples)
+    slower = AffineModel(replace(problem, points=(point,))).at(samples)
+    terms = tuple(
+        (weight, replace(norm, constant=other.constant / factor**2))
+        for (weight, norm), (_, other) in zip(rated.terms, slower.terms, strict=True)
+    )
+    return replace(rated, terms=terms)
+
+
+def main() -> None:
+    """Measure and write the table."""
+    lines = [
+        "# Start-up, solve, re-solve",
+        "",
+        "Medians of runs taken in turns on one machine; the problem is `problems/tractor-four-lanchester.toml`.",
+        "`solve` reads, solves, proves, and writes its report and pictures.",
+        "",
+        "| what | ms | beside | ms | ratio |",
+        "| --- | ---: | --- | ---: | ---: |",
+    ]
+    lines += [
+        f"| {name} | {1e3 * own:.1f} | {beside} | {1e3 * other:.1f} | {own / other:.2f} |"
+        for name, own, beside, other in (*command_rows(), *resolve_rows())
+    ]
+    text = "\n".join(lines) + "\n"
+    print(text)
+    OUT.parent.mkdir(parents=True, exist_ok=True)
+    OUT.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
