@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from laufruhe.machine import Engine, Role
+from laufruhe.machine.firing import even_patterns
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -21,12 +22,12 @@ def amplitude_objective(problem: Problem) -> AmplitudeObjective | None:
     """The objective as norms of |F_h| and |C_h|, where it is of that kind; else None.
 
     It is if nothing but the throws and what hangs on them makes forces and couples,
-    nothing else is open, nothing is limited, and every term is a root mean square or is
+    nothing else is open, no limit can tell even stars apart, and every term is a root mean square or is
     of a single order: then no phase between orders can matter.
     """
     engine = problem.engine
     choosing = problem.phasing is not None and bool(problem.phasing.shafts.optional)
-    if problem.decisions or problem.limits or choosing or not problem.objective:
+    if problem.decisions or choosing or not problem.objective or not _limits_idle(problem):
         return None
     if any(rotor.role is not Role.THROW for rotor in engine.rotors):
         return None
@@ -50,6 +51,18 @@ def amplitude_objective(problem: Problem) -> AmplitudeObjective | None:
             AmplitudeTerm(t.weight, tuple(t.force[k] for k in used), tuple(t.couple[k] for k in used)) for t in terms
         ),
     )
+
+
+def _limits_idle(problem: Problem) -> bool:
+    """Whether only forces are limited, and met: of even stars the counts on the steps fix them."""
+    forces = all(limit.quantity.subject is Subject.SHAKING_FORCE for limit in problem.limits)
+    if not problem.limits or not forces or problem.phasing is None:
+        return not problem.limits
+    layout = problem.phasing.layout(*problem.phasing.geometries[0])
+    if len(even_patterns(problem.phasing.cycle, layout)) > 1:
+        return False
+    given = evaluate(problem)
+    return all(given.value(limit.quantity) <= limit.maximum for limit in problem.limits)
 
 
 def _is_amplitude(term: Term) -> bool:

@@ -33,8 +33,9 @@ from laufruhe.solve.uneven_model import Symbols, UnevenModel
 Array = NDArray[np.float64]
 
 STARTS = 6
-SOFTNESS = (1e-2, 1e-4, 1e-6, 1e-8)
+SOFTNESS = (1e-2, 1e-4, 1e-6)
 FLOOR = 1e-3
+SOFT_LIMIT = 1e-6
 REACH = math.radians(60.0)
 FEASIBLE = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
@@ -196,10 +197,16 @@ class _Program:
         rows, low, high, names = self._firing(symbols, intervals)
         for limit in problem.limits:
             unit = limit.maximum or 1.0
-            rows.append(model.norm(limit.quantity, symbols, 1e-6 * unit) / unit)
-            low.append(-math.inf)
-            high.append(limit.maximum / unit)
-            names.append(limit.name)
+            squares = model.squares(limit.quantity, symbols)
+            if squares is None:
+                row = model.norm(limit.quantity, symbols, SOFT_LIMIT * unit) / unit
+            else:
+                row = squares / unit**2
+            rows.append(row)
+            low += [-math.inf] * row.numel()
+            # the slack keeps a design that stands on a limit from breaking it by a rounding
+            high += [(limit.maximum / unit) * (1.0 - SOFT_LIMIT)] * row.numel()
+            names += [limit.name] * row.numel()
         for domain in model.domains:
             for row, most in _membership(domain, unbalances[domain.columns]):
                 rows.append(row)

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Rotor, SliderCrank
+from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.physics.mount_forces import rigid_mounting
@@ -71,21 +71,40 @@ class UnevenModel:
         self._mounting = rigid_mounting(problem.engine.mounts) if problem.engine.mounts else None
         self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
 
+    def squares(self, quantity: Quantity, at: Symbols) -> Any:
+        """Squares that must all stay under that of a limit: smooth even where the quantity is zero."""
+        if quantity.subject in MASSES or quantity.norm is Norm.SUM:
+            return None
+        if quantity.norm is Norm.RMS:
+            return self._mean_square(quantity, at)
+        signals = [self._signal(quantity, point.speed, at) for point in self._points(quantity)]
+        rows = [_rows([(h, mounts[m]) for h, mounts in s]) for s in signals for m in range(len(s[0][1]))]
+        return ca.vertcat(*(ca.sum2(row * row) for row in rows))
+
+    def _points(self, quantity: Quantity) -> list[OperatingPoint]:
+        return [p for p in self.problem.points if quantity.points is None or p.name in quantity.points]
+
+    def _mean_square(self, quantity: Quantity, at: Symbols) -> Any:
+        """By Parseval: no angles are needed."""
+        chosen = self._points(quantity)
+        whole = sum(point.weight for point in chosen)
+        total = 0.0
+        for point in chosen:
+            for h, mounts in self._signal(quantity, point.speed, at):
+                half = 1.0 if h == 0.0 else 0.5
+                total = total + point.weight / whole * half * sum(ca.sumsqr(c) for c in mounts) / len(mounts)
+        return total
+
     def norm(self, quantity: Quantity, at: Symbols, softness: Any) -> Any:
         """A quantity as one smooth expression; `softness` in its own unit (N3)."""
         if quantity.subject in MASSES:
             rows = [self._unbalance(r, at) / radius_of(r) for r in counted_rotors(quantity, self.problem.engine.rotors)]
             return ca.sum1(softened_lengths(ca.vertcat(*(row.T for row in rows)), softness))
-        chosen = [p for p in self.problem.points if quantity.points is None or p.name in quantity.points]
+        if quantity.norm is Norm.RMS:
+            return ca.sqrt(self._mean_square(quantity, at) + softness**2) - softness
+        chosen = self._points(quantity)
         whole = sum(point.weight for point in chosen)
         parts = [(point.weight / whole, self._signal(quantity, point.speed, at)) for point in chosen]
-        if quantity.norm is Norm.RMS:
-            # Parseval: no angles are needed
-            total = sum(
-                share * ca.sumsqr(c) * (1.0 if h == 0.0 else 0.5) / len(signal[0][1]) for share, signal in parts
-                for h, mounts in signal for c in mounts
-            )  # fmt: skip
-            return ca.sqrt(total + softness**2) - softness
         lengths = [
             (share, softened_lengths(_rows([(h, mounts[m]) for h, mounts in signal]), softness))
             for share, signal in parts
