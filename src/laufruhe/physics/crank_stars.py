@@ -89,7 +89,7 @@ def _joined_tables(
     waves = phase_waves(phases, orders).T
     single = [np.stack([waves, x * waves], axis=-1).reshape(phases, -1).view(float) for x in places]
     width = 1
-    while phases ** (width + 1) <= _TABLE_ROWS:
+    while width < len(places) and phases ** (width + 1) <= _TABLE_ROWS:
         width += 1
     groups = [tuple(range(k, min(k + width, len(places)))) for k in range(0, len(places), width)]
     tables = []

@@ -16,6 +16,7 @@ from laufruhe.problem.fields import Open
 from laufruhe.problem.file_models import BalancerShaftTable, EngineTable, PhasingTable, ProblemFile
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Intervals, Method, OrderCriterion, Phasing, ShaftChoice
+from laufruhe.problem.quantity import Subject
 
 Assemble = Callable[[ProblemFile], Problem]
 
@@ -66,7 +67,20 @@ def opened(file: ProblemFile, assemble: Assemble) -> Problem:
         method=Method(table.method),
     )
     _check(phasing, engine)
-    return replace(phasing.realise(_first(phasing)), phasing=phasing)
+    problem = replace(phasing.realise(_first(phasing)), phasing=phasing)
+    _check_gas(problem, phasing)
+    return problem
+
+
+def _check_gas(problem: Problem, phasing: Phasing) -> None:
+    """Uneven firing changes what gas does, and the smooth program knows inertia only."""
+    quantities = [term.quantity for term in problem.objective] + [limit.quantity for limit in problem.limits]
+    felt = any(quantity.subject in (Subject.MOUNT_FORCE, Subject.ROLL_MOMENT) for quantity in quantities)
+    if phasing.continuous and felt and any(point.gas is not None for point in problem.points):
+        raise Refused(
+            "gas", None, "acts on what is minimised or limited, and uneven throws are decided by inertia alone",
+            "leave [gas] out, or ask for shaking force and rocking couple",
+        )  # fmt: skip
 
 
 def _only_shafts(file: ProblemFile) -> None:

@@ -401,6 +401,7 @@ def _trade(phasing: Phasing, starts: Sequence[Start], found: Sequence[Uneven]) -
             continue
         intervals = _intervals(phasing, best.candidate)
         deviation = max(abs(i - even) for i in intervals)
+        deviation = deviation if deviation > 1e-9 else 0.0
         out.append(TradePoint(share * allowed, deviation, best.value, best.candidate.throws, best.kkt_residual))
     return tuple(out)
 
