@@ -42,10 +42,10 @@ def _factor(unit: str, wanted: str) -> float:
         doubled = float((2.0 * one).to(target).magnitude)
     except Exception as error:
         if type(error).__name__ == "DimensionalityError":
-            raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {_advice(wanted)}") from None
-        raise UnitError(f"unit '{unit}' is not known; {_advice(wanted)}") from None
+            raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}") from None
+        raise UnitError(f"unit '{unit}' is not known; {advice(wanted)}") from None
     if not math.isclose(doubled, 2.0 * ratio):
-        raise UnitError(f"'{unit}' has a zero of its own; {_advice(wanted)}")
+        raise UnitError(f"'{unit}' has a zero of its own; {advice(wanted)}")
     return ratio
 
 
@@ -76,7 +76,8 @@ def example(unit: str) -> str:
     return _EXAMPLES.get(unit, ("", f"1 {unit}"))[1]
 
 
-def _advice(unit: str) -> str:
+def advice(unit: str) -> str:
+    """How to write a value of this dimension."""
     return f'write for example "{example(unit)}"'
 
 
@@ -90,16 +91,16 @@ def parse(text: str, unit: str) -> float:
     """
     match = _QUANTITY.match(text)
     if match is None:
-        raise UnitError(f"is not a number with a unit; {_advice(unit)}")
+        raise UnitError(f"is not a number with a unit; {advice(unit)}")
     number, divisor, name = match.groups()
     if divisor is not None and int(divisor) == 0:
-        raise UnitError(f"divides by zero; {_advice(unit)}")
+        raise UnitError(f"divides by zero; {advice(unit)}")
     value = float(number) / (int(divisor) if divisor else 1)
     if name is None and unit:
-        raise UnitError(f"has no unit, {dimension_name(unit)} needs one; {_advice(unit)}")
+        raise UnitError(f"has no unit, {dimension_name(unit)} needs one; {advice(unit)}")
     value *= _factor(name.strip(), unit) if name else 1.0
     if not math.isfinite(value):
-        raise UnitError(f"is not finite; {_advice(unit)}")
+        raise UnitError(f"is not finite; {advice(unit)}")
     return value
 
 

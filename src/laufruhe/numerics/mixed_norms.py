@@ -72,7 +72,8 @@ def dual_norm(norm: Norm, weights: Array, z: Array) -> float:
     safe = np.where(weights > 0.0, weights, 1.0)
     if norm is Norm.SUM:
         return float((size / safe).max(initial=0.0))
-    return float(np.sqrt((size**2 / safe).sum()))
+    largest = float(size.max(initial=0.0))
+    return largest * float(np.sqrt((np.square(size / largest) / safe).sum())) if largest > 0.0 else 0.0
 
 
 def dual_feasible(norm: Norm, weights: Array, z: Array) -> Array:

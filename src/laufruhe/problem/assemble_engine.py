@@ -171,6 +171,9 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
         raise Refused("engine.slider_cranks", None, "is missing", "list at least one [[engine.slider_cranks]]")
     shafts = {"crankshaft": CRANKSHAFT}
     for k, shaft in enumerate(table.shafts):
+        if shaft.name in shafts:
+            rule = "is the name of another shaft"
+            raise Refused(f"engine.shafts[{k + 1}].name", shaft.name, rule, "give each its own name")
         with blamed_on(f"engine.shafts[{k + 1}]"):
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
     return tuple(_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks))
@@ -228,9 +231,8 @@ def mounts_of(table: MountsTable | None) -> tuple[Mount, ...]:
     for k, (name, place) in enumerate(zip(names, places, strict=True)):
         stiffness = place.relative_stiffness or table.relative_stiffness
         if not any(stiffness):
-            raise Refused(
-                f"mounts.places[{k + 1}].relative_stiffness", stiffness, "carries nothing", "give one a value"
-            )
+            own = f"places[{k + 1}]." if place.relative_stiffness else ""
+            raise Refused(f"mounts.{own}relative_stiffness", stiffness, "carries nothing", "give one a value")
         x, y, z = place.position
         mounts.append(Mount(name, (x, y, z), (stiffness[0], stiffness[1], stiffness[2]), _turned(place.turned)))
     _all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place")

@@ -7,10 +7,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
+
+# SI; squares and products of what is smaller stay finite.
+LARGEST = 1e12
+# Ratios are taken as fractions with a denominator of at most a thousand.
+SLOWEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -84,22 +89,27 @@ class Quantity:
 
     def _number(self, given: Any) -> float:
         if isinstance(given, bool) or not isinstance(given, int | float | str):
-            raise _complaint(f"is no {'number' if not self.unit else 'number with a unit'}; {units._advice(self.unit)}")
+            raise _complaint(f"is no {'number' if not self.unit else 'number with a unit'}; {units.advice(self.unit)}")
         if isinstance(given, str):
             try:
                 return units.parse(given, self.unit)
             except units.UnitError as error:
                 raise _complaint(str(error)) from None
         if self.unit and self.plain is None:
-            raise _complaint(f"has no unit, {units.dimension_name(self.unit)} needs one; {units._advice(self.unit)}")
-        value = float(given) * (self.plain if self.plain is not None else 1.0)
+            raise _complaint(f"has no unit, {units.dimension_name(self.unit)} needs one; {units.advice(self.unit)}")
+        try:
+            value = float(given) * (self.plain if self.plain is not None else 1.0)
+        except OverflowError:
+            value = math.inf
         if not math.isfinite(value):
             raise _complaint("is not finite; give a number")
         return value
 
     def _bounded(self, value: float) -> float:
+        if abs(value) > LARGEST:
+            raise _complaint(f"is beyond any engine; {units.advice(self.unit)}")
         if value <= self.above:
-            raise _complaint(f"must be more than {units.shown(self.above, self.unit)}; {units._advice(self.unit)}")
+            raise _complaint(f"must be more than {units.shown(self.above, self.unit)}; {units.advice(self.unit)}")
         if value < self.least:
             raise _complaint(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
         if value > self.most:
@@ -162,6 +172,12 @@ def _complaint(text: str) -> PydanticCustomError:
     return PydanticCustomError("laufruhe", "{text}", {"text": text})
 
 
+def _turning(ratio: float) -> float:
+    if abs(ratio) < SLOWEST:
+        raise _complaint(f"is a shaft that hardly turns; give at least {SLOWEST:g} either way")
+    return ratio
+
+
 _DEG = math.radians(1.0)
 
 Length: TypeAlias = Annotated[float, Quantity("m")]
@@ -176,7 +192,7 @@ OpenAngle: TypeAlias = Annotated[float | Open, Quantity("rad", plain=_DEG, opena
 Speed: TypeAlias = Annotated[float, Quantity("rad/s", above=0.0)]
 PistonSpeed: TypeAlias = Annotated[float, Quantity("m/s", above=0.0)]
 Time: TypeAlias = Annotated[float, Quantity("s", above=0.0)]
-Number: TypeAlias = Annotated[float, Quantity("")]
+Ratio: TypeAlias = Annotated[float, Quantity("", least=-100.0, most=100.0), AfterValidator(_turning)]
 NonNegative: TypeAlias = Annotated[float, Quantity("", least=0.0)]
 Positive: TypeAlias = Annotated[float, Quantity("", above=0.0)]
 Fraction: TypeAlias = Annotated[float | Open, Quantity("", least=-10.0, most=10.0, openable=True)]

@@ -14,9 +14,7 @@ MASS_NAMES = tuple(str(s) for s in MASSES)
 QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": [*LOAD_NAMES, *MASS_NAMES]})]
 Count: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
-FiringOrder: TypeAlias = Annotated[
-    list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")
-]
+FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
 Place: TypeAlias = Annotated[list[f.Length], Field(min_length=3, max_length=3)]
 Triple: TypeAlias = Annotated[list[f.NonNegative], Field(min_length=3, max_length=3)]
 Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60)]
@@ -40,7 +38,7 @@ class ShaftTable(Table):
     """A crankshaft of a free list of parts."""
 
     name: Name
-    ratio: f.Number = 1.0
+    ratio: f.Ratio = 1.0
     position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
 
 
@@ -255,7 +253,7 @@ class BalancerShaftTable(Table):
     """A balancer shaft."""
 
     name: Name
-    ratio: f.Number
+    ratio: f.Ratio
     position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
     unbalances: list[UnbalanceTable] = Field(min_length=1)
     optional: bool = Field(default=False, description="Whether it is built is decided too.")

@@ -87,8 +87,10 @@ def _only_shafts(file: ProblemFile) -> None:
     engine = file.engine
     for key in ("throws", "firing_order", "bank_angle", "split_pin_angle"):
         value = getattr(engine, key)
-        if value == "open" or isinstance(value, Open) or (
-            isinstance(value, list) and any(isinstance(angle, Open) for angle in value)
+        if (
+            value == "open"
+            or isinstance(value, Open)
+            or (isinstance(value, list) and any(isinstance(angle, Open) for angle in value))
         ):
             raise Refused(
                 f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", "use layout inline or vee"

@@ -92,7 +92,9 @@ def solve_program(
     y = cp.Variable(max(size, 1))
     built = cp.Variable(max(len(shaft_counts), 1), boolean=True)
     held = [*_stars(steps, space), *_shafts(built, shaft_counts, shaft_masses, most, most_mass)]
-    held += [c for d, own in zip(problem.domains, owners, strict=True) for c in _membership(d, y[d.columns], built, own)]
+    held += [
+        c for d, own in zip(problem.domains, owners, strict=True) for c in _membership(d, y[d.columns], built, own)
+    ]
     if not size:
         held.append(y == 0.0)
     unit = max((_reach(norm) for _, norm in problem.terms), default=0.0) or 1.0
@@ -171,9 +173,7 @@ def _stars(steps: Any, space: StarSpace) -> list[Any]:
     return held
 
 
-def _shafts(
-    built: Any, counts: Sequence[int], masses: Sequence[float], most: float, most_mass: float
-) -> list[Any]:
+def _shafts(built: Any, counts: Sequence[int], masses: Sequence[float], most: float, most_mass: float) -> list[Any]:
     if not counts:
         return [built == 0]
     held = []

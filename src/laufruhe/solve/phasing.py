@@ -93,7 +93,9 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
         )
     families, reason = families_of(phasing)
     if not families:
-        return _none(problem, f"no star exists: {reason}") if not phasing.continuous else _uneven(problem, phasing, None)
+        return (
+            _none(problem, f"no star exists: {reason}") if not phasing.continuous else _uneven(problem, phasing, None)
+        )
     answer = _searched(problem, phasing, families)
     if not answer.designs:
         if answer.complete:
@@ -326,7 +328,9 @@ def phase_decisions(
     if phasing.throws is None:
         given = [part.throw for part in problem.engine.slider_cranks]
         layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
-        before = [given[layout.pins.index(pin)] - layout.pin_offsets[layout.pins.index(pin)] for pin in set(layout.pins)]
+        before = [
+            given[layout.pins.index(pin)] - layout.pin_offsets[layout.pins.index(pin)] for pin in set(layout.pins)
+        ]
         for k, (angle, was) in enumerate(zip(candidate.throws, before, strict=True)):
             low, high = phasing.throw_bounds[k] if phasing.throw_bounds else (0.0, math.tau)
             out.append(DecisionValue(f"throw {k + 1}", angle, "rad", low, high, was % math.tau, False))

@@ -70,7 +70,11 @@ def families_of(phasing: Phasing) -> tuple[tuple[Family, ...], str]:
             throws = len(layout.throw_positions)
             reason = (
                 f"phasing.phases = {phasing.steps} conflicts with {throws} throws: "
-                + (f"{phasing.steps} phases are more than {throws} throws can take, and " if phasing.steps > throws else "")
+                + (
+                    f"{phasing.steps} phases are more than {throws} throws can take, and "
+                    if phasing.steps > throws
+                    else ""
+                )
                 + f"even firing stands on {steps}; leave phases out, or allow uneven intervals"
             )
             continue

@@ -155,8 +155,10 @@ def search_stars(
             return np.ones(len(partial.stars), dtype=bool)
         limit = best.cut
         # stars equal to the last one wanted are kept out: any of them will do
-        return bounds.beyond(partial, limit * (1.0 - SLACK)) if np.isfinite(limit) else np.zeros(
-            len(partial.stars), dtype=bool
+        return (
+            bounds.beyond(partial, limit * (1.0 - SLACK))
+            if np.isfinite(limit)
+            else np.zeros(len(partial.stars), dtype=bool)
         )
 
     for block in space.blocks(prune):
@@ -274,9 +276,11 @@ def directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
 def _shares(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Array]:
     """Sizes of v on the heavy orders: a term of several orders divides its unit between them."""
     grid = [np.array(s) for s in itertools.product((0.25, 0.6, 0.95), repeat=len(heavy))] if len(heavy) > 1 else []
-    grid = [np.ones(len(heavy)), *grid] if any(_orders_of(t, heavy) > 1 for t in objective.terms) else [
-        np.ones(len(heavy))
-    ]
+    grid = (
+        [np.ones(len(heavy)), *grid]
+        if any(_orders_of(t, heavy) > 1 for t in objective.terms)
+        else [np.ones(len(heavy))]
+    )
     for raw in grid:
         sizes = np.zeros(len(heavy))
         for term in objective.terms:

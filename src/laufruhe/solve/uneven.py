@@ -285,9 +285,7 @@ class _Program:
         lower, upper = np.array(low), np.array(high)
         return lower, upper, np.clip(x0, lower, upper)
 
-    def _firing(
-        self, at: Symbols, intervals: Intervals
-    ) -> tuple[list[Any], list[float], list[float], list[str]]:
+    def _firing(self, at: Symbols, intervals: Intervals) -> tuple[list[Any], list[float], list[float], list[str]]:
         """Firing intervals, linear in throws, bank and split pin (S20)."""
         layout, start, cycle = self._model.layout, self._start, self._phasing.cycle
         order = start.firing_order or ()
@@ -326,8 +324,10 @@ def _is_open(bounds: tuple[float, float] | None) -> bool:
 
 def _size(quantity: Quantity, even: Uneven | None, problem: Problem) -> float:
     """What a term is measured in: its value in the design as given, never far below it."""
-    return evaluate(problem).value(quantity) if even is None else max(
-        even.result.final.value(quantity), FLOOR * even.result.initial.value(quantity)
+    return (
+        evaluate(problem).value(quantity)
+        if even is None
+        else max(even.result.final.value(quantity), FLOOR * even.result.initial.value(quantity))
     )
 
 
@@ -346,7 +346,9 @@ def _starts(problem: Problem, phasing: Phasing, even: Result | None) -> list[Sta
     """Designs to start from: the ranked even stars, or the middle of the throws' own bounds."""
     if even is not None and even.phasing is not None:
         return [
-            Start(Candidate(s.throws, s.firing_orders[0].order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts)))
+            Start(
+                Candidate(s.throws, s.firing_orders[0].order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts))
+            )
             for s in even.phasing.ranking
             if s.firing_orders
         ]
@@ -390,9 +392,11 @@ def _trade(phasing: Phasing, starts: Sequence[Start], found: Sequence[Uneven]) -
     for share in TRADE_STEPS:
         low = even - share * (even - phasing.intervals.least)
         high = even + share * (phasing.intervals.most - even)
-        answers = list(found) if share == 1.0 else [
-            answer for s in starts[:3] if (answer := local_optimum(phasing, s, Intervals(low, high))) is not None
-        ]
+        answers = (
+            list(found)
+            if share == 1.0
+            else [answer for s in starts[:3] if (answer := local_optimum(phasing, s, Intervals(low, high))) is not None]
+        )
         if not answers:
             continue
         best = min(answers, key=lambda answer: answer.value)

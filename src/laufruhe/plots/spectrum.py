@@ -1,0 +1,115 @@
+"""What orders of crank speed the loads are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from laufruhe.physics.metrics import order_amplitude
+from laufruhe.plots.style import FAINT, colours_of, heading, names_of, page, point_name, source_line
+from laufruhe.problem.evaluation import Evaluation, PointLoads
+from laufruhe.report.measures import changed, hardest_point, mount_orders, padded
+from laufruhe.solve.result import Result
+
+Array = NDArray[np.float64]
+Panel = tuple[str, Callable[[PointLoads], Array]]
+
+SHARE = 0.005
+LAST_ORDER = 24.0
+SHORTEST = 6.0
+NOTHING = 1e-9
+
+
+def figure(result: Result) -> Figure:
+    """Mount forces by order; of an engine without mounts, the shaking force and its couples."""
+    k = hardest_point(result)
+    designs = [result.initial, result.final] if changed(result) else [result.final]
+    with_mounts = bool(result.problem.engine.mounts)
+    panels = _mount_panels(result) if with_mounts else _shaking_panels()
+    base = _base(designs[0], k, with_mounts)
+    amplitudes = [_seen([measure(design.loads[k]) for design in designs], base) for _, measure in panels]
+    last = base * max(len(series[0]) - 1 for series in amplitudes)
+    drawn = page(len(panels), 1, (6.4, 3.4 if len(panels) == 1 else 1.75))
+    for axes, (label, _), series in zip(drawn.panels, panels, amplitudes, strict=True):
+        _bars(axes, series, base, colours_of(result))
+        _frame(axes, label, series, last)
+        axes.tick_params(labelbottom=axes is drawn.panels[-1])
+    drawn.panels[-1].set_xlabel("order, multiples of crank speed")
+    title = "Mount forces by order" if with_mounts else "Shaking force and couples by order"
+    heading(drawn.figure, title, _subtitle(result, k, with_mounts), _legend(result), source_line(result))
+    return drawn.figure
+
+
+def _mount_panels(result: Result) -> list[Panel]:
+    count = len(result.problem.engine.mounts)
+
+    def mean(loads: PointLoads) -> Array:
+        forces = loads.mount_forces
+        return np.zeros(1) if forces is None else mount_orders(forces).mean(axis=1)
+
+    return [("amplitude [N]" if count == 1 else f"amplitude, mean of {count} mounts [N]", mean)]
+
+
+def _shaking_panels() -> list[Panel]:
+    def part(components: slice) -> Callable[[PointLoads], Array]:
+        return lambda loads: order_amplitude(loads.wrench.coefficients[:, components])
+
+    return [
+        ("shaking force [N]", part(slice(0, 3))),
+        ("rocking couple [N m]", part(slice(4, 6))),
+        ("roll moment [N m]", part(slice(3, 4))),
+    ]
+
+
+def _base(design: Evaluation, k: int, with_mounts: bool) -> float:
+    loads = design.loads[k]
+    return float(loads.mount_forces.base if with_mounts and loads.mount_forces is not None else loads.wrench.base)
+
+
+def _seen(series: list[Array], base: float) -> list[Array]:
+    """Amplitudes up to the last order that can be seen beside the largest, all of one length."""
+    length = max(len(values) for values in series)
+    table = np.stack([padded(values, length) for values in series])
+    seen = np.flatnonzero(table.max(axis=0) > SHARE * float(table.max(initial=0.0)))
+    last = min(int(seen[-1]) if len(seen) else 0, int(LAST_ORDER / base))
+    return list(table[:, : last + 1])
+
+
+def _bars(axes: Axes, series: list[Array], base: float, colours: tuple[str, ...]) -> None:
+    table = np.stack(series)
+    drawn = np.flatnonzero(table.max(axis=0) > NOTHING * float(table.max(initial=0.0)))
+    apart = float(np.diff(drawn).min(initial=2)) * base
+    width = 0.8 * min(1.0, apart) / len(series)
+    for k, (values, colour) in enumerate(zip(series, colours, strict=True)):
+        places = drawn * base + (k - 0.5 * (len(series) - 1)) * width
+        axes.bar(places, values[drawn], width, color=colour, linewidth=0)
+
+
+def _frame(axes: Axes, label: str, series: list[Array], last: float) -> None:
+    top = max(float(values.max(initial=0.0)) for values in series)
+    axes.set(xlim=(-0.6, max(last, SHORTEST) + 0.6), ylim=(0.0, 1.1 * top if top > 0.0 else 1.0), ylabel=label)
+    axes.xaxis.set_major_locator(MaxNLocator(12, integer=True))
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+    axes.grid(axis="x", visible=False)
+    axes.tick_params(axis="x", length=2)
+    if top <= 0.0:
+        axes.set_yticks([])
+        axes.text(0.5, 0.5, "none: balanced", transform=axes.transAxes, ha="center", va="center", color=FAINT)
+
+
+def _subtitle(result: Result, k: int, with_mounts: bool) -> str:
+    what = "Amplitude of the force on a mount" if with_mounts else "Amplitude of the load on the block"
+    return f"{what} at {point_name(result, k)}; order 0 is the steady part."
+
+
+def _legend(result: Result) -> list[Artist]:
+    return [
+        Patch(facecolor=colour, label=name) for colour, name in zip(colours_of(result), names_of(result), strict=True)
+    ]

@@ -1,0 +1,1 @@
+"""Results as files and tables: `result.json`, `report.md`, and what the screen shows."""

@@ -1,0 +1,120 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from laufruhe.errors import Complaint, InputError
+
+RESULT = "result.json"
+REPORT = "report.md"
+PICTURES = ("polar.png", "bars.png", "spectrum.png", "star.png", "firings.png", "trade.png")
+RESULT_FILES = (RESULT, REPORT, *PICTURES)
+
+
+@contextmanager
+def staged(folder: Path, option: str, names: Collection[str] = RESULT_FILES) -> Iterator[Path]:
+    """A hidden folder whose files move into `folder` when all of them are made.
+
+    Whether `folder` can be written is found out on entry. After an error or an
+    interrupt it is as it was before.
+
+    Parameters
+    ----------
+    folder
+        Made if it does not exist.
+    option
+        Names the culprit in a complaint.
+    names
+        The files that may be made. One that is not made this time is removed from
+        `folder`: it would show another result.
+
+    Raises
+    ------
+    InputError
+        If nothing can be written to `folder`.
+    """
+    made: list[Path] = []
+    try:
+        _make(folder, made)
+        _check_free(folder, names)
+        stage = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
+    except OSError as error:
+        _remove_empty(made)
+        raise _refused(option, folder, error) from None
+    try:
+        yield stage
+        _move(stage, folder, names)
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+        _remove_empty(made)
+
+
+@contextmanager
+def staged_file(path: Path, option: str) -> Iterator[Path]:
+    """A place to write one file to; it becomes `path` when it is whole.
+
+    Raises
+    ------
+    InputError
+        If `path` cannot be written.
+    """
+    path = path.resolve()
+    if path.exists() and not path.is_file() and not path.is_dir():
+        # a device or a pipe takes text, and must not be replaced by a file
+        yield path
+        return
+    if path.is_dir():
+        raise InputError("laufruhe", (Complaint(option, str(path), "is a folder", "name a file in it"),))
+    if path.is_file() and not os.access(path, os.W_OK):
+        raise InputError("laufruhe", (Complaint(option, str(path), "cannot be written", "check its permissions"),))
+    with staged(path.parent, option, (path.name,)) as stage:
+        yield stage / path.name
+
+
+def write(path: Path, text: str) -> None:
+    """Text as UTF-8, the same on every system."""
+    # a file name that is no text leaves lone surrogates behind; JSON writes them as \udcxx
+    path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def _make(folder: Path, made: list[Path]) -> None:
+    missing = []
+    while not folder.exists() and not folder.is_symlink():
+        missing.append(folder)
+        folder = folder.parent
+    for path in reversed(missing):
+        path.mkdir()
+        made.append(path)
+    if not folder.is_dir():
+        raise NotADirectoryError(f"'{folder}' is not a folder")
+
+
+def _check_free(folder: Path, names: Collection[str]) -> None:
+    for name in names:
+        if (folder / name).is_dir():
+            raise IsADirectoryError(f"'{name}' is a folder there")
+
+
+def _move(stage: Path, folder: Path, names: Collection[str]) -> None:
+    ready = sorted(stage.iterdir())
+    for file in ready:
+        os.replace(file, folder / file.name)
+    for name in set(names) - {file.name for file in ready}:
+        (folder / name).unlink(missing_ok=True)
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in reversed(folders):
+        with suppress(OSError):
+            folder.rmdir()
+
+
+def _refused(option: str, folder: Path, error: OSError) -> InputError:
+    why = error.strerror or str(error)
+    return InputError("laufruhe", (Complaint(option, str(folder), f"cannot be written ({why})", "name another place"),))

@@ -1,0 +1,103 @@
+"""What tables, files and pictures read from an evaluation: mount forces and orders, point by point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.metrics import CycleMeasures, cycle_measures, order_amplitude
+from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, PointLoads, over
+from laufruhe.problem.model import Limit
+from laufruhe.solve.result import LimitValue, Result
+
+Array = NDArray[np.float64]
+
+# An order counts as present from this share of the largest on.
+PRESENT = 1e-3
+
+
+@dataclass(frozen=True)
+class MountMeasures:
+    """One mount at one operating point, as given and as decided."""
+
+    point: str
+    mount: str
+    initial: CycleMeasures
+    final: CycleMeasures
+
+
+def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
+    """Mount forces at operating point k over the whole cycle, shape (samples, mounts, 3) [N]."""
+    forces = evaluation.loads[k].mount_forces
+    if forces is None:
+        raise ValueError("an engine without mounts has no mount forces")
+    return over(evaluation.engine.cycle.base_order, [forces])[0].sample(finer * evaluation.samples)
+
+
+def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
+    """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
+    samples, fine = mount_samples(evaluation, k), mount_samples(evaluation, k, PEAK_REFINEMENT)
+    return [replace(cycle_measures(samples[:, m]), max=cycle_measures(fine[:, m]).max) for m in range(samples.shape[1])]
+
+
+def mount_measures(result: Result) -> list[MountMeasures]:
+    """Of every operating point and mount, in the order of the problem."""
+    if not result.problem.engine.mounts:
+        return []
+    names = result.initial.mount_names
+    return [
+        MountMeasures(point.name, name, before, after)
+        for k, point in enumerate(result.problem.points)
+        for name, before, after in zip(names, measured(result.initial, k), measured(result.final, k), strict=True)
+    ]
+
+
+def hardest_point(result: Result) -> int:
+    """The operating point whose loads are largest in the design as given."""
+    sizes = [float(np.abs(main_load(loads).coefficients).max(initial=0.0)) for loads in result.initial.loads]
+    return int(np.argmax(sizes))
+
+
+def main_load(loads: PointLoads) -> Spectrum:
+    """Mount forces, or the shaking force of an engine without mounts."""
+    return loads.wrench if loads.mount_forces is None else loads.mount_forces
+
+
+def mount_orders(spectrum: Spectrum) -> Array:
+    """Amplitude by order of every mount's force, shape (orders, mounts) [N]."""
+    return order_amplitude(spectrum.coefficients)
+
+
+def shaking_orders(wrench: Spectrum) -> tuple[Array, Array]:
+    """Amplitude by order of the shaking force [N] and of the moment about the origin of C2 [N m]."""
+    return order_amplitude(wrench.coefficients[:, :3]), order_amplitude(wrench.coefficients[:, 3:])
+
+
+def padded(values: Array, length: int) -> Array:
+    """Zeros for orders that one of two designs does not have."""
+    return np.pad(values, [(0, length - len(values))] + [(0, 0)] * (values.ndim - 1))
+
+
+def limits_of(result: Result) -> tuple[LimitValue, ...]:
+    """Limits as solved, or how an evaluated design stands to those of its problem."""
+    if result.limits:
+        return result.limits
+    return tuple(_stated(limit, result.final.value(limit.quantity)) for limit in result.problem.limits)
+
+
+def is_met(limit: LimitValue) -> bool:
+    """Whether the design keeps a limit, up to the rounding of a solver."""
+    return limit.value <= limit.limit * (1.0 + 1e-6) + 1e-12
+
+
+def changed(result: Result) -> bool:
+    """Whether the design is another than the one given."""
+    return result.final is not result.initial
+
+
+def _stated(limit: Limit, value: float) -> LimitValue:
+    active = value >= limit.maximum * (1.0 - 1e-5)
+    return LimitValue(limit.name, value, limit.maximum, limit.quantity.unit, active, 0.0)

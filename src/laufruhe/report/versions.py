@@ -1,0 +1,21 @@
+"""Versions that a result was made with."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+
+PACKAGES = ("laufruhe", "numpy", "cvxpy", "clarabel")
+
+
+def version_of(package: str) -> str:
+    """Version as installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def versions() -> dict[str, str]:
+    """Of everything that numbers hang on."""
+    return {"python": platform.python_version(), **{name: version_of(name) for name in PACKAGES}}

@@ -1,0 +1,209 @@
+"""Pictures show the evaluation's own numbers, and come out as whole PNG files."""
+
+from __future__ import annotations
+
+import struct
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from cli import scenes
+from laufruhe.plots import bars, draw, polar, spectrum
+from laufruhe.plots.style import DPI, fitted
+from laufruhe.report.measures import measured, mount_orders, mount_samples
+from laufruhe.solve import Result
+
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+
+def texts(figure: Figure) -> str:
+    found = [text.get_text() for text in figure.texts]
+    found += [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    return "\n".join(found)
+
+
+def size_of(path: Path) -> tuple[int, int]:
+    data = path.read_bytes()
+    assert data.startswith(SIGNATURE)
+    assert data.rstrip().endswith(b"IEND\xaeB`\x82")
+    return struct.unpack(">II", data[16:24])
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        (scenes.TIGHT, ("polar.png", "bars.png", "spectrum.png")),
+        (scenes.TWO_POINTS, ("polar.png", "bars.png", "spectrum.png")),
+        (scenes.PARTS, ("polar.png", "bars.png", "spectrum.png")),
+        (scenes.SHAKING_ONLY, ("spectrum.png",)),
+    ],
+)
+def test_pictures_are_whole(text: str, names: tuple[str, ...], tmp_path: Path) -> None:
+    result = scenes.solved(text)
+    assert draw(result, tmp_path) == names
+    assert {path.name for path in tmp_path.iterdir()} == set(names)
+    makers = {"polar.png": polar.figure, "bars.png": bars.figure, "spectrum.png": spectrum.figure}
+    for name in names:
+        inches = makers[name](result).get_size_inches()
+        assert size_of(tmp_path / name) == tuple(int(DPI * side) for side in inches)
+        assert (tmp_path / name).stat().st_size > 10_000
+
+
+def test_polar_diagrams_are_the_samples() -> None:
+    result = scenes.solved(scenes.TIGHT)
+    figure = polar.figure(result)
+    assert len(figure.axes) == 4
+    for m, axes in enumerate(figure.axes):
+        lines = {line.get_label(): line.get_xydata() for line in axes.lines}
+        for label, design in (("as given", result.initial), ("as decided", result.final)):
+            samples = mount_samples(design, 0)[:, m, 1:]
+            assert np.array_equal(np.asarray(lines[label])[:-1], samples)
+            assert np.array_equal(np.asarray(lines[label])[-1], samples[0])
+
+
+def test_polar_diagrams_share_one_scale() -> None:
+    figure = polar.figure(scenes.solved(scenes.PARTS))
+    assert len({(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes}) == 1
+    for axes in figure.axes:
+        assert axes.get_aspect() == 1.0
+        box = axes.get_position()
+        wide, high = figure.get_size_inches() * (box.width, box.height)
+        spans = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
+        assert wide / high == pytest.approx(spans[0] / spans[1], rel=1e-9)
+
+
+def test_bars_are_mean_and_maximum() -> None:
+    result = scenes.solved(scenes.TIGHT)
+    axes = bars.figure(result).axes[0]
+    heights = [[bar.get_height() for bar in container] for container in axes.containers]
+    for k, design in enumerate((result.initial, result.final)):
+        each = measured(design, 0)
+        assert heights[2 * k][:4] == [measures.mean for measures in each]
+        assert heights[2 * k + 1][:4] == [measures.max for measures in each]
+        assert heights[2 * k + 1][4] == max(measures.max for measures in each)
+    assert result.objective is not None
+    assert heights[2][4] == pytest.approx(result.objective.value, rel=1e-12)
+
+
+def test_a_spectrum_is_the_mean_amplitude() -> None:
+    result = scenes.solved(scenes.TIGHT)
+    axes = spectrum.figure(result).axes[0]
+    for container, design in zip(axes.containers, (result.initial, result.final), strict=True):
+        forces = design.loads[0].mount_forces
+        assert forces is not None
+        mean = mount_orders(forces).mean(axis=1)
+        drawn = {round(2 * (bar.get_x() + bar.get_width() / 2)) / 2: bar.get_height() for bar in container}
+        for order, height in drawn.items():
+            assert height == pytest.approx(mean[int(order / float(forces.base))], rel=1e-12)
+        assert set(drawn) >= {2.0, 4.0}
+
+
+@pytest.mark.parametrize("maker", [polar.figure, bars.figure, spectrum.figure])
+def test_an_evaluated_design_has_one_series(maker: object) -> None:
+    assert callable(maker)
+    given, decided = texts(maker(scenes.stated(scenes.TIGHT))), texts(maker(scenes.solved(scenes.TIGHT)))
+    assert "as given" in given
+    assert "as decided" not in given
+    assert "as decided" in decided
+
+
+def test_an_engine_without_mounts_shows_shaking_loads() -> None:
+    figure = spectrum.figure(scenes.solved(scenes.SHAKING_ONLY))
+    assert [axes.get_ylabel().split(" [")[0] for axes in figure.axes] == [
+        "shaking force",
+        "rocking couple",
+        "roll moment",
+    ]
+    assert any(text.get_text() == "none: balanced" for text in figure.axes[1].texts)
+
+
+def test_each_operating_point_has_its_bars() -> None:
+    figure = bars.figure(scenes.solved(scenes.TWO_POINTS))
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["at idle", "at rated"]
+    assert "rated (largest loads of 2 points)" in texts(polar.figure(scenes.solved(scenes.TWO_POINTS)))
+
+
+def drawn_texts(figure: Figure) -> list[Text]:
+    """Texts that can be seen; matplotlib keeps labels of ticks beyond the ends of an axis."""
+    figure.canvas.draw()
+    hidden = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            hidden |= {tick.label1 for tick in axis.get_major_ticks() if not low <= tick.get_loc() <= high}
+    return [t for t in figure.findobj(Text) if t.get_visible() and t.get_text().strip() and t not in hidden]
+
+
+def overlaps(figure: Figure) -> list[tuple[str, str]]:
+    """Pairs of texts that lie on each other."""
+    boxes = [(t.get_text(), t.get_window_extent()) for t in drawn_texts(figure)]
+    return [
+        (a, b)
+        for k, (a, first) in enumerate(boxes)
+        for b, second in boxes[k + 1 :]
+        if min(first.x1, second.x1) - max(first.x0, second.x0) > 1.0
+        and min(first.y1, second.y1) - max(first.y0, second.y0) > 1.0
+    ]
+
+
+def many_mounts(count: int) -> str:
+    places = ", ".join(f'["{100 * k} mm", "{250 - 500 * (k % 2)} mm", "0 mm"]' for k in range(count))
+    start, _, rest = scenes.TIGHT.partition("[mounts]")
+    return f"{start}[mounts]\npositions = [{places}]\n{rest[rest.index('[[balancer_shafts]]') :]}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [scenes.TIGHT, scenes.TWO_POINTS, scenes.PARTS, many_mounts(3), many_mounts(7), many_mounts(20)],
+    ids=["tight", "two points", "parts", "three mounts", "seven mounts", "twenty mounts"],
+)
+@pytest.mark.parametrize("maker", [polar.figure, bars.figure, spectrum.figure])
+def test_no_text_lies_on_another(maker: object, text: str) -> None:
+    assert callable(maker)
+    result = scenes.solved(text) if text in (scenes.TIGHT, scenes.TWO_POINTS, scenes.PARTS) else scenes.stated(text)
+    figure = maker(result)
+    assert overlaps(figure) == []
+    width, height = figure.get_size_inches() * DPI
+    for entry in [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]:
+        box = entry.get_window_extent()
+        assert 0.0 <= box.x0 <= box.x1 <= width
+        assert 0.0 <= box.y0 <= box.y1 <= height
+
+
+def renamed(result: Result, name: str) -> Result:
+    def with_name(design: object) -> object:
+        engine = design.engine
+        mounts = tuple(replace(mount, name=f"{name} {k}") for k, mount in enumerate(engine.mounts))
+        return replace(design, engine=replace(engine, mounts=mounts))
+
+    problem = with_name(result.problem)
+    return replace(result, problem=problem, initial=with_name(result.initial), final=with_name(result.final))
+
+
+@pytest.mark.parametrize("name", ["$a$ and $b", "\\frac{", "发动机", "a" * 60, "{x}", "%d"])
+def test_any_name_can_be_drawn(name: str, tmp_path: Path) -> None:
+    assert len(draw(renamed(scenes.solved(scenes.TIGHT), name), tmp_path)) == 3
+
+
+def test_long_lines_are_cut() -> None:
+    assert fitted("a  b\nc", 8.0, 9.0) == "a b c"
+    assert fitted("x" * 500, 8.0, 9.0).endswith("…")
+
+
+def test_pictures_need_no_pyplot_and_change_no_settings(tmp_path: Path) -> None:
+    path = scenes.written(tmp_path, scenes.GIVEN)
+    code = (
+        "import sys; from pathlib import Path; import matplotlib as mpl; before = dict(mpl.rcParams)\n"
+        "from laufruhe.problem.reader import load; from laufruhe.solve import state; from laufruhe.plots import draw\n"
+        "draw(state(load(sys.argv[1])), Path(sys.argv[2]))\n"
+        "assert 'matplotlib.pyplot' not in sys.modules\n"
+        "assert dict(mpl.rcParams) == before\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, path, tmp_path], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,55 @@
+"""The contract of result.json as a JSON schema, written down a second time on purpose."""
+
+from __future__ import annotations
+
+from typing import Any
+
+NUMBER = {"type": "number"}
+MAYBE = {"type": ["number", "null"]}
+TEXT = {"type": "string"}
+
+
+def table(**properties: Any) -> dict[str, Any]:
+    """An object that has all of these keys; it may have more."""
+    return {"type": "object", "properties": properties, "required": list(properties)}
+
+
+def array(items: Any) -> dict[str, Any]:
+    return {"type": "array", "items": items}
+
+
+ORDERS = array(table(order=NUMBER, amplitude=NUMBER))
+MOUNT = table(name=TEXT, mean=NUMBER, max=NUMBER, rms=NUMBER, orders=ORDERS)
+SHAKING = table(orders=array(NUMBER), force=array(NUMBER), moment=array(NUMBER))
+DECISION = table(value=NUMBER, unit=TEXT, lower=NUMBER, upper=NUMBER, at_bound={"type": "boolean"})
+CONSTRAINT = table(
+    name=TEXT, value=NUMBER, limit=NUMBER, unit=TEXT, active={"type": "boolean"}, shadow_price=MAYBE
+)  # fmt: skip
+SCHEMA = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    **table(
+        problem=TEXT,
+        status={"enum": ["optimal", "feasible", "infeasible", "failed"]},
+        objective={"anyOf": [{"type": "null"}, table(name=TEXT, value=NUMBER, unit=TEXT, initial=NUMBER)]},
+        certificate={
+            "anyOf": [
+                {"type": "null"},
+                table(
+                    kind={"enum": ["global", "global within gap", "local", "none"]},
+                    lower_bound=NUMBER,
+                    gap=NUMBER,
+                    kkt_residual=NUMBER,
+                    method=TEXT,
+                ),
+            ]
+        },
+        decisions={"type": "object", "additionalProperties": DECISION},
+        constraints=array(CONSTRAINT),
+        mounts=array(MOUNT),
+        shaking=SHAKING,
+        firing_intervals=array(NUMBER),
+        fidelity=table(kinematics=TEXT, samples={"type": "integer"}, error_estimate=MAYBE),
+        timing={"type": "object", "additionalProperties": NUMBER},
+        versions={"type": "object", "additionalProperties": TEXT},
+    ),
+}

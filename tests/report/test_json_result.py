@@ -1,0 +1,111 @@
+"""result.json: the contract with scripts."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+from cli import scenes
+from laufruhe.problem.quantity import MEASURES, Quantity, Subject
+from laufruhe.report.json_result import as_json
+from laufruhe.solve import Result
+from report.result_schema import SCHEMA
+
+RESULTS = {
+    "shaking only": lambda: scenes.solved(scenes.SHAKING_ONLY),
+    "tight": lambda: scenes.solved(scenes.TIGHT),
+    "impossible": lambda: scenes.solved(scenes.IMPOSSIBLE),
+    "two points": lambda: scenes.solved(scenes.TWO_POINTS),
+    "parts": lambda: scenes.solved(scenes.PARTS),
+    "given": lambda: scenes.stated(scenes.GIVEN),
+}
+
+
+def parsed(result: Result) -> dict[str, Any]:
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is no JSON")
+
+    found: dict[str, Any] = json.loads(as_json(result), parse_constant=refuse)
+    return found
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_result_keeps_the_contract(name: str) -> None:
+    Draft202012Validator(SCHEMA).validate(parsed(RESULTS[name]()))
+
+
+def test_the_schema_finds_what_is_missing() -> None:
+    written = parsed(scenes.solved(scenes.TIGHT))
+    del written["certificate"]["gap"]
+    assert not Draft202012Validator(SCHEMA).is_valid(written)
+
+
+def test_numbers_are_those_of_the_result() -> None:
+    result = scenes.solved(scenes.TIGHT)
+    written = parsed(result)
+    assert result.objective is not None
+    assert result.certificate is not None
+    # full precision: what is read back is the same float
+    assert written["objective"]["value"] == result.objective.value
+    assert written["objective"]["initial"] == result.objective.initial
+    assert written["certificate"]["lower_bound"] == result.certificate.lower_bound
+    assert written["decisions"]["left.unbalance"]["value"] == result.decisions[0].value
+    assert written["constraints"][0]["shadow_price"] == result.limits[0].shadow_price > 0.0
+    assert written["constraints"][0]["active"]
+    assert written["firing_intervals"] == [math.pi] * 4
+    assert written["timing"] == result.timing
+
+
+def test_mounts_agree_with_the_model() -> None:
+    result = scenes.solved(scenes.TIGHT)
+    for mount in parsed(result)["mounts"]:
+        for measure, key in (("mean", "mean"), ("maximum", "max"), ("rms", "rms")):
+            quantity = Quantity(Subject.MOUNT_FORCE, MEASURES[measure], mounts=(mount["name"],))
+            assert mount[key] == pytest.approx(result.final.value(quantity), rel=1e-12)
+            assert mount["initial"][key] == pytest.approx(result.initial.value(quantity), rel=1e-12)
+
+
+def test_mounts_over_two_points_are_weighted() -> None:
+    result = scenes.solved(scenes.TWO_POINTS)
+    written = parsed(result)
+    assert [point["name"] for point in written["points"]] == ["idle", "rated"]
+    mean = np.mean([mount["mean"] for mount in written["mounts"]])
+    assert result.objective is not None
+    assert mean == pytest.approx(result.objective.value, rel=1e-9)
+    for k, mount in enumerate(written["mounts"]):
+        idle, rated = (point["mounts"][k] for point in written["points"])
+        assert mount["mean"] == pytest.approx(0.25 * idle["mean"] + 0.75 * rated["mean"])
+        assert mount["max"] == rated["max"]
+
+
+def test_shaking_orders_are_amplitudes_of_the_wrench() -> None:
+    result = scenes.solved(scenes.SHAKING_ONLY)
+    shaking = parsed(result)["shaking"]
+    wrench = result.final.loads[0].wrench
+    # one direction only: the amplitude is the coefficient's size
+    k = shaking["orders"].index(4.0)
+    assert shaking["force"][k] == pytest.approx(abs(wrench.at(4.0)[2]), rel=1e-12)
+    whole = np.array(shaking["real"]) + 1j * np.array(shaking["imag"])
+    assert whole[k] == pytest.approx(wrench.at(4.0))
+
+
+def test_infeasible_has_no_objective() -> None:
+    written = parsed(scenes.solved(scenes.IMPOSSIBLE))
+    assert written["status"] == "infeasible"
+    assert written["objective"] is None
+    assert written["certificate"] is None
+    assert written["decisions"] == {}
+    assert set(written["conflict"]) == {"light shafts", "quiet mounts"}
+    assert [entry["met"] for entry in written["constraints"]] == [True, False, True]
+
+
+@pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_is_null(odd: float) -> None:
+    result = replace(scenes.solved(scenes.TIGHT), error_estimate=odd)
+    assert parsed(result)["fidelity"]["error_estimate"] is None
