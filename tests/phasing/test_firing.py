@@ -89,7 +89,7 @@ def test_orders_of_a_star(cycle, layout, star, count, one):
         engine = Engine("even", cycle, parts)
         assert engine.slider_cranks[0].firing_angle == pytest.approx(0.0, abs=1e-12)
         assert engine.firing_intervals == pytest.approx([cycle.angle / len(order)] * len(order), rel=1e-12)
-        turns = firing_turns(cycle, layout, throws, order)
+        turns = firing_turns(layout, throws, order)
         assert intervals_of(cycle, turns) == pytest.approx(engine.firing_intervals, rel=1e-9)
         assert order_content(cycle, turns) == pytest.approx(0.0, abs=1e-9)
 
@@ -100,7 +100,7 @@ def test_orders_are_all_there_are():
     by_laps = {
         order
         for order in lap_orders(FOUR, layout, throws)
-        if max(i := intervals_of(FOUR, firing_turns(FOUR, layout, throws, order))) - min(i) < 1e-9
+        if max(i := intervals_of(FOUR, firing_turns(layout, throws, order))) - min(i) < 1e-9
     }
     assert by_laps == set(even_orders(FOUR, layout, star))
 
@@ -113,6 +113,6 @@ def test_measures_of_orders():
     order = next(even_orders(FOUR, cross, (0, 1, 3, 2)))
     throws = star_throws(cross, (0, 1, 3, 2), 4)
     # two left-hand or right-hand cylinders follow each other somewhere in a cross-plane V8
-    assert longest_bank_gap(FOUR, cross, order, firing_turns(FOUR, cross, throws, order)) > math.radians(180.0)
+    assert longest_bank_gap(FOUR, cross, order, firing_turns(cross, throws, order)) > math.radians(180.0)
     # two cylinders at 180 and 540 deg leave all of order 1 (S9): |1 + e^{-i pi}| = 0 there, half orders stay
     assert order_content(FOUR, (0.0, 0.5)) == pytest.approx(abs(1 + complex(0, -1)) / 2)

@@ -162,7 +162,7 @@ def even_orders(cycle: Cycle, layout: Layout, steps: Sequence[int]) -> Iterator[
             yield tuple(order)
 
 
-def firing_turns(cycle: Cycle, layout: Layout, throws: Sequence[float], order: Sequence[int]) -> tuple[float, ...]:
+def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) -> tuple[float, ...]:
     """Turn of the crank at which each cylinder of the order fires, ascending from 0."""
     start, out = None, []
     previous = -_SAME

@@ -18,7 +18,7 @@ def phasing_grids(result: Result) -> list[Grid]:
     if result.phasing is None:
         return []
     phasing = result.phasing
-    grids = [_stars(result, phasing), _orders(result, phasing)]
+    grids = [_stars(result, phasing), _orders(phasing)]
     if len(phasing.trade) > 1:
         grids.append(_trade(result, phasing))
     return grids
@@ -45,7 +45,7 @@ def _stars(result: Result, phasing: PhasingResult) -> Grid:
         "intervals [deg]",
     )
     note = (
-        "Free force / couple of the star alone by order, in forces of one throw and that force times the throw spacing. "
+        "Free force / couple of the star alone by order, in forces of one throw and that times the throw spacing. "
         f"{phasing.designs} star(s) to choose from; {phasing.method}."
     )
     return Grid("Crank stars", head, tuple(rows), left=3 if built else 2, note=note)
@@ -66,20 +66,19 @@ def _span(intervals: tuple[float, ...]) -> str:
     return trimmed(low) if high - low < 1e-6 else f"{trimmed(low)} to {trimmed(high)}"
 
 
-def _orders(result: Result, phasing: PhasingResult) -> Grid:
-    rows = []
-    for k, star in enumerate(phasing.ranking):
-        for order in star.firing_orders[: ORDERS_SHOWN if k == 0 else 1]:
-            rows.append(
-                (
-                    f"{k + 1}",
-                    "-".join(map(str, order.order)),
-                    f"{order.neighbours}",
-                    trimmed(math.degrees(order.longest_gap)),
-                    number(order.roll_content, 3, 1.0),
-                    f"{star.order_count}",
-                )
-            )
+def _orders(phasing: PhasingResult) -> Grid:
+    rows = [
+        (
+            f"{k + 1}",
+            "-".join(map(str, order.order)),
+            f"{order.neighbours}",
+            trimmed(math.degrees(order.longest_gap)),
+            number(order.roll_content, 3, 1.0),
+            f"{star.order_count}",
+        )
+        for k, star in enumerate(phasing.ranking)
+        for order in star.firing_orders[: ORDERS_SHOWN if k == 0 else 1]
+    ]
     head = ("star", "firing order", "neighbours", "longest gap [deg]", "roll content", "orders")
     note = (
         "Neighbours: firings in succession on one throw or on throws side by side. Longest gap: in which one bank does "

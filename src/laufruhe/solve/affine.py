@@ -44,6 +44,8 @@ class AffineNorm:
 
     def rows(self, x: Array) -> Array:
         """V0 + B x, shape (k, d)."""
+        if not self.slope.shape[-1]:
+            return self.constant
         moved = self.slope.reshape(-1, self.slope.shape[-1]) @ x
         return self.constant + moved.reshape(self.constant.shape)
 

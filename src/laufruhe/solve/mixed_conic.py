@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
+from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.solve.domain import Domain
@@ -26,7 +27,7 @@ from laufruhe.solve.star_model import StarNorm, StarProblem
 Array = NDArray[np.float64]
 
 # what SCIP's own feasibility tolerance may hide of the objective
-TRUST = 1e-5
+TRUST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +110,11 @@ def solve_program(
         value, cones = rows.value(norm, own)
         held += [*cones, value <= maximum / own]
     program = cp.Problem(cp.Minimize(sum(least)), held)
-    return _answer(program, steps, built, unit, space, bool(shaft_counts), time_limit)
+    return _answer(program, steps, built, unit, bool(shaft_counts), time_limit)
 
 
 def _answer(
-    program: Any, steps: Any, built: Any, unit: float, space: StarSpace, choosing: bool, time_limit: float
+    program: Any, steps: Any, built: Any, unit: float, choosing: bool, time_limit: float
 ) -> ProgramFound:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -198,7 +199,9 @@ def _membership(domain: Domain, y: Any, built: Any, own: int) -> list[Any]:
 
 
 def _reach(norm: StarNorm) -> float:
-    """A size of the norm that is not zero."""
-    sizes = np.abs(norm.constant).max(initial=0.0), np.abs(norm.moves).max(initial=0.0)
-    scale = float(np.sqrt(norm.weights.sum())) if norm.norm is Norm.RMS else 1.0
-    return float(max(*sizes, np.abs(norm.slope).max(initial=0.0) if norm.slope.size else 0.0)) * scale
+    """A size of the norm that is not zero: what one throw, or one unbalance, can make of it."""
+    weights = norm.weights
+    sizes = [mixed_norms.value(norm.norm, weights, norm.constant)]
+    sizes += [mixed_norms.value(norm.norm, weights, rows) for rows in norm.moves.reshape(-1, *norm.constant.shape)]
+    sizes += [mixed_norms.value(norm.norm, weights, norm.slope[..., j]) for j in range(norm.slope.shape[-1])]
+    return max(sizes)

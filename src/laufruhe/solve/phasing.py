@@ -18,8 +18,8 @@ from laufruhe.problem.phasing import Candidate, Method, Phasing
 from laufruhe.solve.certificate import Certificate, Proof
 from laufruhe.solve.ranking import PhasingResult, RankedStar, ranked_orders, ranked_star
 from laufruhe.solve.result import DecisionValue, ObjectiveValue, Result, Status
-from laufruhe.solve.star_families import Family, families_of
 from laufruhe.solve.star_cuts import CutsFound, owners_of, search_designs, solve_design
+from laufruhe.solve.star_families import Family, families_of
 from laufruhe.solve.star_model import StarModel
 from laufruhe.solve.star_objective import amplitude_objective
 from laufruhe.solve.star_search import StarsFound, enumerate_stars, search_stars
@@ -341,8 +341,8 @@ def phase_decisions(
         if bounds is not None and value is not None and bounds[0] < bounds[1]:
             edge = min(value - bounds[0], bounds[1] - value) <= 1e-9
             out.append(DecisionValue(name, value, "rad", *bounds, bounds[0], edge))
-    for name in (name for names in phasing.shafts.optional for name in names):
-        out.append(DecisionValue(f"{name} built", float(name in shafts), "", 0.0, 1.0, 1.0, False))
+    optional = (name for names in phasing.shafts.optional for name in names)
+    out += [DecisionValue(f"{name} built", float(name in shafts), "", 0.0, 1.0, 1.0, False) for name in optional]
     return tuple(out)
 
 
@@ -352,8 +352,6 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     bank, split = (b[0] if b is not None else None for b in (phasing.bank, phasing.split))
     layout = phasing.layout(bank, split)
     orders, count = ranked_orders(phasing, layout, throws, None)
-    if not orders and phasing.shafts.optional and phasing.firing_order is None and phasing.cylinders == 1:
-        orders = ()
     if not orders:
         return _none(problem, _no_order(phasing, layout, throws))
     sets = [b for b in _all_sets(len(phasing.shafts.optional)) if phasing.shafts.allows(b)]

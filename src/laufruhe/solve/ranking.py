@@ -159,7 +159,7 @@ def ranked_orders(
         orders = firing.lap_orders(phasing.cycle, layout, throws)
     found = []
     for order in itertools.islice(orders, firing.MOST_ORDERS):
-        turns = firing.firing_turns(phasing.cycle, layout, throws, order)
+        turns = firing.firing_turns(layout, throws, order)
         intervals = firing.intervals_of(phasing.cycle, turns)
         if phasing.intervals.holds(intervals, 1e-6):
             found.append(_judged(phasing, layout, order, turns, intervals))

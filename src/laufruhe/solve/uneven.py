@@ -91,7 +91,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     SolverError
         If no start leads anywhere.
     """
-    starts = _starts(problem, phasing, even)
+    starts = _starts(phasing, even)
     if not starts:
         from laufruhe.solve.phasing import _none
 
@@ -113,7 +113,7 @@ def local_optimum(phasing: Phasing, start: Start, intervals: Intervals) -> Uneve
         return best
     problem = replace(phasing.realise(start.candidate), phasing=None)
     layout = phasing.layout(start.candidate.bank_angle, start.candidate.split_pin)
-    model = UnevenModel(problem, layout, _rides(phasing, problem, start.candidate))
+    model = UnevenModel(problem, layout, _rides(phasing, start.candidate))
     program = _Program(phasing, model, start.candidate, intervals, best)
     if program.is_fixed:
         return best
@@ -147,11 +147,11 @@ def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: b
 
 def _intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...]:
     layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
-    turns = firing_turns(phasing.cycle, layout, candidate.throws, candidate.firing_order or ())
+    turns = firing_turns(layout, candidate.throws, candidate.firing_order or ())
     return intervals_of(phasing.cycle, turns)
 
 
-def _rides(phasing: Phasing, problem: Problem, candidate: Candidate) -> dict[str, int]:
+def _rides(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
     """The throw that each rotor turns with: found by moving one throw at a time."""
     out = {}
     still = replace(candidate, firing_order=None, motored=True)
@@ -289,7 +289,7 @@ class _Program:
         """Firing intervals, linear in throws, bank and split pin (S20)."""
         layout, start, cycle = self._model.layout, self._start, self._phasing.cycle
         order = start.firing_order or ()
-        turns = firing_turns(cycle, layout, start.throws, order)
+        turns = firing_turns(layout, start.throws, order)
         moments = []
         for turn, number in zip(turns, order, strict=True):
             k = number - 1
@@ -342,7 +342,7 @@ def _columns_of(model: UnevenModel, result: Result) -> Array:
     return out
 
 
-def _starts(problem: Problem, phasing: Phasing, even: Result | None) -> list[Start]:
+def _starts(phasing: Phasing, even: Result | None) -> list[Start]:
     """Designs to start from: the ranked even stars, or the middle of the throws' own bounds."""
     if even is not None and even.phasing is not None:
         return [
