@@ -123,7 +123,9 @@ def test_program_and_cuts_agree_with_unbalances_and_shafts(tmp_path, cylinders):
     rest = engines.MOUNTS + engines.WEIGHTS + TWO_SHAFTS + engines.MOUNT_FORCE.replace("mean", "rms")
     values = []
     for method in ("search", "program"):
-        problem = engines.problem(tmp_path, cylinders, phasing=f'method = "{method}"\nbest = 1\nmost_shafts = 1', rest=rest)
+        problem = engines.problem(
+            tmp_path, cylinders, phasing=f'method = "{method}"\nbest = 1\nmost_shafts = 1', rest=rest
+        )
         result = solve(problem)
         assert sum(d.value for d in result.decisions if d.name.endswith("built")) <= 1
         values.append(result.objective.value)
@@ -147,7 +149,9 @@ def test_sampled_norms_are_not_certified_by_scip(tmp_path):
         tmp_path, 4, phasing='method = "program"\nbest = 1', rest=engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
     )
     result = solve(problem)
-    proven = engines.problem(tmp_path, 4, phasing="best = 1", rest=engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE)
+    proven = engines.problem(
+        tmp_path, 4, phasing="best = 1", rest=engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
+    )
     assert result.certificate.lower_bound <= solve(proven).objective.value * (1.0 + 1e-9)
     if result.certificate.kind is Proof.GLOBAL:
         assert result.certificate.gap <= 2.0 * problem.tolerance

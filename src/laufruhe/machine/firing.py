@@ -13,6 +13,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
+
 from laufruhe.errors import ModelError
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts import Layout
@@ -216,16 +218,6 @@ def order_content(cycle: Cycle, turns: Sequence[float]) -> float:
 
     Equal impulses at these turns add up to |sum_k e^{-i h 2 pi t_k}| / n in order h.
     """
-    count = len(turns)
-    return max(
-        (
-            abs(sum(_unit(Fraction(h, cycle.turns), t) for t in turns)) / count
-            for h in range(1, count)
-        ),
-        default=0.0,
-    )  # fmt: skip
-
-
-def _unit(order: Fraction, turn: float) -> complex:
-    angle = math.tau * float(order) * turn
-    return complex(math.cos(angle), -math.sin(angle))
+    orders = np.arange(1, len(turns)) / cycle.turns
+    left = np.abs(np.exp(-2j * np.pi * np.outer(orders, turns)).sum(axis=1)) / len(turns)
+    return float(left.max(initial=0.0))

@@ -113,9 +113,7 @@ def solve_program(
     return _answer(program, steps, built, unit, bool(shaft_counts), time_limit)
 
 
-def _answer(
-    program: Any, steps: Any, built: Any, unit: float, choosing: bool, time_limit: float
-) -> ProgramFound:
+def _answer(program: Any, steps: Any, built: Any, unit: float, choosing: bool, time_limit: float) -> ProgramFound:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

@@ -143,7 +143,7 @@ def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
     answers = []
     for family in families:
-        model = StarModel(phasing, family.space, family.geometry)
+        model = StarModel(phasing, family.space, family.geometry, family.fixed)
         found = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, floor)
         designs = tuple(
             _Decided(family, s.star, s.built, s.value, s.bound, s.value <= found.beyond * (1.0 + problem.tolerance))
@@ -171,7 +171,7 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     answers = []
     for family in families:
         space = replace(family.space, mirror=simple, reflect=simple)
-        model = StarModel(phasing, space, family.geometry)
+        model = StarModel(phasing, space, family.geometry, family.fixed)
         exact = all(term.quantity.norm is Norm.RMS for term in problem.objective) and not problem.limits
         samples = model.samples if exact else PROGRAM_SAMPLES
         owners, shafts = owners_of(model), phasing.shafts
@@ -290,7 +290,7 @@ def _needed(problem: Problem, phasing: Phasing, best: _Decided) -> tuple[int, ..
     kept = best.built
     if not kept:
         return kept
-    model = StarModel(phasing, best.family.space, best.family.geometry)
+    model = StarModel(phasing, best.family.space, best.family.geometry, best.family.fixed)
     owners = owners_of(model)
     floor = FLOOR * objective_value(problem, evaluate(problem))
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):

@@ -87,13 +87,21 @@ class StarModel:
         Stars allowed.
     geometry
         Bank angle and split pin [rad].
+    origin
+        Star that the moves are counted from; the first of the space when left out.
     """
 
-    def __init__(self, phasing: Phasing, space: StarSpace, geometry: tuple[float | None, float | None]) -> None:
+    def __init__(
+        self,
+        phasing: Phasing,
+        space: StarSpace,
+        geometry: tuple[float | None, float | None],
+        origin: tuple[int, ...] | None = None,
+    ) -> None:
         self.phasing, self.space, self.geometry = phasing, space, geometry
         self.layout: Layout = phasing.layout(*geometry)
-        pattern = space.patterns[0]
-        self._origin = tuple(step for step, times in enumerate(pattern) for _ in range(times))
+        first = tuple(step for step, times in enumerate(space.patterns[0]) for _ in range(times))
+        self._origin = first if origin is None else origin
         self.problem = _normalised(phasing.realise(self.candidate(self._origin)))
         self._whole = AffineModel(self.problem, keep_all=True)
         self._still = self._motored(self._origin)

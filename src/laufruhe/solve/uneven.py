@@ -257,7 +257,9 @@ class _Program:
         first = start.throws[0]
         if bank is not None and start.bank_angle is not None:
             # cylinder 1 stays at its dead centre when phi = 0
-            first = first + 0.5 * (bank - start.bank_angle) + 0.5 * ((split or 0.0) - (start.split_pin or 0.0))
+            first = first + 0.5 * (bank - start.bank_angle)
+        if split is not None and start.split_pin is not None:
+            first = first + 0.5 * (split - start.split_pin)
         throws = [first] if not self._phasing.throw_bounds else []
         throws += [start.throws[k] + x[j] for j, k in enumerate(self._throws)]
         return bank, split, throws, x[position:]
