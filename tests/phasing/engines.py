@@ -7,7 +7,10 @@ from laufruhe.problem.reader import load
 
 MOUNTS = """
 [mounts]
-positions = [["300 mm","250 mm","0 mm"],["300 mm","-250 mm","0 mm"],["-500 mm","250 mm","0 mm"],["-500 mm","-250 mm","0 mm"]]
+positions = [
+    ["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"],
+    ["-500 mm", "250 mm", "0 mm"], ["-500 mm", "-250 mm", "0 mm"],
+]
 """
 WEIGHTS = """
 [[counterweights]]

@@ -1,11 +1,12 @@
 """What cannot be: one clear line, the right status, and nothing sold for more than it is."""
 
 import pytest
-from phasing import engines
 
 from laufruhe.errors import InputError
+from laufruhe.problem.reader import load
 from laufruhe.solve import solve
 from laufruhe.solve.result import Status
+from phasing import engines
 
 OPEN = 'throws = "open"\nfiring_order = "open"'
 GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "80 bar"\nimep = "6 bar"\n'
@@ -14,7 +15,7 @@ GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "80 bar"\nimep = "6 bar"\n'
 @pytest.mark.parametrize(
     ("cylinders", "cycle", "engine", "phasing", "layout", "said"),
     [
-        (5, "four-stroke", OPEN, 'intervals = { min = "150 deg" }', "inline", "no star can meet the intervals: 5 cyl.*144"),
+        (5, "four-stroke", OPEN, 'intervals = { min = "150 deg" }', "inline", "no star can meet the intervals: 5.*144"),
         (5, "four-stroke", OPEN, 'intervals = { max = "140 deg" }', "inline", "no star can meet the intervals"),
         (4, "two-stroke", OPEN, "phases = 8", "inline", "phases = 8 conflicts with 4 throws: 8 phases are more than 4"),
         (6, "two-stroke", OPEN, "phases = 3", "inline", "phases = 3 conflicts with 6 throws.*stands on 6"),
@@ -107,14 +108,10 @@ def test_refused(tmp_path, cylinders, engine, phasing, rest, said):
 
 
 def test_cylinders_are_asked_for(tmp_path):
+    engines.problem(tmp_path, 4, engine='throws = "open"')
+    path = tmp_path / "none.toml"
+    path.write_text((tmp_path / "test.toml").read_text().replace("cylinders = 4\n", ""), encoding="utf-8")
     with pytest.raises(InputError, match=r"engine\.cylinders: is missing, and open throws do not tell it"):
-        problem = engines.problem
-        text = 'throws = "open"'
-        path = tmp_path / "none.toml"
-        problem(tmp_path, 4, engine=text)
-        path.write_text((tmp_path / "test.toml").read_text().replace("cylinders = 4\n", ""), encoding="utf-8")
-        from laufruhe.problem.reader import load
-
         load(path)
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from phasing import engines
 
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns, firing_lattice
@@ -17,6 +16,7 @@ from laufruhe.solve import solve
 from laufruhe.solve.certificate import Proof
 from laufruhe.solve.result import Status
 from laufruhe.solve.star_search import AmplitudeObjective, AmplitudeTerm, search_stars
+from phasing import engines
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SQRT2, SQRT10 = math.sqrt(2.0), math.sqrt(10.0)

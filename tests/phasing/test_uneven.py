@@ -7,7 +7,6 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from phasing import engines
 
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
@@ -16,6 +15,7 @@ from laufruhe.solve import solve
 from laufruhe.solve.certificate import Proof
 from laufruhe.solve.uneven import Start, _rides, local_optimum
 from laufruhe.solve.uneven_model import Symbols, UnevenModel
+from phasing import engines
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPLIT = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"

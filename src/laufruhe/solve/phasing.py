@@ -26,6 +26,8 @@ from laufruhe.solve.star_search import StarsFound, enumerate_stars, search_stars
 from laufruhe.solve.unbalances import objective_name, solve_unbalances
 
 MOST_LISTED = 1_000_000
+# looking at every star is as quick as a search up to here
+FEW_STARS = 60_000
 PROGRAM_SAMPLES = 24
 FLOOR = 1e-3
 
@@ -118,7 +120,8 @@ def _searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) ->
     for family in families:
         own = amplitude_objective(phasing.realise(family.candidate(phasing, family.first))) or simple
         space = replace(family.space, mirror=True, reflect=True)
-        if phasing.method is Method.ENUMERATION:
+        few = phasing.method is Method.AUTO and space.size <= FEW_STARS
+        if few or phasing.method is Method.ENUMERATION:
             found = enumerate_stars(space, own, phasing.best)
             answers.append(_stars_answer(family, found, "every star looked at"))
         else:
