@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
 _DEFINITIONS = (
     "@alias kilogram_force = kp = kilopond",
+    "newton_metre = newton * meter = Nm",
     "pferdestaerke = 75 * kilogram_force * meter / second = PS",
 )
 
@@ -36,7 +37,8 @@ def _factor(unit: str, wanted: str) -> float:
     """SI value of one `unit` of the dimension of `wanted`."""
     registry = _registry()
     try:
-        one = registry.Quantity(1.0, registry.parse_units(unit))
+        parsed = registry.parse_units(unit)
+        one = registry.Quantity(1.0, parsed)
         target = registry.parse_units(wanted) if wanted else registry.dimensionless
         ratio = float(one.to(target).magnitude)
         doubled = float((2.0 * one).to(target).magnitude)
@@ -44,9 +46,17 @@ def _factor(unit: str, wanted: str) -> float:
         if type(error).__name__ == "DimensionalityError":
             raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}") from None
         raise UnitError(f"unit '{unit}' is not known; {advice(wanted)}") from None
+    if _turns(str(parsed)) != (wanted in ("rad", "rad/s")):
+        # a radian has no dimension, so 50 Hz would pass for 50 rad/s and 15 deg for a ratio
+        raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}")
     if not math.isclose(doubled, 2.0 * ratio):
         raise UnitError(f"'{unit}' has a zero of its own; {advice(wanted)}")
     return ratio
+
+
+def _turns(unit: str) -> bool:
+    """Whether a unit's full name speaks of an angle."""
+    return re.search(r"radian|degree|turn|revolution|minute_of_arc|arcminute|arcsecond|gradian|grade", unit) is not None
 
 
 _EXAMPLES = {
@@ -93,13 +103,14 @@ def parse(text: str, unit: str) -> float:
     if match is None:
         raise UnitError(f"is not a number with a unit; {advice(unit)}")
     number, divisor, name = match.groups()
-    if divisor is not None and int(divisor) == 0:
+    below = float(divisor or 1)
+    if below == 0.0:
         raise UnitError(f"divides by zero; {advice(unit)}")
-    value = float(number) / (int(divisor) if divisor else 1)
+    value = float(number) / below
     if name is None and unit:
         raise UnitError(f"has no unit, {dimension_name(unit)} needs one; {advice(unit)}")
     value *= _factor(name.strip(), unit) if name else 1.0
-    if not math.isfinite(value):
+    if not math.isfinite(value) or not math.isfinite(below):
         raise UnitError(f"is not finite; {advice(unit)}")
     return value
 

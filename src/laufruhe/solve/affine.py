@@ -44,9 +44,7 @@ class AffineNorm:
 
     def rows(self, x: Array) -> Array:
         """V0 + B x, shape (k, d)."""
-        if not self.slope.shape[-1]:
-            return self.constant
-        moved = self.slope.reshape(-1, self.slope.shape[-1]) @ x
+        moved = self.slope.reshape(self.constant.size, len(x)) @ x
         return self.constant + moved.reshape(self.constant.shape)
 
     def value(self, x: Array) -> float:
