@@ -76,6 +76,7 @@ _EXAMPLES = {
     "rad": ("an angle", "90 deg"),
     "rad/s": ("a speed of rotation", "2500 rpm"),
     "m/s": ("a speed", "10 m/s"),
+    "s": ("a time", "60 s"),
     "": ("a plain number", "0.26"),
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from laufruhe.plots import bars, mounting, polar, spectrum
+from laufruhe.plots import bars, mounting, polar, spectrum, star
 from laufruhe.plots.style import save
 from laufruhe.report.mounting import is_elastic
 from laufruhe.solve.result import Result
@@ -21,6 +21,10 @@ def draw(result: Result, folder: Path) -> tuple[str, ...]:
     makers["spectrum.png"] = spectrum.figure
     if is_elastic(result.final):
         makers |= mounting.FIGURES
+    if result.phasing is not None and result.phasing.ranking:
+        makers = {"star.png": star.figure, "firings.png": star.firings, **makers}
+        if len(result.phasing.trade) > 1:
+            makers["trade.png"] = star.trade
     for name, figure in makers.items():
         save(figure(result), folder / name)
     return tuple(makers)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
@@ -135,6 +136,37 @@ class Quantity:
         return Open(low, high, start)
 
 
+@dataclass(frozen=True)
+class OrOpen:
+    """A pydantic field that reads a list, or the word "open" in its place.
+
+    Attributes
+    ----------
+    inner
+        Type of the list.
+    example
+        As a user would write it.
+    """
+
+    inner: Any
+    example: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(self.inner))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [handler(schema), {"const": "open"}]}
+
+    def _read(self, given: Any, inner: Callable[[Any], Any]) -> Any:
+        if isinstance(given, str):
+            if given == "open":
+                return given
+            raise _complaint(f'is neither a list nor "open"; write for example {self.example} or "open"')
+        return inner(given)
+
+
 def _complaint(text: str) -> PydanticCustomError:
     # braces would be read as a template
     return PydanticCustomError("laufruhe", "{text}", {"text": text})
@@ -159,6 +191,7 @@ Angle: TypeAlias = Annotated[float, Quantity("rad", plain=_DEG)]
 OpenAngle: TypeAlias = Annotated[float | Open, Quantity("rad", plain=_DEG, openable=True)]
 Speed: TypeAlias = Annotated[float, Quantity("rad/s", above=0.0)]
 PistonSpeed: TypeAlias = Annotated[float, Quantity("m/s", above=0.0)]
+Time: TypeAlias = Annotated[float, Quantity("s", above=0.0)]
 Ratio: TypeAlias = Annotated[float, Quantity("", least=-100.0, most=100.0), AfterValidator(_turning)]
 NonNegative: TypeAlias = Annotated[float, Quantity("", least=0.0)]
 Positive: TypeAlias = Annotated[float, Quantity("", above=0.0)]
@@ -172,3 +205,4 @@ OpenLossFactor: TypeAlias = Annotated[float | Open, Quantity("", least=0.0, most
 OpenLength: TypeAlias = Annotated[float | Open, Quantity("m", openable=True)]
 OpenStiffness: TypeAlias = Annotated[float | Open, Quantity("N/m", least=0.0, openable=True)]
 OpenDamping: TypeAlias = Annotated[float | Open, Quantity("N s/m", least=0.0, openable=True)]
+Throws: TypeAlias = Annotated[list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]")]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.shaking_loads import EXACT, Fidelity
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountDesign
+from laufruhe.problem.phasing import Phasing
 from laufruhe.problem.quantity import Quantity
 
 Array = NDArray[np.float64]
@@ -119,6 +120,8 @@ class Problem:
         Relative gap at which an optimum counts as proven.
     mount_design
         What of elastic mounts is open and asked.
+    phasing
+        What of throws, firing order and the choice of shafts is open; None if nothing is.
     """
 
     name: str
@@ -133,6 +136,7 @@ class Problem:
     fidelity: Fidelity = EXACT
     tolerance: float = 1e-4
     mount_design: MountDesign = NOTHING_ASKED
+    phasing: Phasing | None = None
 
     @property
     def start(self) -> tuple[complex, ...]:

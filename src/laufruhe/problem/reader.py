@@ -22,6 +22,7 @@ from laufruhe.problem.model import Limit, Problem, Term
 from laufruhe.problem.mount_asked import asked_of_mounts
 from laufruhe.problem.mount_design import MOUNT_NAMES
 from laufruhe.problem.quantity import MEASURES, ON_MOUNTS, Quantity, Subject, counted_rotors
+from laufruhe.problem.read_phasing import is_open, opened
 
 
 def load(path: str | Path) -> Problem:
@@ -35,6 +36,8 @@ def load(path: str | Path) -> Problem:
     path = Path(path)
     file = _parsed(path)
     try:
+        if is_open(file):
+            return opened(file, lambda closed: _assembled(closed, path))
         return _assembled(file, path)
     except Refused as refused:
         raise InputError(str(path), (refused.complaint,)) from None

@@ -15,6 +15,7 @@ RESULT = "result.json"
 REPORT = "report.md"
 PICTURES = (
     "polar.png", "bars.png", "spectrum.png", "transmissibility.png", "campbell.png", "modes.png", "run_up.png",
+    "star.png", "firings.png", "trade.png",
 )  # fmt: skip
 RESULT_FILES = (RESULT, REPORT, *PICTURES)
 

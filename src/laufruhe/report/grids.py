@@ -31,7 +31,10 @@ ORDER_SHARE = 0.005
 def grids_of(result: Result) -> list[Grid]:
     """Every table that this result fills."""
     candidates = [_decisions(result), _limits(result), _mounts(result), *mode_grids(result), _orders(result)]
-    return [grid for grid in candidates if grid.rows]
+    # an import above would be circular: the ranking makes grids too
+    from laufruhe.report.ranking import phasing_grids
+
+    return [grid for grid in [*phasing_grids(result), *candidates] if grid.rows]
 
 
 def _decisions(result: Result) -> Grid:

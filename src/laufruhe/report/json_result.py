@@ -21,6 +21,7 @@ from laufruhe.report.measures import (
     shaking_orders,
 )
 from laufruhe.report.mounting import is_elastic, modes_as_dict
+from laufruhe.report.ranking import phasing_record
 from laufruhe.report.versions import versions
 from laufruhe.solve.result import Result
 
@@ -53,6 +54,7 @@ def as_dict(result: Result) -> dict[str, Any]:
         "points": [{key: point[key] for key in own} for point in points],
         **({"modes": modes_as_dict(result.final)} if is_elastic(result.final) else {}),
         "firing_intervals": list(engine.firing_intervals),
+        **phasing_record(result),
         "fidelity": {
             "kinematics": problem.fidelity.kinematics,
             "samples": problem.fidelity.samples,

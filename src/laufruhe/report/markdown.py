@@ -19,6 +19,9 @@ _CAPTIONS = {
     "campbell.png": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
     "modes.png": "Share of each motion in the kinetic energy of each natural mode.",
     "run_up.png": "Largest force and travel on any mount while the engine runs up and is shut down.",
+    "star.png": "The best crank stars, from the front and from the side.",
+    "firings.png": "Firing orders of the best stars over one working cycle.",
+    "trade.png": "What slightly uneven firing buys.",
 }
 
 

@@ -23,10 +23,16 @@ def solve(problem: Problem) -> Result:
     ModelError
         If the engine as given cannot be evaluated.
     """
+    if problem.phasing is not None and problem.mount_design.asked:
+        raise ModelError("throws or firing order are open together with mounts; fix one of the two and solve again")
     if problem.mount_design.asked:
         from laufruhe.solve.mounts import solve_mounts
 
         return solve_mounts(problem)
+    if problem.phasing is not None:
+        from laufruhe.solve.phasing import solve_phasing
+
+        return solve_phasing(problem)
     if problem.decisions and not problem.objective:
         raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
     return solve_unbalances(problem) if problem.decisions else state(problem)
