@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.mounting import mount_maps, mounting_of
 from laufruhe.physics.shaking_loads import inertia_coefficients, rotor_wrench
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES, Quantity, Subject, counted_rotors, radius_of
@@ -68,7 +68,7 @@ class UnevenModel:
     def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
         self.problem, self.layout, self.rides = problem, layout, rides
         self.domains: tuple[Domain, ...] = domains_of(problem.decisions)
-        self._mounting = rigid_mounting(problem.engine.mounts) if problem.engine.mounts else None
+        self._mounting = mounting_of(problem.engine)
         self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
 
     def squares(self, quantity: Quantity, at: Symbols) -> Any:
@@ -130,12 +130,12 @@ class UnevenModel:
                 raise ValueError("an engine without mounts has no mount forces")
             weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
             names = [mount.name for mount in self.problem.engine.mounts]
+            every = mount_maps(self._mounting, h, speed)
             maps = [
-                weights @ self._mounting.maps[k]
-                for k, name in enumerate(names)
-                if quantity.mounts is None or name in quantity.mounts
+                weights @ every[k] for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts
             ]
-            out.append((h, [ca.DM(m) @ wrench for m in maps]))
+            turned = ca.horzcat(-wrench[:, 1], wrench[:, 0])
+            out.append((h, [ca.DM(m.real) @ wrench + ca.DM(m.imag) @ turned for m in maps]))
         return out or [(1.0, [ca.DM.zeros(1, 2)])]
 
     def _wrench(self, speed: float, at: Symbols) -> dict[float, Any]:
