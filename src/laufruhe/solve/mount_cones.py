@@ -98,16 +98,14 @@ def _limited(
 
 
 def _dual(constraint: Any, factor: float, size: float) -> tuple[float, Array | None]:
-    value = constraint.dual_value
-    if value is None:
+    """Price of a constraint in its own unit, and its dual matrix where it has one."""
+    if constraint.dual_value is None:
         return 0.0, None
-    array = np.asarray(value, dtype=float)
-    if array.ndim == 2:
-        array = 0.5 * (array + array.T)
-        return max(float(np.trace(np.maximum(np.linalg.eigvalsh(array), 0.0)[:, None] * np.eye(6))), 0.0) * (
-            factor * size
-        ), array
-    return max(float(array), 0.0) * factor * size, None
+    array = np.asarray(constraint.dual_value, dtype=float)
+    if array.ndim < 2:
+        return max(float(array), 0.0) * factor * size, None
+    array = 0.5 * (array + array.T)
+    return float(np.maximum(np.linalg.eigvalsh(array), 0.0).sum()) * factor * size, array
 
 
 def _vector(cone: Any) -> Array | None:

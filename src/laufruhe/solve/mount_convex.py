@@ -305,11 +305,12 @@ def solve_convex_mounts(problem: Problem) -> Result:
     bound, gradient = dual_bound(program, x, duals)
     final = evaluate(problem, problem.design(problem.start, [float(v) for v in x]))
     value, given = whole_objective(problem, final), whole_objective(problem, initial)
-    gap = max(value - max(bound, 0.0), 0.0) / max(abs(value), 1e-3 * abs(given), 1e-300)
+    bound = float(max(bound, 0.0))
+    gap = float(max(value - bound, 0.0) / max(abs(value), 1e-3 * abs(given), 1e-300))
     worst = max((excess(limit, final) for limit in problem.mount_design.limits), default=0.0)
     proven = gap <= problem.tolerance and worst <= FEASIBLE
     certificate = Certificate(
-        Proof.GLOBAL if proven else Proof.WITHIN_GAP, max(bound, 0.0), gap, _residual(program, x, duals, gradient),
+        Proof.GLOBAL if proven else Proof.WITHIN_GAP, bound, gap, _residual(program, x, duals, gradient),
         "linear matrix inequalities, dual bound over the box of stiffnesses",
     )  # fmt: skip
     prices = _prices(problem, program, duals)
