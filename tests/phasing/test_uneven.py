@@ -7,13 +7,14 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from laufruhe.solve.uneven_program import rides_of
 
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.reader import load
 from laufruhe.solve import solve
 from laufruhe.solve.certificate import Proof
-from laufruhe.solve.uneven import Start, _rides, local_optimum
+from laufruhe.solve.uneven import Start, local_optimum
 from laufruhe.solve.uneven_model import Symbols, UnevenModel
 from phasing import engines
 
@@ -113,7 +114,7 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     count = 3 if layout == "vee" else 6
     start = Candidate(tuple(rng.uniform(0.0, math.tau, count)), None, bank, split)
     problem = replace(phasing.realise(start), phasing=None)
-    model = UnevenModel(problem, phasing.layout(bank, split), _rides(phasing, start))
+    model = UnevenModel(problem, phasing.layout(bank, split), rides_of(phasing, start))
     moved = tuple(rng.uniform(0.0, math.tau, count))
     bank, split = (math.radians(70.0), math.radians(41.0)) if layout == "vee" else (None, None)
     columns = np.concatenate([[0.0], *(0.3 * d.scale * rng.uniform(0.1, 1.0, d.width) for d in model.domains)])[1:]
