@@ -194,7 +194,8 @@ def _written(request: _Request, answer: Callable[[Problem], Result], say: Callab
         option, folder = ("--out", request.out) if request.out is not None else ("results", _default_folder(problem))
         stage = places.enter_context(files.staged(folder, option))
         json_file = _json_file(request, places)
-        say(f"deciding {len(problem.decisions)} unbalance(s)" if problem.decisions else "evaluating")
+        what = "stars and firing orders" if problem.phasing is not None else f"{len(problem.decisions)} unbalance(s)"
+        say(f"deciding {what}" if problem.decisions or problem.phasing is not None else "evaluating")
         result = answer(problem)
         pictures: tuple[str, ...] = ()
         if request.pictures:

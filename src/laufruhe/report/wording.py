@@ -77,7 +77,8 @@ def one_line(problem: Problem) -> str:
         f"{len(problem.points)} operating point(s)",
         f"{len(problem.limits)} constraint(s)",
     ]
-    names = [decision.name + ("" if decision.fixed_angle else " and angle") for decision in problem.decisions]
+    names = list(problem.phasing.open_names) if problem.phasing is not None else []
+    names += [decision.name + ("" if decision.fixed_angle else " and angle") for decision in problem.decisions]
     return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
 
 
