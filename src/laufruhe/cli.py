@@ -195,7 +195,8 @@ def _written(request: _Request, answer: Callable[[Problem], Result], say: Callab
         stage = places.enter_context(files.staged(folder, option))
         json_file = _json_file(request, places)
         open_numbers = len(problem.decisions) + len(problem.mount_design.decisions)
-        say(f"deciding {open_numbers} open number(s)" if open_numbers else "evaluating")
+        what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
+        say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
         result = answer(problem)
         pictures: tuple[str, ...] = ()
         if request.pictures:

@@ -1,5 +1,6 @@
 """What the field knows, found without being told."""
 
+import json
 import math
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from laufruhe.machine.layouts import inline
 from laufruhe.physics.crank_stars import score_stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.reader import load
+from laufruhe.report.json_result import as_dict
+from laufruhe.report.wording import explained
 from laufruhe.solve import solve
 from laufruhe.solve.certificate import Proof
 from laufruhe.solve.result import Status
@@ -177,3 +180,23 @@ def test_orders_are_ranked_by_what_the_user_names(tmp_path, criterion):
     attribute = {"neighbours": "neighbours", "longest gap": "longest_gap", "roll moment": "roll_content"}[criterion]
     values = [round(getattr(order, attribute), 9) for order in orders]
     assert values == sorted(values)
+
+
+def test_reports_say_where_a_bound_is_from(tmp_path):
+    by = {}
+    for method in ("search", "program"):
+        by[method] = explained(solve(engines.problem(tmp_path, 5, phasing=f'method = "{method}"\nbest = 1')))
+    assert "computed from the exact model" in by["search"]
+    assert "SCIP's dual bound" in by["program"]
+    assert "computed from the exact model" not in by["program"]
+    none = solve(engines.problem(tmp_path, 5, phasing='intervals = { max = "60 deg" }'))
+    assert "cone solver" not in explained(none)
+
+
+def test_json_holds_ranking_and_trade():
+    record = as_dict(solve(load(PROBLEMS / "inline-nine-uneven.toml")))
+    assert [star["rank"] for star in record["ranking"]] == list(range(1, len(record["ranking"]) + 1))
+    assert record["objective"]["value"] == record["ranking"][0]["objective"]
+    assert len(record["phasing"]["trade"]) > 2
+    assert record["certificate"]["kind"] == "global"
+    json.dumps(record["ranking"], allow_nan=False)

@@ -13,8 +13,13 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.reader import load
 from laufruhe.solve import solve
 from laufruhe.solve.certificate import Proof
-from laufruhe.solve.uneven import Start, _rides, local_optimum
+from laufruhe.solve.star_families import families_of
+from laufruhe.solve.star_objective import amplitude_objective
+from laufruhe.solve.star_search import search_stars
+from laufruhe.solve.uneven import Start, local_optimum
+from laufruhe.solve.uneven_bound import star_bounds, throw_costs, uneven_bound
 from laufruhe.solve.uneven_model import Symbols, UnevenModel
+from laufruhe.solve.uneven_program import rides_of
 from phasing import engines
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -113,7 +118,7 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     count = 3 if layout == "vee" else 6
     start = Candidate(tuple(rng.uniform(0.0, math.tau, count)), None, bank, split)
     problem = replace(phasing.realise(start), phasing=None)
-    model = UnevenModel(problem, phasing.layout(bank, split), _rides(phasing, start))
+    model = UnevenModel(problem, phasing.layout(bank, split), rides_of(phasing, start))
     moved = tuple(rng.uniform(0.0, math.tau, count))
     bank, split = (math.radians(70.0), math.radians(41.0)) if layout == "vee" else (None, None)
     columns = np.concatenate([[0.0], *(0.3 * d.scale * rng.uniform(0.1, 1.0, d.width) for d in model.domains)])[1:]
@@ -146,3 +151,48 @@ def test_bank_and_split_pins_move_within_bounds(tmp_path):
     for name in ("bank angle", "split pin angle"):
         assert values[name].lower - 1e-9 <= values[name].value <= values[name].upper + 1e-9
     assert result.objective.value <= result.phasing.even_value
+
+
+@pytest.mark.parametrize("cycle", ["two-stroke", "four-stroke"])
+@pytest.mark.parametrize("cylinders", [4, 5, 6])
+def test_no_uneven_star_goes_under_the_bound(tmp_path, cycle, cylinders):
+    """Random intervals between the bounds, random orders: every one lies above the bound of its own star."""
+    allowed = 'intervals = { min = "%s deg", max = "%s deg" }'
+    even = (720.0 if cycle == "four-stroke" else 360.0) / cylinders
+    problem = engines.problem(tmp_path, cylinders, cycle, phasing=allowed % (even - 3.0, even + 2.0))
+    phasing = problem.phasing
+    (family,), _ = families_of(phasing)
+    objective = amplitude_objective(problem)
+    costs = throw_costs(phasing, family.space, objective, phasing.intervals)
+    least = uneven_bound(phasing, family.space, objective, phasing.intervals)
+    rng = np.random.default_rng(cylinders)
+    x, orders = np.array(family.space.places), np.array(objective.orders)
+    for _ in range(60):
+        order = [0, *(1 + rng.permutation(cylinders - 1))]
+        deviations = rng.uniform(-1.0, 1.0, cylinders)
+        deviations -= deviations.mean()
+        deviations *= 2.0 * rng.uniform(0.2, 1.0) / np.abs(deviations).max()
+        angles = np.zeros(cylinders)
+        angles[order] = -np.radians(np.cumsum([0.0, *(even + deviations[:-1])]))
+        steps = np.zeros(cylinders, dtype=np.uint8)
+        steps[order] = [-slot * phasing.cycle.turns * family.space.phases // cylinders % family.space.phases
+                        for slot in range(cylinders)]  # fmt: skip
+        couples = np.abs((x * np.exp(1j * np.outer(orders, angles))).sum(axis=1))
+        value = sum(t.weight * np.linalg.norm(np.multiply(t.couple, couples)) for t in objective.terms)
+        own = star_bounds(costs, steps[None])[0]
+        assert own <= value * (1.0 + 1e-9)
+        assert least <= max(own, 0.0) * (1.0 + 1e-9)
+    even_only = Intervals(phasing.even_interval, phasing.even_interval)
+    tight = uneven_bound(phasing, family.space, objective, even_only)
+    best = search_stars(replace(family.space, mirror=True, reflect=True), objective).values[0]
+    # a few hundred directions come within a few percent of all
+    assert 0.95 * best - 1e-9 <= tight <= best * (1.0 + 1e-9) + 1e-9
+
+
+@pytest.mark.parametrize("name", ["inline-seven-uneven", "two-stroke-eight-uneven"])
+def test_the_trade_lies_between_its_bounds(name):
+    result = solve(load(PROBLEMS / f"{name}.toml"))
+    for point in result.phasing.trade:
+        assert point.lower_bound <= point.value
+    assert result.phasing.trade[0].lower_bound >= 0.95 * result.phasing.even_value
+    assert result.phasing.trade[1].lower_bound > 0.5 * result.phasing.trade[1].value

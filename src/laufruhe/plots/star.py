@@ -58,7 +58,7 @@ def _title(result: Result, star: RankedStar, k: int) -> str:
 
 def _balance(star: RankedStar) -> str:
     shown = ", ".join(
-        f"{h}: {number(force, 3, 1.0)} / {number(couple, 3, 1.0)}"
+        f"{h}: {number(force, 2, 1.0)} / {number(couple, 2, 1.0)}"
         for h, force, couple in zip(star.orders, star.forces, star.couples, strict=True)
     )
     return f"free force / couple of order {shown}"
@@ -188,7 +188,12 @@ def trade(result: Result) -> Figure:
         xlabel="largest deviation of a firing interval from even [deg]",
         ylabel=f"{name} [{unit}]" if len(name) < 42 else f"objective [{unit}]",
     )
-    legend = [Line2D([], [], color=AFTER, marker="o", label="best local optimum found")]
+    bounds = [p.lower_bound for p in points]
+    axes.plot(x, bounds, color=BEFORE, linewidth=1.2, linestyle=(0, (4, 2)))
+    legend = [
+        Line2D([], [], color=AFTER, marker="o", label="best local optimum found"),
+        Line2D([], [], color=BEFORE, linestyle=(0, (4, 2)), label="proven: no design below"),
+    ]
     lines = "What slightly uneven crank angles buy; each point is a design, evaluated by the exact model."
     heading(drawn.figure, "Balance against even firing", lines, legend, source_line(result))
     return drawn.figure

@@ -168,6 +168,18 @@ class Phasing:
         return self.throw_bounds is not None or (self.throws is None and not self.intervals.forbid_unevenness)
 
     @property
+    def open_names(self) -> tuple[str, ...]:
+        """What is open, for the screen."""
+        found = (
+            ("throws", self.throws is None),
+            ("firing order", self.firing_order is None),
+            ("bank angle", self.bank is not None and self.bank[0] < self.bank[1]),
+            ("split pin angle", self.split is not None and self.split[0] < self.split[1]),
+            (f"which of {sum(map(len, self.shafts.optional))} shaft(s) are built", bool(self.shafts.optional)),
+        )
+        return tuple(name for name, is_open in found if is_open)
+
+    @property
     def geometries(self) -> tuple[tuple[float | None, float | None], ...]:
         """Bank angles and split pins between their bounds that let the firing be even (S6).
 

@@ -96,13 +96,19 @@ def _trade(result: Result, phasing: PhasingResult) -> Grid:
             f"{trimmed(math.degrees(p.allowed))} deg",
             trimmed(math.degrees(p.deviation)),
             number(p.value, scale=even),
+            number(p.lower_bound, scale=even),
             f"{100.0 * (p.value / even - 1.0):+.1f} %".replace("-", "−") if even else DASH,
             f"{p.kkt_residual:.0e}" if p.kkt_residual else DASH,
         )
         for p in phasing.trade
     )
-    head = ("deviation allowed", "used [deg]", f"objective [{unit}]", "change", "KKT residual")
-    return Grid("Objective against even firing", head, rows, note="Local optima, the best found of every freedom.")
+    head = ("deviation allowed", "used [deg]", f"objective [{unit}]", "not under", "change", "KKT residual")
+    return Grid(
+        "Objective against even firing",
+        head,
+        rows,
+        note="Local optima, the best found of every freedom; no design with that freedom goes under the bound.",
+    )
 
 
 def phasing_record(result: Result) -> dict[str, Any]:
@@ -122,6 +128,7 @@ def phasing_record(result: Result) -> dict[str, Any]:
                     "allowed": p.allowed,
                     "deviation": p.deviation,
                     "value": p.value,
+                    "lower_bound": p.lower_bound,
                     "throws": list(p.throws),
                     "kkt_residual": p.kkt_residual,
                 }

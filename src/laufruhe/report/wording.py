@@ -77,7 +77,8 @@ def one_line(problem: Problem) -> str:
         f"{len(problem.points)} operating point(s)",
         f"{len(problem.limits) + len(problem.mount_design.limits)} constraint(s)",
     ]
-    names = [decision.name + ("" if decision.fixed_angle else " and angle") for decision in problem.decisions]
+    names = list(problem.phasing.open_names) if problem.phasing is not None else []
+    names += [decision.name + ("" if decision.fixed_angle else " and angle") for decision in problem.decisions]
     names += [decision.name for decision in problem.mount_design.decisions]
     return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
 
@@ -120,6 +121,8 @@ def gap_text(certificate: Certificate) -> str:
 def explained(result: Result) -> str:
     """The certificate in two sentences."""
     c, o = result.certificate, result.objective
+    if result.status is Status.INFEASIBLE and result.problem.phasing is not None:
+        return "Every star and firing order allowed was ruled out; what they conflict with is named above."
     if result.status is Status.INFEASIBLE:
         return (
             "The cone solver proved that the limits cannot be met together. "
@@ -133,10 +136,13 @@ def explained(result: Result) -> str:
             f"The optimality conditions, taken anew, hold with a residual of {c.kkt_residual:.1e}; "
             f"that nothing better exists is proven only down to {number(c.lower_bound, 6)} {o.unit}."
         )
+    origin = "was not taken from the solver but computed from the exact model"
+    if "SCIP" in c.method:
+        origin = "is SCIP's dual bound less its tolerances, or that of dual rows where it is better"
     return (
         f"No design within the bounds and limits has less than {number(c.lower_bound, 6)} {o.unit}; "
         f"this one has {number(o.value, 6)} {o.unit}, a gap of {gap_text(c)} (proof: {c.kind}). "
-        f"The bound was not taken from the solver but computed from the exact model ({c.method}), "
+        f"The bound {origin} ({c.method}), "
         f"and the optimality conditions hold with a residual of {c.kkt_residual:.1e}."
     )
 

@@ -97,13 +97,26 @@ class RankedStar:
 
 @dataclass(frozen=True)
 class TradePoint:
-    """One design on the trade of objective against unevenness [rad, SI]."""
+    """One design on the trade of objective against unevenness [rad, SI].
+
+    Attributes
+    ----------
+    allowed, deviation
+        Largest deviation of an interval from even that was allowed, and that is used [rad].
+    value, lower_bound
+        Objective, and what no design with this freedom goes under [SI].
+    throws
+        Angles [rad].
+    kkt_residual
+        Of the nonlinear program.
+    """
 
     allowed: float
     deviation: float
     value: float
     throws: tuple[float, ...]
     kkt_residual: float
+    lower_bound: float = 0.0
 
 
 @dataclass(frozen=True)
