@@ -83,8 +83,8 @@ def equal_cylinder_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             long[6],
             "kp, mean",
             tie < 0.0,
-            f"a tie: three cylinders have {long[3]:.1f} kp, {100.0 * tie:.1f} % apart. What is left of the six is "
-            "gas torque, so a trace 2 % softer turns it",
+            f"a tie: three cylinders have {long[3]:.1f} kp, {100.0 * tie:.1f} % apart. All that is left of the "
+            "six is gas torque, and its trace is not printed",
         ),
         Verdict(
             "Six cylinders: the length of the mounting does not matter (Fig. 12)",
@@ -161,7 +161,7 @@ def _scaled(cylinders: int) -> Design:
     how = study.Build(length=scale.length, mass=scale.mass)
     webs = tuple(_scaled_rotor(rotor, scale.length, scale.mass) for rotor in crank_webs(cylinders))
     point = study.running(study.gas(study.FULL_LOAD), length=scale.length)
-    return given(f"{cylinders}", study.inline_engine(cylinders, webs, how), point)
+    return given("webs for half the couple", study.inline_engine(cylinders, webs, how), point)
 
 
 def _scaled_rotor(rotor: Rotor, length: float, mass: float) -> Rotor:

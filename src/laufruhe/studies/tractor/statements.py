@@ -124,6 +124,21 @@ def cancelling_speed(gas: GasModel, rod_ratio: float) -> float:
 
 def balanced_four(gas: GasModel | None, rod_ratio: float, piston_speed: float = study.PISTON_SPEED) -> BalancedFour:
     """The four-cylinder with the shafts of eqs. 26 and 28 (Fig. 22)."""
+    bare, left, slope = _pairs(gas, rod_ratio, piston_speed)
+    means = np.array([_mean(left + share * slope) for share in SHARES])
+    k = int(np.argmin(means))
+    both = _mean(left + shafts.MOMENT_SHARE * slope)
+    return BalancedFour(_mean(bare), _mean(left), both, float(SHARES[k]), float(means[k]))
+
+
+def moment_sweep(gas: GasModel | None, rod_ratio: float, shares: Array) -> Array:
+    """Mean mount force [N] over the share Phi of the moment pair (eq. 28), the force pair in place."""
+    _, left, slope = _pairs(gas, rod_ratio, study.PISTON_SPEED)
+    return np.array([_mean(left + share * slope) for share in shares])
+
+
+def _pairs(gas: GasModel | None, rod_ratio: float, piston_speed: float) -> tuple[Array, Array, Array]:
+    """Mount forces without shafts, with the force pair, and of a whole moment pair alone, sampled."""
     engine = study.inline_engine(4, how=study.Build(rod_ratio=rod_ratio))
     point = study.running(gas, piston_speed)
     mounting = rigid_mounting(engine.mounts)
@@ -132,11 +147,7 @@ def balanced_four(gas: GasModel | None, rod_ratio: float, piston_speed: float = 
     lanchester = bare + rotor_loads(pair, point.speed, engine.cycle)
     moment = rotor_loads(shafts.moment_pair(1.0), point.speed, engine.cycle)
     given, left, slope = (_sampled(engine, mounting.forces(load)) for load in (bare, lanchester, moment))
-    means = np.array([_mean(left + share * slope) for share in SHARES])
-    k = int(np.argmin(means))
-    return BalancedFour(
-        _mean(given), _mean(left), _mean(left + shafts.MOMENT_SHARE * slope), float(SHARES[k]), float(means[k])
-    )
+    return given, left, slope
 
 
 def _sampled(engine: Engine, forces: Spectrum) -> Array:
