@@ -13,6 +13,7 @@ from laufruhe.machine import Cycle, Engine, GasModel, Seiliger
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.order_coefficients import inertia_roll_orders
+from laufruhe.physics.seiliger_cycle import compression_end_pressure, seiliger_imep
 from laufruhe.physics.shaking_loads import Fidelity, gas_torque, rotor_loads, shaking_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
@@ -31,8 +32,10 @@ class Unprinted:
     ----------
     compression_ratio, compression_exponent, expansion_exponent
         Of the mixed cycle.
-    part_load_peak
-        Peak pressure at 5.5 kp/cm2 [Pa]; Fig. 2 prints 80 kp/cm2 for 9 kp/cm2 alone.
+    part_share
+        Where the peak pressure at 5.5 kp/cm2 lies between the end of compression (0) and
+        the highest that this load and 80 kp/cm2 allow (1); Fig. 2 prints a peak for
+        9 kp/cm2 alone.
     rod_ratio
         lambda.
     """
@@ -40,30 +43,42 @@ class Unprinted:
     compression_ratio: float = 17.0
     compression_exponent: float = 1.35
     expansion_exponent: float = 1.30
-    part_load_peak: float = study.PEAK_PRESSURE
+    part_share: float = 1.0
     rod_ratio: float = study.ROD_RATIO
 
     def cycle(self, imep: float, peak_pressure: float) -> Seiliger:
         """The mixed cycle at a load."""
-        return Seiliger(
-            peak_pressure, imep, self.compression_ratio, self.compression_exponent, self.expansion_exponent
-        )
+        return Seiliger(peak_pressure, imep, self.compression_ratio, self.compression_exponent, self.expansion_exponent)
+
+    @property
+    def compression_end(self) -> float:
+        """Pressure before heat comes [Pa]."""
+        return compression_end_pressure(self.cycle(0.0, study.PEAK_PRESSURE))
+
+    def highest_peak(self, imep: float) -> float:
+        """Peak pressure with all heat at constant volume, 80 kp/cm2 at most [Pa]."""
+        # the mean pressure is linear in the peak pressure
+        low, high = 40e5, 80e5
+        reached = [seiliger_imep(self.cycle(imep, peak), Cycle.FOUR_STROKE, 1.0) for peak in (low, high)]
+        peak = low + (imep - reached[0]) / (reached[1] - reached[0]) * (high - low)
+        return max(min(peak, study.PEAK_PRESSURE), self.compression_end)
 
     @property
     def full_load(self) -> Seiliger:
         """Of Figs. 2 to 17."""
-        return self.cycle(study.FULL_LOAD, study.PEAK_PRESSURE)
+        return self.cycle(study.FULL_LOAD, self.highest_peak(study.FULL_LOAD))
 
     @property
     def part_load(self) -> Seiliger:
         """Of Figs. 22 and 25."""
-        return self.cycle(study.PART_LOAD, self.part_load_peak)
+        end, highest = self.compression_end, self.highest_peak(study.PART_LOAD)
+        return self.cycle(study.PART_LOAD, end + self.part_share * (highest - end))
 
     @property
     def motored(self) -> Seiliger:
         """No heat: expansion follows compression back."""
-        end = 101_325.0 * self.compression_ratio**self.compression_exponent
-        return Seiliger(end, 0.0, self.compression_ratio, self.compression_exponent, self.compression_exponent)
+        exponent = self.compression_exponent
+        return Seiliger(self.compression_end, 0.0, self.compression_ratio, exponent, exponent)
 
 
 @dataclass(frozen=True)
