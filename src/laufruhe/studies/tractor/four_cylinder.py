@@ -60,7 +60,7 @@ def pairs_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             -100.0 * force,
             "%",
             abs(force - 0.70) <= 0.05,
-            "five points allowed: a rod ratio of 0.22 instead of 0.26 takes off one, gas at full load five",
+            "five points allowed: a rod ratio of 0.22 instead of 0.26 takes off four, gas at full load five",
         ),
         Verdict(
             "The moment pair at Φ = 50 % lowers what is left (Fig. 22)",
