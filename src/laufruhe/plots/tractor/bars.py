@@ -28,7 +28,9 @@ def equal_cylinders(data: xr.Dataset) -> Figure:
         mean, most, names = mounts_and_all(usual.sel(mounting=mounting))
         group(axes, mean, most, names, SERIES[: len(mean)])
         axes.set_ylabel(FORCE)
-        axes.set_title(f"{mounting} mounting" if "," not in mounting else mounting.replace(",", " mounting,"), loc="left")
+        axes.set_title(
+            f"{mounting} mounting" if "," not in mounting else mounting.replace(",", " mounting,"), loc="left"
+        )
     legend = bar_legend([f"{z} cylinders" for z in data["cylinders"].values], SERIES[: data.sizes["cylinders"]])
     return entitled(
         drawn.figure,
@@ -46,7 +48,7 @@ def equal_power(data: xr.Dataset) -> Figure:
     group(drawn.panels[0], mean, most, names, SERIES[: len(mean)])
     drawn.panels[0].set_ylabel(FORCE)
     rows = zip(data["cylinders"].values, data["displacement"].values, data["crank_speed"].values, strict=True)
-    labels = [f"{z}: {1e3 * v:.2f} l, {n * 9.549297:.0f} rpm" for z, v, n in rows]
+    labels = [f"{z} cyl.: {1e3 * v:.2f} l, {n * 9.549297:.0f} rpm" for z, v, n in rows]
     return entitled(
         drawn.figure,
         "Two, three, four and six cylinders of equal total power",
@@ -135,5 +137,3 @@ def two_stroke(data: xr.Dataset) -> Figure:
         bar_legend(["webs", "+ shaft (study)", "shaft and webs, optimum"], colours),
         "Figs. 26 to 28",
     )
-
-

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from textwrap import wrap
+from typing import Literal
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
+from numpy.typing import NDArray
 
 from laufruhe.plots.style import FAINT, page
 from laufruhe.plots.tractor.sheet import (
@@ -29,7 +34,11 @@ from laufruhe.plots.tractor.sheet import (
 def parts(data: xr.Dataset) -> Figure:
     """Figs. 2, 5, 7: one panel each."""
     drawn = page(3, 1, (8.0, 1.9), lead=0.22, gap=0.35)
-    titles = {"gas": "Fig. 2: gas", "reciprocating mass": "Fig. 5: reciprocating mass", "rod inertia": "Fig. 7: inertia of the rod, scale 100 times larger"}
+    titles = {
+        "gas": "Fig. 2: gas",
+        "reciprocating mass": "Fig. 5: reciprocating mass",
+        "rod inertia": "Fig. 7: inertia of the rod, scale 100 times larger",
+    }
     for axes, part in zip(drawn.panels, data["part"].values, strict=True):
         for mount, colour in (("left", BLUE), ("right", ORANGE)):
             curve = data["vertical_force"].sel(part=part, mount=mount) / KILOPOND
@@ -56,14 +65,16 @@ def polar(data: xr.Dataset) -> Figure:
     drawn = page(1, 2, (4.0, 4.4), lead=0.25, gap=0.6)
     colours = (GREY, BLUE, ORANGE)
     reach = 1.08 * float(np.abs(data["force"]).max()) / KILOPOND
-    for axes, mount, where in zip(drawn.panels, ("left", "right"), ("Fig. 8: left mount", "Fig. 9: right mount"), strict=True):
+    for axes, mount, where in zip(
+        drawn.panels, ("left", "right"), ("Fig. 8: left mount", "Fig. 9: right mount"), strict=True
+    ):
         for share, colour in zip(data["fraction"].values, colours, strict=True):
             path = data["force"].sel(fraction=share, mount=mount) / KILOPOND
             closed = np.concatenate([path.values, path.values[:1]])
-            axes.plot(closed[:, 0], closed[:, 1], color=colour, linewidth=1.5)
+            axes.plot(closed[:, 0], closed[:, 1], color=colour, linewidth=1.5 if share else 3.0)
         axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel="lateral force [kp]")
-        axes.axhline(0.0, color=FAINT, linewidth=0.7)
-        axes.axvline(0.0, color=FAINT, linewidth=0.7)
+        axes.axhline(0.0, color="#bbbbbb", linewidth=0.6, zorder=0.5)
+        axes.axvline(0.0, color="#bbbbbb", linewidth=0.6, zorder=0.5)
         axes.set_title(where, loc="left")
     drawn.panels[0].set_ylabel("vertical force [kp]")
     legend = [line(c, f"{100 * f:.0f} % balanced") for f, c in zip(data["fraction"].values, colours, strict=True)]
@@ -88,7 +99,9 @@ def fraction(data: xr.Dataset) -> Figure:
         axes.text(101.0, float(row["mean"][-1]) / KILOPOND, f"{speed:g} m/s", color=colour, va="center")
     axes.axvline(50.0, color=FAINT, linewidth=0.8, linestyle=(0, (3, 3)))
     axes.text(50.8, 4.0, "about 50 %: the study's optimum", color=FAINT, size=8)
-    axes.set(xlim=(0, 112), ylim=(0, None), xlabel="balance fraction of the reciprocating mass [%]", ylabel="mean " + FORCE)
+    axes.set(
+        xlim=(0, 112), ylim=(0, None), xlabel="balance fraction of the reciprocating mass [%]", ylabel="mean " + FORCE
+    )
     best = 100.0 * float(data["best_fraction"].sel(speed=10.0))
     return entitled(
         drawn.figure,
@@ -102,7 +115,10 @@ def fraction(data: xr.Dataset) -> Figure:
 def vee(data: xr.Dataset) -> Figure:
     """Fig. 29: parts of both orders by bank angle."""
     drawn = page(1, 2, (4.0, 3.3), lead=0.25, gap=0.6)
-    styles = {"with the crank": (BLUE, "-"), "against the crank": (ORANGE, "--")}
+    styles: dict[str, tuple[str, Literal["-", "--"]]] = {
+        "with the crank": (BLUE, "-"),
+        "against the crank": (ORANGE, "--"),
+    }
     for axes, order, name in zip(drawn.panels, (1, 2), ("First order", "Second order"), strict=True):
         for direction, (colour, style) in styles.items():
             curve = data["force"].sel(order=order, direction=direction)
@@ -111,7 +127,14 @@ def vee(data: xr.Dataset) -> Figure:
         axes.xaxis.set_major_locator(MultipleLocator(30))
         axes.set_title(name, loc="left")
     drawn.panels[0].set_ylabel("rotating force over m r ω²")
-    drawn.panels[0].annotate("90°: webs alone\nbalance the rest", (90, 0), (100, 0.42), size=8, color=FAINT, arrowprops={"arrowstyle": "-", "color": FAINT})
+    drawn.panels[0].annotate(
+        "90°: webs alone\nbalance the rest",
+        (90, 0),
+        (100, 0.42),
+        size=8,
+        color=FAINT,
+        arrowprops={"arrowstyle": "-", "color": FAINT},
+    )
     legend = [line(c, f"turns {name}", s) for name, (c, s) in styles.items()]
     return entitled(
         drawn.figure,
@@ -139,8 +162,6 @@ def boxer(data: xr.Dataset) -> Figure:
         axes.set_xticks(places, [f"order {order}" for order in data["order"].values])
         axes.grid(axis="x", visible=False)
         axes.set(ylabel=label, ylim=(0.0, 1.1 * top))
-    from matplotlib.patches import Patch
-
     return entitled(
         drawn.figure,
         "Four cylinders in line and opposed",
@@ -199,9 +220,12 @@ def free_force(data: xr.Dataset) -> Figure:
     drawn = page(1, 1, (7.2, 3.6))
     axes = drawn.panels[0]
     axes.plot(data["speed"], data["force"] / KILOPOND, color=BLUE, linewidth=2.0)
-    for level, words in ((1000.0, "1000 kp: free force of a vehicle diesel, as stated"), (100.0, "100 kp: worst sum of tolerances, as stated")):
+    for level, words in (
+        (1000.0, "1000 kp: free force of a vehicle diesel, as stated"),
+        (100.0, "100 kp: worst sum of tolerances, as stated"),
+    ):
         axes.axhline(level, color=VERMILION, linewidth=1.2, linestyle=(0, (4, 3)))
-        axes.text(4.1, level + 12.0, words, size=8, color=FAINT, va="bottom")
+        axes.text(4.1 if level > 500.0 else 7.0, level + 12.0, words, size=8, color=FAINT, va="bottom")
     axes.axvline(10.0, color=FAINT, linewidth=0.8, linestyle=(0, (2, 3)))
     axes.set(xlim=(4, 14), ylim=(0, 1150), xlabel="mean piston speed [m/s]", ylabel="force [kp]")
     return entitled(
@@ -224,18 +248,18 @@ def traces(data: xr.Dataset) -> Figure:
         "first_fall": ("force pair: less by [%]", 100.0),
         "second_fall": ("moment pair: less by [%]", 100.0),
     }
-    drawn = page(1, len(labels), (1.75, 3.2), lead=0.25, gap=0.3)
-    cases = [str(case) for case in data["case"].values]
-    places = np.arange(len(cases), dtype=float)[::-1]
-    fired = [not case.startswith("no load") for case in cases]
-    for axes, (name, (label, factor)) in zip(drawn.panels, labels.items(), strict=True):
+    drawn = page(1, len(labels) + 1, (1.75, 3.5), lead=0.25, gap=0.3)
+    places = np.arange(data.sizes["case"], dtype=float)[::-1]
+    _case_names(drawn.panels[0], data, places)
+    fired = [not str(case).startswith("no load") for case in data["case"].values]
+    for axes, (name, (label, factor)) in zip(drawn.panels[1:], labels.items(), strict=True):
         claim, span = factor * CLAIMED[name], factor * ALLOWED[name]
         axes.axvspan(claim - span, claim + span, color="#d9ecd9", linewidth=0)
         axes.axvline(claim, color=GREEN, linewidth=1.0)
         _scatter(axes, factor * data[name].values, places, fired)
         axes.set_title(label, loc="left", size=8.5)
-        axes.set_yticks(places, cases if axes is drawn.panels[0] else [""] * len(cases))
-        axes.set_ylim(-0.6, len(cases) - 0.4)
+        axes.set_yticks(places, [""] * len(places))
+        axes.set_ylim(-0.6, len(places) - 0.4)
     return entitled(
         drawn.figure,
         "Which gas trace meets what the study says of it",
@@ -245,9 +269,17 @@ def traces(data: xr.Dataset) -> Figure:
     )
 
 
-def _scatter(axes: object, values: np.ndarray, places: np.ndarray, fired: Sequence[bool]) -> None:
+def _case_names(axes: Axes, data: xr.Dataset, places: NDArray[np.float64]) -> None:
+    """Names of the cases and their parameters, where the first panel would be."""
+    axes.set_axis_off()
+    axes.set(xlim=(0.0, 1.0), ylim=(-0.6, len(places) - 0.4))
+    for case, words, place in zip(data["case"].values, data["parameters"].values, places, strict=True):
+        axes.text(-0.3, place + 0.05, str(case), size=9, weight="bold", va="bottom")
+        for k, part in enumerate(wrap(str(words), 38)):
+            axes.text(-0.3, place - 0.03 - 0.24 * k, part, size=6.5, va="top", color=FAINT)
+
+
+def _scatter(axes: Axes, values: NDArray[np.float64], places: NDArray[np.float64], fired: Sequence[bool]) -> None:
     for value, place, hot in zip(values, places, fired, strict=True):
         if math.isfinite(value):
-            axes.plot(value, place, "o", color=ORANGE if hot else BLUE, markersize=7)  # type: ignore[attr-defined]
-
-
+            axes.plot(value, place, "o", color=ORANGE if hot else BLUE, markersize=7)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -30,7 +31,7 @@ def entitled(figure: Figure, title: str, line: str, legend: Sequence[Artist], nu
     return figure
 
 
-def line(colour: str, label: str, style: str = "-", width: float = 2.0) -> Line2D:
+def line(colour: str, label: str, style: Literal["-", "--"] = "-", width: float = 2.0) -> Line2D:
     """A line in a legend."""
     return Line2D([], [], color=colour, label=label, linestyle=style, linewidth=width)
 
@@ -43,23 +44,34 @@ def dot(colour: str, label: str) -> Line2D:
 def bar_legend(names: Sequence[str], colours: Sequence[str]) -> list[Artist]:
     """Names of the series, and what filled and hollow means."""
     fills: list[Artist] = [Patch(facecolor=c, label=n) for n, c in zip(names, colours, strict=True)]
-    return [*fills, Patch(facecolor=FAINT, label="filled: mean"), Patch(facecolor="none", edgecolor=FAINT, label="outline: largest")]
+    return [
+        *fills,
+        Patch(facecolor=FAINT, label="filled: mean"),
+        Patch(facecolor="none", edgecolor=FAINT, label="outline: largest"),
+    ]
 
 
 def pairs(
-    axes: Axes, places: NDArray[np.float64], mean: NDArray[np.float64], most: NDArray[np.float64], colour: str,
-    width: float, top: float,
+    axes: Axes,
+    places: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    most: NDArray[np.float64],
+    colour: str,
+    width: float,
+    top: float,
 ) -> None:
     """Mean as a filled bar, the largest value as an outline around it, with their numbers."""
     axes.bar(places, mean, width, color=colour, linewidth=0)
     axes.bar(places, most, width, facecolor="none", edgecolor=colour, linewidth=1.3)
     for x, low, high in zip(places, mean, most, strict=True):
         axes.text(x, high + 0.012 * top, number(float(high), 3), ha="center", va="bottom", size=6.5, color=FAINT)
-        if low > 0.07 * top:
+        if low > 0.055 * top:
             axes.text(x, low - 0.012 * top, number(float(low), 3), ha="center", va="top", size=6.5, color="white")
 
 
-def group(axes: Axes, mean: NDArray[np.float64], most: NDArray[np.float64], names: Sequence[str], colours: Sequence[str]) -> None:
+def group(
+    axes: Axes, mean: NDArray[np.float64], most: NDArray[np.float64], names: Sequence[str], colours: Sequence[str]
+) -> None:
     """Groups of bars, shape (series, groups), names below the groups."""
     count = len(mean)
     width = 0.84 / count

@@ -178,7 +178,7 @@ def _fitted(residuals: Callable[[Unprinted], Sequence[float]], starts: Sequence[
             scaled,
             np.clip((_vector(start) - low) / (high - low), 0.02, 0.98),
             bounds=(0.0, 1.0),
-            diff_step=2e-3,
+            diff_step=[2e-3] * len(low),
             ftol=1e-4,
             xtol=1e-4,
             max_nfev=30,
@@ -200,7 +200,9 @@ def _late_burn() -> Wiebe:
     def residual(x: Array) -> Array:
         return np.array([cancelling_speed(_burn(x), study.ROD_RATIO) - CLAIMED["cancelling_speed"]])
 
-    fit = least_squares(residual, [0.0, 60.0], bounds=([-20.0, 30.0], [20.0, 110.0]), diff_step=1e-3, max_nfev=15)
+    fit = least_squares(
+        residual, [0.0, 60.0], bounds=([-20.0, 30.0], [20.0, 110.0]), diff_step=[1e-3, 1e-3], max_nfev=15
+    )
     return _burn(fit.x)
 
 

@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.verdict import Verdict
+
+Array = NDArray[np.float64]
 
 GRAVITY = 9.80665
 DAMPINGS = (0.0, 0.5, 1.0, 2.0, 4.0)
@@ -18,14 +21,14 @@ CRITICAL_SPEEDS = np.arange(150.0, 1001.0, 10.0)
 EXAMPLE_SPEED = 400.0
 
 
-def transmissibility(speed_ratio: np.ndarray, damping: float) -> np.ndarray:
+def transmissibility(speed_ratio: Array, damping: float) -> Array:
     """Force on the foundation over the exciting force, loss factor eta = psi / (2 pi) (eq. 40, Fig. 31)."""
     loss = damping / math.tau
     with np.errstate(divide="ignore"):
         return np.asarray(np.sqrt((1.0 + loss**2) / ((1.0 - speed_ratio**2) ** 2 + loss**2)))
 
 
-def sag(critical_speed: np.ndarray | float, order: int) -> np.ndarray:
+def sag(critical_speed: Array | float, order: int) -> Array:
     """Static sag [m] of a mass whose order excites it at a critical speed [rpm] (eq. 41)."""
     return np.asarray(GRAVITY / (np.asarray(critical_speed) * order * math.pi / 30.0) ** 2)
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum
@@ -51,7 +52,7 @@ def parts() -> xr.Dataset:
     )
 
 
-def _forces(engine: Engine, load: Spectrum) -> np.ndarray:
+def _forces(engine: Engine, load: Spectrum) -> NDArray[np.float64]:
     forces = rigid_mounting(engine.mounts).forces(load).rebased(Fraction(1, 2))
     return np.asarray(forces.sample(SAMPLES)[:, :, 2])
 
@@ -63,7 +64,7 @@ def _piston_force() -> float:
 
 def parts_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
     """Of Figs. 2, 5 and 7."""
-    largest = np.abs(data["vertical_force"]).max(dim=("angle", "mount"))
+    largest = abs(data["vertical_force"]).max(("angle", "mount"))
     gas, mass, rod = (float(largest.sel(part=name)) / study.KILOPOND for name in data["part"].values)
     piston = float(data["piston_force"]) / study.KILOPOND
     series = data["vertical_force"].sel(part="rod inertia", mount="left").values
@@ -84,8 +85,8 @@ def parts_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             mass / gas,
             "",
             abs(mass / gas - TIMES_CLAIMED) <= 0.5,
-            f"on one mount the largest are {mass:.0f} and {gas:.0f} kp. Eq. 7 halves the force of the piston; the whole "
-            f"of it, {piston:.0f} kp on both mounts together, is twice the 300 kp",
+            f"on one mount the largest are {mass:.0f} and {gas:.0f} kp. Eq. 7 halves the force of the piston; the "
+            f"whole of it, {piston:.0f} kp on both mounts together, is twice the 300 kp",
         ),
         Verdict(
             "Mount force from the rod's inertia deficit is small (Fig. 7)",
@@ -126,7 +127,7 @@ def polar() -> xr.Dataset:
 
 def polar_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
     """Of Figs. 8 and 9."""
-    rms = np.sqrt((data["force"] ** 2).mean(dim=("angle", "mount")))
+    rms = (data["force"] ** 2).mean(("angle", "mount")) ** 0.5
     lateral = (rms.sel(direction="lateral") / rms.sel(direction="vertical")).values
     return (
         Verdict(
