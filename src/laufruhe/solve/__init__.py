@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.solve.result import ObjectiveValue, Result, Status
@@ -22,6 +23,12 @@ def solve(problem: Problem) -> Result:
     ModelError
         If the engine as given cannot be evaluated.
     """
+    if problem.phasing is not None:
+        from laufruhe.solve.phasing import solve_phasing
+
+        return solve_phasing(problem)
+    if problem.decisions and not problem.objective:
+        raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
     return solve_unbalances(problem) if problem.decisions else state(problem)
 
 
