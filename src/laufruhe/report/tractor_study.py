@@ -49,8 +49,9 @@ class Figure:
 _WORDS: dict[str, tuple[str, str]] = {
     "fig-02-05-07": (
         "Mount force of the single, part by part",
-        "Gas loads a mount of the single with up to 300 kp (Fig. 2), the reciprocating mass with twice as much (Fig. 5); "
-        "what the two point masses of the rod miss of its inertia hardly matters, and is of first order (Fig. 7).",
+        "Gas loads a mount of the single with up to 300 kp (Fig. 2), the reciprocating mass with twice as much "
+        "(Fig. 5); what the two point masses of the rod miss of its inertia hardly matters, and is of first order "
+        "(Fig. 7).",
     ),
     "fig-08-09": (
         "Polar diagrams of the single",
@@ -84,8 +85,8 @@ _WORDS: dict[str, tuple[str, str]] = {
     ),
     "fig-25": (
         "Four cylinders with one pair at the front end",
-        "A pair at the front end alone helps markedly; turned for force and moment, with 72 % of the force, not as much "
-        "as two pairs but still considerably (Fig. 25).",
+        "A pair at the front end alone helps markedly; turned for force and moment, with 72 % of the force, not as "
+        "much as two pairs but still considerably (Fig. 25).",
     ),
     "fig-28": (
         "Two-stroke four-cylinder on two cranks",
@@ -106,7 +107,8 @@ _WORDS: dict[str, tuple[str, str]] = {
     ),
     "fig-32": (
         "Sag of an elastic mounting",
-        "A critical speed of 400 rpm takes 5.6 mm with first-order excitation, 1.4 mm with second order only (Fig. 32).",
+        "A critical speed of 400 rpm takes 5.6 mm with first-order excitation, 1.4 mm with second order only "
+        "(Fig. 32).",
     ),
     "free-force": (
         "Free force against tolerances",

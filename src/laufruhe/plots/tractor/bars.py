@@ -112,7 +112,7 @@ def front(data: xr.Dataset) -> Figure:
     return entitled(
         drawn.figure,
         "Four cylinders with one balancer pair at the front end of the crank",
-        "A pair for force, or one above the other for force and moment; last, the pairs of Fig. 21. 5.5 kp/cm², 10 m/s.",
+        "A pair for force, or one above the other for force and moment; Fig. 21 for comparison. 5.5 kp/cm², 10 m/s.",
         bar_legend(short, SERIES[: len(mean)]),
         "Figs. 23 to 25",
     )

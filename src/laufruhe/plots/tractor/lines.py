@@ -130,7 +130,7 @@ def vee(data: xr.Dataset) -> Figure:
     drawn.panels[0].annotate(
         "90°: webs alone\nbalance the rest",
         (90, 0),
-        (100, 0.42),
+        (67, 0.72),
         size=8,
         color=FAINT,
         arrowprops={"arrowstyle": "-", "color": FAINT},

@@ -149,6 +149,6 @@ def front_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             "%",
             abs(share - 0.72) <= 0.05,
             "of a pair in the plane where the crank is taken to end, 250 mm ahead of the middle; the front mounts "
-            "carry 77 %. For 72 % it would stand 413 mm ahead, in front of the mounts, where no figure's text puts it",
+            "carry 77 %. For 72 % it would stand 413 mm ahead, ahead of the front mounts too",
         ),
     )

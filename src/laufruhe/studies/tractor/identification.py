@@ -45,8 +45,8 @@ ALLOWED = {
     "first_fall": 0.05,
     "second_fall": 0.05,
 }
-UNITS = {"gas_force": "kp", "cancelling_speed": "m/s", "best_share": "1", "first_fall": "1", "second_fall": "1"}
 """What 'about' is taken to mean: 5 % of a size, five points of a fall, ten of a flat optimum's place."""
+UNITS = {"gas_force": "kp", "cancelling_speed": "m/s", "best_share": "1", "first_fall": "1", "second_fall": "1"}
 
 LOWEST = Unprinted(12.0, 1.25, 1.15, 0.0, 0.20)
 HIGHEST = Unprinted(22.0, 1.40, 1.45, 1.0, 0.32)
@@ -242,8 +242,8 @@ def verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             at[ASSUMED_CASE],
             "m/s",
             abs(at[ASSUMED_CASE] - 7.0) <= ALLOWED["cancelling_speed"],
-            f"the softest mixed cycle found within bounds gets down to {at[FIRED_SPEED]:.1f} m/s; a burn from dead centre "
-            f"far into expansion to {at[LATE]:.1f} m/s, with a peak of {peak:.0f} kp/cm²",
+            f"the softest mixed cycle found within bounds gets down to {at[FIRED_SPEED]:.1f} m/s; a burn from dead "
+            f"centre far into expansion to {at[LATE]:.1f} m/s, with a peak of {peak:.0f} kp/cm²",
         ),
         Verdict(
             "The same without load",
