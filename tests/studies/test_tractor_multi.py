@@ -39,7 +39,7 @@ class TestEqualCylinders:
         assert float(short.sel(cylinders=6)) < 0.7 * float(short.drop_sel(cylinders=6).min())
 
     def test_six_and_three_are_level_when_long(self, mean: xr.DataArray) -> None:
-        """The study has six best. Here three are ahead by about a percent of the mean, six by a third of the largest."""
+        """The study has six best. Here three are ahead by a percent of the mean, six by a third of the largest."""
         long = mean.sel(mounting=layouts.LONG)
         assert float(long.sel(cylinders=6) / long.sel(cylinders=3)) == pytest.approx(1.011, abs=0.005)
 
@@ -77,7 +77,7 @@ class TestEqualCylinders:
         """Half of the couple is what a crank can do in first order; higher orders and gas move the optimum by 2 %."""
         means = figure("fig-12")["mean_of_mounts"]
         usual, best = means.sel(design="webs for half the couple"), means.sel(design="webs at the optimum")
-        assert (best <= usual * (1.0 + 1e-6)).all()
+        assert (best <= usual * (1.0 + 1e-4)).all()
         assert (best >= 0.97 * usual).all()
 
 
@@ -114,7 +114,7 @@ class TestFourCylinder:
         assert fall(figure("fig-22"), four_cylinder.BARE, four_cylinder.FORCE) == pytest.approx(0.70, abs=0.05)
 
     def test_moment_pair_at_part_load_does_not_reach_the_studys_53_percent(self, figure: Data) -> None:
-        """Where ours disagrees: at 5.5 kp/cm2 gas takes 81 % of the inertia's second order, so half a pair is too much."""
+        """Where ours disagrees: gas at 5.5 kp/cm2 takes 81 % of the inertia's second order: half a pair is too much."""
         data = figure("fig-22")
         assert 0.0 < fall(data, four_cylinder.FORCE, four_cylinder.BOTH) < 0.05
         assert float(data["swept_mean"].sel(load="5.5 kp/cm²").idxmin("share")) == pytest.approx(0.275, abs=0.05)

@@ -83,8 +83,8 @@ def equal_cylinder_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             long[6],
             "kp, mean",
             tie < 0.0,
-            f"three cylinders have {long[3]:.1f} kp, {100.0 * tie:.1f} % less. On traces of compression ratios 16 to 20.5 "
-            "they stay ahead by 1 to 4 %: close enough that bars of one height may have been drawn",
+            f"three cylinders have {long[3]:.1f} kp, {100.0 * tie:.1f} % less. On traces of compression ratios "
+            "16 to 20.5 they stay ahead by 1 to 4 %: close enough that bars of one height may have been drawn",
         ),
         Verdict(
             "Six cylinders: the length of the mounting does not matter (Fig. 12)",
