@@ -1,0 +1,158 @@
+"""The tractor study as a registry: what each figure says, how it is computed, drawn and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import xarray as xr
+
+from laufruhe.studies.tractor import COMPUTE, VERDICTS, Verdict
+
+__all__ = ["FIGURES", "Figure", "Verdict", "verdict_table"]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure of the study.
+
+    Attributes
+    ----------
+    name
+        Of files and tables.
+    title
+        One line.
+    paper
+        What the study says, in other words.
+    compute
+        The dataset behind it, units in its attributes.
+    verdicts
+        The study's statements, read off the dataset.
+    """
+
+    name: str
+    title: str
+    paper: str
+    compute: Callable[[], xr.Dataset]
+    verdicts: Callable[[xr.Dataset], tuple[Verdict, ...]]
+
+    def draw(self, data: xr.Dataset, path: Path) -> None:
+        """Write the picture as a PNG file."""
+        # late: a study may be computed without drawing it
+        from laufruhe.plots.style import save
+        from laufruhe.plots.tractor import DRAW
+
+        save(DRAW[self.name](data), path)
+
+
+_WORDS: dict[str, tuple[str, str]] = {
+    "fig-02-05-07": (
+        "Mount force of the single, part by part",
+        "Gas loads a mount of the single with up to 300 kp (Fig. 2), the reciprocating mass with twice as much "
+        "(Fig. 5); what the two point masses of the rod miss of its inertia hardly matters, and is of first order "
+        "(Fig. 7).",
+    ),
+    "fig-08-09": (
+        "Polar diagrams of the single",
+        "Little balancing leaves chiefly vertical forces, much of it chiefly lateral ones (Figs. 8 and 9).",
+    ),
+    "fig-10": (
+        "Mean mount force over the balance fraction",
+        "About half of the reciprocating mass should be balanced if both directions count alike, and forces grow with "
+        "piston speed (Fig. 10).",
+    ),
+    "fig-12": (
+        "Two, three, four and six equal cylinders",
+        "Six cylinders are best and do not mind the length of the mounting; four come off badly, their front mounts "
+        "worse when it is long; three do well; two suffer from second order on the front mounts (Fig. 12).",
+    ),
+    "fig-13": (
+        "The same at equal total power",
+        "Three cylinders beat four, and two by more (Fig. 13).",
+    ),
+    "fig-15": (
+        "Two cylinders with a first-order shaft",
+        "Negligible on rigid mounts, because the force of second order prevails (Fig. 15).",
+    ),
+    "fig-17": (
+        "Three cylinders with a first-order shaft",
+        "Noticeable, if not very large (Fig. 17).",
+    ),
+    "fig-22": (
+        "Four cylinders with force pair and moment pair",
+        "The force pair takes off 70 %, half of the full moment pair another 53 % (Fig. 22).",
+    ),
+    "fig-25": (
+        "Four cylinders with one pair at the front end",
+        "A pair at the front end alone helps markedly; turned for force and moment, with 72 % of the force, not as "
+        "much as two pairs but still considerably (Fig. 25).",
+    ),
+    "fig-28": (
+        "Two-stroke four-cylinder on two cranks",
+        "Without a shaft the common crank is better; with one, the other crank, of which no first or second order is "
+        "left (Fig. 28).",
+    ),
+    "fig-29": (
+        "V-twin by bank angle",
+        "At 90 degrees nothing of first order turns against the crank; at 180 the second order vanishes (Fig. 29).",
+    ),
+    "fig-30": (
+        "Boxer against inline",
+        "Both are free of first order; the second is a force in line and a couple in the boxer (Fig. 30).",
+    ),
+    "fig-31": (
+        "Isolation of an elastic mounting",
+        "A mounting isolates from sqrt 2 times its natural frequency on (Fig. 31).",
+    ),
+    "fig-32": (
+        "Sag of an elastic mounting",
+        "A critical speed of 400 rpm takes 5.6 mm with first-order excitation, 1.4 mm with second order only "
+        "(Fig. 32).",
+    ),
+    "free-force": (
+        "Free force against tolerances",
+        "A four-cylinder vehicle diesel has about 1000 kp of free second-order force, all tolerances together make "
+        "100 kp at worst.",
+    ),
+    "gas-trace": (
+        "The gas trace behind the figures",
+        "No trace is printed; 300 kp, 7 m/s, Φ = 50 %, 70 % and 53 % bear on it.",
+    ),
+}
+
+FIGURES: dict[str, Figure] = {
+    name: Figure(name, *words, COMPUTE[name], VERDICTS[name]) for name, words in _WORDS.items()
+}
+"""Every figure of the study, by its name."""
+
+
+def verdict_table(verdicts: Mapping[str, tuple[Verdict, ...]]) -> str:
+    """All statements as a Markdown table, figure by figure."""
+    lines = ["| statement | the study | here | confirmed | why |", "| --- | --- | --- | --- | --- |"]
+    for name in verdicts:
+        for v in verdicts[name]:
+            ours = "0" if abs(v.ours) < 1e-9 else f"{v.ours:.4g}"
+            cells = (v.statement, v.paper, f"{ours} {v.unit}".strip(), "yes" if v.agrees else "**no**", v.why)
+            lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def main(folder: str) -> None:
+    """Every dataset, picture and verdict into a folder."""
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    found: dict[str, tuple[Verdict, ...]] = {}
+    for name, figure in FIGURES.items():
+        data = figure.compute()
+        data.to_netcdf(target / f"{name}.nc")
+        figure.draw(data, target / f"{name}.png")
+        found[name] = figure.verdicts(data)
+        print(f"{name}: {sum(v.agrees for v in found[name])} of {len(found[name])} statements confirmed")
+    (target / "verdicts.md").write_text(verdict_table(found), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    import sys
+
+    main(*sys.argv[1:2])

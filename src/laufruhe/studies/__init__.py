@@ -1,0 +1,1 @@
+"""Sweeps and comparisons: many designs, one labelled table."""
