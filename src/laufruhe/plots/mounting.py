@@ -91,7 +91,7 @@ def transmissibility(result: Result) -> Figure:
     ]
     legend += _limits(axes, result, top)
     axes.axhline(1.0, color=FAINT, linewidth=0.8)
-    _points(axes, result, 1.25 * highest)
+    _points(axes, result, 0.98)
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(10.0, (1.0, 2.0, 5.0), numticks=12))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -124,14 +124,15 @@ def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:
     return [Line2D([], [], color=LIMIT, linewidth=2.4, label="limit")] if found else []
 
 
-def _points(axes: Axes, result: Result, height: float) -> None:
+def _points(axes: Axes, result: Result, share: float) -> None:
     """Operating points as thin lines; names where they do not crowd."""
     points = result.problem.points
     for k, point in enumerate(points):
         axes.axvline(point.speed * _RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)
         if len(points) <= 5 or k in (0, len(points) - 1):
-            words: Any = {"size": 7.5, "color": FAINT, "va": "bottom", "ha": "right", "rotation": 90}
-            axes.text(point.speed * _RPM, height, f" {point.name}", **words)
+            side = "top" if share > 0.5 else "bottom"
+            words: Any = {"size": 7.5, "color": FAINT, "va": side, "ha": "right", "rotation": 90}
+            axes.text(point.speed * _RPM, share, point.name, transform=axes.get_xaxis_transform(), **words)
 
 
 def campbell(result: Result) -> Figure:
@@ -156,7 +157,7 @@ def campbell(result: Result) -> Figure:
             axes.plot(critical_speed(frequency, order) * _RPM, frequency, "o", color=AFTER, markersize=4.5, zorder=5)
     for height, (_, text) in zip(_apart([f for f, _ in labels], 0.038 * reach), labels, strict=True):
         axes.text(1.01, height / reach, text, size=7.5, color=INK, va="center", transform=axes.transAxes)
-    _points(axes, result, 0.02 * reach)
+    _points(axes, result, 0.02)
     axes.set(xlim=(0.0, top * _RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
     legend = _order_lines(facts, AFTER)
     legend.append(Line2D([], [], color=AFTER, marker="o", linestyle="none", markersize=4.5, label="critical speed"))
