@@ -180,16 +180,18 @@ def trade(result: Result) -> Figure:
             size=7.5,
             color=FAINT,
         )
+    # what holds with more freedom holds with less: a step reaches back to the point before
+    freedom = [math.degrees(p.allowed) for p in phasing.trade]
+    bounds = [p.lower_bound for p in phasing.trade]
+    axes.plot(freedom, bounds, color=BEFORE, linewidth=1.2, linestyle=(0, (4, 2)), drawstyle="steps-pre", zorder=1)
     name = result.objective.name if result.objective else ""
     unit = result.objective.unit if result.objective else ""
     axes.set(
-        xlim=(-0.03 * max(*x, 1e-3), 1.12 * max(*x, 1e-3)),
+        xlim=(-0.03 * freedom[-1], 1.08 * freedom[-1]),
         ylim=(-0.03 * max(*y, 1e-300), 1.15 * max(*y, 1e-300)),
         xlabel="largest deviation of a firing interval from even [deg]",
         ylabel=f"{name} [{unit}]" if len(name) < 42 else f"objective [{unit}]",
     )
-    bounds = [p.lower_bound for p in points]
-    axes.plot(x, bounds, color=BEFORE, linewidth=1.2, linestyle=(0, (4, 2)))
     legend = [
         Line2D([], [], color=AFTER, marker="o", label="best local optimum found"),
         Line2D([], [], color=BEFORE, linestyle=(0, (4, 2)), label="proven: no design below"),

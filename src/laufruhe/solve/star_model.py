@@ -18,7 +18,6 @@ from laufruhe.machine.firing import even_orders, star_throws
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.spectrum import common_base
-from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.model import Problem, UnbalanceDecision
 from laufruhe.problem.phasing import Candidate, Phasing
@@ -219,8 +218,3 @@ def _compressed(norm: StarNorm) -> StarNorm:
         turns,
         np.ones(rows),
     )
-
-
-def step_counts(stars: Stars, phases: int) -> NDArray[np.int64]:
-    """Throws on every step, shape (n, phases)."""
-    return np.stack([(stars == p).sum(axis=1) for p in range(phases)], axis=1)
