@@ -92,7 +92,7 @@ def pairs(data: xr.Dataset) -> Figure:
     lower.text(50.5, 2.0, "Φ = 50 % of the study", color="#666666", size=8)
     lower.set(xlim=(0, 113), ylim=(0, None), xlabel="share Φ of the moment pair [%]", ylabel="mean force [kp]")
     lower.set_title("Mean force over the share of the moment pair, force pair in place; dots: best share", loc="left")
-    legend = bar_legend(["none", "force pair", "+ moment pair", "force, opt.", "both, opt."], SERIES[: len(mean)])
+    legend = bar_legend(["none", "force pair", "+ moment pair", "force, optimum", "both, optimum"], SERIES[: len(mean)])
     return entitled(
         drawn.figure,
         "Four cylinders with a force pair and a moment pair at twice crank speed",
@@ -104,11 +104,11 @@ def pairs(data: xr.Dataset) -> Figure:
 
 def front(data: xr.Dataset) -> Figure:
     """Fig. 25: one pair at the front end."""
-    drawn = page(1, 1, (9.6, 3.5))
+    drawn = page(1, 1, (10.8, 3.6))
     mean, most, names = mounts_and_all(data)
     group(drawn.panels[0], mean, most, names, SERIES[: len(mean)])
     drawn.panels[0].set_ylabel(FORCE)
-    short = ["none", "force 72 %", "force + moment", "force, opt.", "both, opt.", "Fig. 21"]
+    short = ["none", "force 72 %", "force + moment", "force, optimum", "both, optimum", "pairs of Fig. 21"]
     return entitled(
         drawn.figure,
         "Four cylinders with one balancer pair at the front end of the crank",

@@ -263,7 +263,7 @@ def traces(data: xr.Dataset) -> Figure:
     return entitled(
         drawn.figure,
         "Which gas trace meets what the study says of it",
-        "Five statements, seven sets of parameters. Green: the statement, and what 'about' is taken to mean.",
+        "Seven sets of parameters. Green: stated, and what 'about' is taken to mean. Gas force: at 9 kp/cm².",
         [dot(ORANGE, "fired at 5.5 kp/cm²"), dot(BLUE, "without load"), line(GREEN, "the study")],
         "Figs. 2 and 22, and the 7 m/s of the text",
     )
