@@ -118,3 +118,10 @@ def test_cylinders_are_asked_for(tmp_path):
 def test_layouts_without_stars_are_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be open in layout 'boxer'"):
         engines.problem(tmp_path, 4, engine='bank_stagger = "30 mm"\nthrows = "open"', layout="boxer")
+
+
+def test_a_sum_that_even_firing_leaves_open_is_refused(tmp_path):
+    """Bank angle and split pin both open: even firing binds only their sum, so no search over them would be whole."""
+    both = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"
+    with pytest.raises(InputError, match="split_pin_angle.*binds only their sum.*fix one of the two"):
+        engines.problem(tmp_path, 6, "four-stroke", both + OPEN, layout="vee")

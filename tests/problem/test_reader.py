@@ -260,7 +260,7 @@ BAD = [
     bad("unknown operating point", '"mean mount force"', "\"mean mount force\"\noperating_points = [\"idle\"]",
         'objective.operating_points = "idle": is no operating point here'),
     bad("weights of a moment", '"mean mount force"', "\"mean roll moment\"\ndirection_weights = [1, 1, 0]",
-        "objective.mounts: goes with mount forces only; leave it out"),
+        "objective.mounts: goes with mount forces and travels only; leave it out"),
     bad("gas without bore", "bore = \"100 mm\"\n", "",
         "engine.bore: is missing, and gas acts on it; add it"),
     bad("unknown gas model", '"seiliger"', '"seliger"',

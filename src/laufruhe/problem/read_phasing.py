@@ -182,6 +182,9 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
     if engine.layout == "vee" and engine.bank_angle is None:
         raise Refused("engine.bank_angle", None, "is missing", "add the angle between the banks, or its bounds")
     count = phasing.cylinders
+    if not phasing.continuous and isinstance(engine.bank_angle, Open) and isinstance(engine.split_pin_angle, Open):
+        rule = "is open beside bank_angle, and even firing binds only their sum"
+        raise Refused("engine.split_pin_angle", None, rule, "fix one of the two, or let the firing be uneven")
     if engine.layout == "vee" and count % 2:
         raise Refused("engine.cylinders", count, "is odd in a vee", "give an even number")
     throws = count // 2 if engine.layout == "vee" else count
