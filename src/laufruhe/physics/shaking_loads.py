@@ -128,6 +128,17 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
     return Spectrum(cycle.base_order, out)
 
 
+def added_rotor_loads(
+    rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
+) -> Spectrum:
+    """Loads that rotors alone would add to an engine at an operating point, at even or uneven speed (L1, F5)."""
+    if fidelity.is_uneven:
+        from laufruhe.physics.uneven_speed import uneven_rotor_loads
+
+        return uneven_rotor_loads(rotors, engine, point, fidelity)
+    return rotor_loads(rotors, point.speed, engine.cycle)
+
+
 def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
     """Coefficient of order |n| of one rotor's wrench, shape (6,) (L1)."""
     shaft = rotor.shaft
@@ -189,9 +200,7 @@ def _square(part: SliderCrank, speed: float) -> float:
 def _acceleration(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
     if fidelity.kinematics == "two-order":
         return np.array([0.0, -1.0, -part.rod_ratio], dtype=complex)
-    return order_coefficients.piston_acceleration_orders(
-        part.rod_ratio, part.offset_ratio, _highest(part, fidelity)
-    )
+    return order_coefficients.piston_acceleration_orders(part.rod_ratio, part.offset_ratio, _highest(part, fidelity))
 
 
 def _roll(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:

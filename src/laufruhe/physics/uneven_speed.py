@@ -8,7 +8,9 @@ left, the energy at the start of the cycle, and the mean speed determines it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,10 +69,16 @@ def crank_motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> C
     ModelError
         If the crank would stop within the cycle: the flywheel is too small for the speed.
     """
+    # rotors and mounts do not move the crank; without them a motion is found once for all designs
+    return _motion(replace(engine, rotors=(), mounts=()), point, fidelity)
+
+
+@lru_cache(maxsize=32)
+def _motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankMotion:
     count = fidelity.samples
     phi = engine.cycle.angle * np.arange(count) / count
     work = _work(engine, point, fidelity, phi)
-    inertia, slope = _inertia(engine, fidelity, phi)
+    inertia, _ = _inertia(engine, fidelity, phi)
     start = _start_energy(work, inertia, point.speed)
     pace = spectrum_of(point.speed / np.sqrt(2.0 * (start + work) / inertia), engine.cycle.base_order)
     angle = _angles_at(pace, phi)
@@ -81,7 +89,10 @@ def crank_motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> C
     drive = torque.values(angle) if torque is not None else np.zeros(count)
     # d/d phi of J w^2 / 2 = torque less load (F2)
     acceleration = (drive - 0.5 * slope * square) / inertia
-    return CrankMotion(angle, np.sqrt(square), acceleration)
+    motion = CrankMotion(angle, np.sqrt(square), acceleration)
+    for values in (motion.angle, motion.speed, motion.acceleration):
+        values.setflags(write=False)
+    return motion
 
 
 def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -111,8 +122,9 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
     return loads if fidelity.orders is None else loads.kept(max(fidelity.orders, _last_rotor_order(engine)))
 
 
-def uneven_rotor_loads(rotors: tuple[Rotor, ...], engine: Engine, motion: CrankMotion) -> Spectrum:
-    """Loads of rotors alone at a motion that they do not change; linear in their unbalances (F5)."""
+def uneven_rotor_loads(rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """Loads of rotors alone on an engine whose motion they do not change; linear in their unbalances (F5)."""
+    motion = crank_motion(engine, point, fidelity)
     return spectrum_of(_rotor_loads(rotors, motion), engine.cycle.base_order)
 
 
@@ -127,9 +139,7 @@ def _mean_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> f
     return float(gas_loads(engine, point.gas, fidelity).coefficients[0, 3].real)
 
 
-def _work_series(
-    engine: Engine, point: OperatingPoint, fidelity: Fidelity
-) -> tuple[Spectrum | None, Spectrum | None]:
+def _work_series(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum | None, Spectrum | None]:
     """Work of gas less load over the crank angle, and the torque that does it (F2)."""
     from laufruhe.physics.shaking_loads import gas_loads
 
@@ -235,7 +245,7 @@ def _slider_loads(part: SliderCrank, motion: CrankMotion, fidelity: Fidelity) ->
     return wrench
 
 
-def _rotor_loads(rotors: tuple[Rotor, ...], motion: CrankMotion) -> Array:
+def _rotor_loads(rotors: Sequence[Rotor], motion: CrankMotion) -> Array:
     """F = U (n^2 w^2 - i n dw/dt) e^{i n phi} of each rotor, with its moments (F5), shape (n, 6)."""
     wrench = np.zeros((len(motion.angle), 6))
     for rotor in rotors:

@@ -125,6 +125,7 @@ def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> f
     Over the objective of `evaluation`; infinite where that is zero and the bound is not.
     """
     bound = value = 0.0
+    half = half_gas(problem, best)
     for term in problem.objective:
         if term.quantity.subject in MASSES:
             value += term.weight * evaluation.value(term.quantity)
@@ -133,7 +134,7 @@ def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> f
         bound += term.weight * (
             left_out(term.quantity, evaluation, best)
             + sampling_bound(term.quantity, evaluation)
-            + gas_doubt(term.quantity, best)
+            + gas_doubt(term.quantity, best, half)
         )
     floor = ROUNDING * value
     return (bound + floor) / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
@@ -145,33 +146,21 @@ def left_out(quantity: Quantity, evaluation: Evaluation, best: Evaluation) -> fl
     return norm_above(quantity, difference(ours, theirs), shares(quantity, best))
 
 
-def gas_doubt(quantity: Quantity, best: Evaluation) -> float:
+def half_gas(problem: Problem, best: Evaluation) -> Evaluation | None:
+    """The reference with gas torque at half as many steps; None without gas."""
+    if not best.fidelity.gas or all(loads.point.gas is None for loads in best.loads):
+        return None
+    less = replace(best.fidelity, gas_samples=best.fidelity.gas_steps // 2)
+    return evaluate(replace(problem, fidelity=less), best.engine)
+
+
+def gas_doubt(quantity: Quantity, best: Evaluation, half: Evaluation | None) -> float:
     """What the reference itself may miss of gas torque between its steps (F9).
 
     Torque bends where valves and heat act, so its orders converge with the square of
     the step: the change from half the steps is three times what is left.
     """
-    gases = [loads.point.gas for loads in best.loads]
-    if not any(gas is not None for gas in gases) or not best.fidelity.gas:
-        return 0.0
-    from laufruhe.physics.mount_forces import rigid_mounting
-    from laufruhe.physics.shaking_loads import gas_loads
-
-    engine, steps = best.engine, best.fidelity.gas_steps
-    changed = []
-    for loads in best.loads:
-        if loads.point.gas is None:
-            changed.append(Spectrum(engine.cycle.base_order, np.zeros((1, 6), dtype=complex)))
-            continue
-        fine, coarse = (
-            gas_loads(engine, loads.point.gas, replace(best.fidelity, gas_samples=n)) for n in (steps, steps // 2)
-        )
-        changed.append(fine + Spectrum(coarse.base, -coarse.coefficients))
-    if engine.mounts:
-        mounting = rigid_mounting(engine.mounts)
-        changed = [Spectrum(c.base, np.einsum("mij,nj->nmi", mounting.maps, c.coefficients)) for c in changed]
-    found = [selected(quantity, signal, best.mount_names) for signal in over(engine.cycle.base_order, changed)]
-    return norm_above(quantity, found, shares(quantity, best))
+    return 0.0 if half is None else left_out(quantity, half, best)
 
 
 def _mean_square(signal: Spectrum) -> Array:

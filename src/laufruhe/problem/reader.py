@@ -12,13 +12,13 @@ from laufruhe import units
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
 from laufruhe.machine.layouts import throw_rotors
-from laufruhe.physics.shaking_loads import Fidelity
 from laufruhe.problem.assemble_engine import cycle_of, mounts_of, moving_parts, operating_points
 from laufruhe.problem.assemble_rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.problem.complaints import Refused, complaints_of, nearest
 from laufruhe.problem.file_models import LOAD_NAMES, MASS_NAMES, ConstraintTable, ProblemFile, QuantityTable
 from laufruhe.problem.model import Limit, Problem, Term
 from laufruhe.problem.quantity import MEASURES, Quantity, Subject, counted_rotors
+from laufruhe.problem.read_fidelity import at_fidelity
 
 
 def load(path: str | Path) -> Problem:
@@ -76,7 +76,7 @@ def _assembled(file: ProblemFile, path: Path) -> Problem:
     engine = Engine(file.title, cycle_of(file.engine), cylinders, tuple(collected.rotors), mounts)
     points = operating_points(file, path.parent)
     scene = _Scene(mounts, points, tuple(collected.rotors))
-    return Problem(
+    problem = Problem(
         name=path.stem,
         title=file.title,
         engine=engine,
@@ -86,9 +86,9 @@ def _assembled(file: ProblemFile, path: Path) -> Problem:
         limits=tuple(_limit(table, k, scene) for k, table in enumerate(file.constraints)),
         source=file.source,
         assumptions=tuple(file.assumptions),
-        fidelity=Fidelity(file.fidelity.kinematics, file.fidelity.samples),
         tolerance=file.tolerance,
     )
+    return at_fidelity(problem, file.fidelity)
 
 
 class _Scene:

@@ -6,8 +6,9 @@ import time
 
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
+from laufruhe.solve.accuracy import error_of, solve_within
 from laufruhe.solve.result import ObjectiveValue, Result, Status
-from laufruhe.solve.unbalances import objective_name, sampling_error, solve_unbalances
+from laufruhe.solve.unbalances import objective_name, solve_unbalances
 
 __all__ = ["Result", "Status", "solve", "state"]
 
@@ -22,7 +23,11 @@ def solve(problem: Problem) -> Result:
     ModelError
         If the engine as given cannot be evaluated.
     """
-    return solve_unbalances(problem) if problem.decisions else state(problem)
+    if not problem.decisions:
+        return state(problem)
+    if problem.fidelity.tolerance is not None:
+        return solve_within(problem, solve_unbalances)
+    return solve_unbalances(problem)
 
 
 def state(problem: Problem) -> Result:
@@ -43,6 +48,6 @@ def state(problem: Problem) -> Result:
         limits=(),
         initial=evaluation,
         final=evaluation,
-        error_estimate=sampling_error(problem, evaluation) if problem.objective else 0.0,
+        error_estimate=error_of(problem, evaluation),
         timing={"evaluate": time.perf_counter() - started},
     )

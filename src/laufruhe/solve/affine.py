@@ -13,8 +13,9 @@ from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mount_forces import RigidMounting, rigid_mounting
-from laufruhe.physics.shaking_loads import rotor_loads
+from laufruhe.physics.shaking_loads import added_rotor_loads
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES, Quantity, Rows, Subject, load_rows, mass_rows
@@ -104,7 +105,7 @@ class AffineModel:
         orders = [Fraction(abs(r.shaft.ratio)).limit_denominator(1000) for rotors in changes for r in rotors]
         self._slopes = {
             subject: [
-                [_slope(rotors, point, problem.engine, mounting, subject) for rotors in changes]
+                [_slope(rotors, point, problem.engine, mounting, subject, problem.fidelity) for rotors in changes]
                 for point in problem.points
             ]
             for subject in self._subjects(mounting)
@@ -169,9 +170,14 @@ def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
 
 
 def _slope(
-    rotors: Sequence[Rotor], point: OperatingPoint, engine: Engine, mounting: RigidMounting | None, subject: Subject
+    rotors: Sequence[Rotor],
+    point: OperatingPoint,
+    engine: Engine,
+    mounting: RigidMounting | None,
+    subject: Subject,
+    fidelity: Fidelity,
 ) -> Spectrum:
-    wrench = rotor_loads(rotors, point.speed, engine.cycle)
+    wrench = added_rotor_loads(rotors, engine, point, fidelity)
     return mounting.forces(wrench) if mounting and subject is Subject.MOUNT_FORCE else wrench
 
 
