@@ -93,9 +93,14 @@ class AffineModel:
     """Spectra of the design without its decisions, and of each decision alone.
 
     Rows at any number of samples follow from them without evaluating the engine again.
+
+    Parameters
+    ----------
+    whole_cycle
+        Rows over the whole working cycle, even where the loads repeat within it.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, whole_cycle: bool = False) -> None:
         self.problem = problem
         self.domains = domains_of(problem.decisions)
         bare = evaluate(problem, problem.design([0.0] * len(problem.decisions)))
@@ -110,7 +115,7 @@ class AffineModel:
             ]
             for subject in self._subjects(mounting)
         }
-        self.base = self._shortest_base(bare, orders)
+        self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
 
     def _subjects(self, mounting: RigidMounting | None) -> tuple[Subject, ...]:
         return (Subject.SHAKING_FORCE, *((Subject.MOUNT_FORCE,) if mounting else ()))
