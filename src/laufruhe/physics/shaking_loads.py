@@ -128,6 +128,20 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
     return Spectrum(cycle.base_order, out)
 
 
+def unit_star_load(engine: Engine, order: int, coefficient: complex, roll: bool) -> Spectrum:
+    """Wrench of one order whose coefficient is the same at every cylinder (L6).
+
+    Parameters
+    ----------
+    coefficient
+        Of a force along each cylinder axis [N], or of a roll moment [N m].
+    """
+    series = np.zeros(order + 1, dtype=complex)
+    series[order] = coefficient
+    weight = (lambda _: _ROLL) if roll else _axial
+    return _star_loads(engine.cycle, engine.slider_cranks, lambda _: series, weight)
+
+
 def added_rotor_loads(
     rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
 ) -> Spectrum:

@@ -105,7 +105,9 @@ def _merged(rows: Array, weights: Array) -> tuple[Array, Array]:
     """Rows that are equal to the last bit, or each other's negative, as one row: symmetric mounts."""
     flat = rows.reshape(-1, rows.shape[2]).T
     lead = np.take_along_axis(flat, np.argmax(flat != 0.0, axis=1)[:, None], axis=1)
-    _, first, inverse = np.unique(flat * np.where(lead < 0.0, -1.0, 1.0), axis=0, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(
+        flat * np.where(lead < 0.0, -1.0, 1.0), axis=0, return_index=True, return_inverse=True
+    )
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))

@@ -133,7 +133,9 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
         say(name)
         rows.append(_row(problem, name, fidelity, best, optimum))
     say("uneven crank speed")
-    return Trade(problem, tuple(rows), value, optimum, rigid_part_error(problem.engine), _price_of_constant_speed(problem))
+    return Trade(
+        problem, tuple(rows), value, optimum, rigid_part_error(problem.engine), _price_of_constant_speed(problem)
+    )
 
 
 def _row(problem: Problem, name: str, fidelity: Fidelity, best: Evaluation, optimum: float) -> Row:
@@ -197,7 +199,7 @@ def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
 
     inertia = 30.0 * max(_reciprocating_inertia(problem), 1e-12)
     for _ in range(12):
-        uneven = Fidelity(samples=720, crank_inertia=inertia)
+        uneven = Fidelity(samples=360, crank_inertia=inertia)
         try:
             most = max(crank_motion(problem.engine, point, uneven).unevenness for point in problem.points)
         except ModelError:
@@ -206,7 +208,7 @@ def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
         if most < 1e-9 or 0.019 < most < 0.021:
             break
         inertia *= most / 0.02
-    even = objective_value(problem, evaluate(replace(problem, fidelity=Fidelity(samples=720))))
+    even = objective_value(problem, evaluate(replace(problem, fidelity=Fidelity(samples=360))))
     changed = objective_value(problem, evaluate(replace(problem, fidelity=uneven)))
     return inertia, (changed - even) / even if even > 0.0 else 0.0
 
