@@ -90,7 +90,7 @@ class BatchNorm:
             if k > 0:
                 np.add(total, target, out=total)
         if self.norm is Norm.RMS:
-            return np.sqrt(total @ self.weights)
+            return np.asarray(np.sqrt(total @ self.weights))
         if self.norm is Norm.MAXIMUM:
             return np.asarray(np.sqrt(total.max(axis=1)))
         np.sqrt(total, out=total)
@@ -102,5 +102,5 @@ class BatchNorm:
     @property
     def operations(self) -> int:
         """Additions and multiplications of the matrix products of one design."""
-        components, features, k = self.rows.shape
+        components, features, k = (int(n) for n in self.rows.shape)
         return 2 * components * features * k

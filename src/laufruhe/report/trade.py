@@ -33,7 +33,8 @@ def as_page(found: Trade, picture: str, command: str) -> str:
         "*Solve*: optimum from nothing, at this fidelity's own angles. *From nothing*: engine to objective. "
         "*Regret*: by how much the reference objective of the optimum found is above that of the best.",
         f"Constant crank speed: with a flywheel of {inertia:.3g} kg m2 for all that turns, at which the speed "
-        f"varies by some 2 %, the objective changes by {100.0 * change:+.2f} %. No fidelity at constant speed sees that.",
+        f"varies by some 2 %, the objective changes by {100.0 * change:+.2f} %. "
+        "No fidelity at constant speed sees that.",
         f"```sh\n{command}\n```",
     ]
     return "\n\n".join(sections) + "\n"
@@ -71,13 +72,14 @@ def index(trades: Sequence[Trade]) -> str:
         "Which fidelity to take, measured on every ready problem. In short:",
         "",
         "- `auto` is the safe choice: it says how wrong it can be, and is not more wrong than that.",
-        "- The two-order formulas of textbooks cost 0.2 to 2 % of the number and, as starting point of a design, little "
-        "regret. Not of engines whose second order cancels: what is left there is what they leave out.",
+        "- The two-order formulas of textbooks cost 0.2 to 2 % of the number and, as starting point of a design, "
+        "little regret. Not of engines whose second order cancels: what is left there is what they leave out.",
         "- Leaving gas out is what costs most: it decides how the roll moment is balanced.",
         "- More than 720 steps a cycle serve peaks and proofs, not means.",
         "- Regret is far smaller than error: an optimum is flat. A cheap fidelity to search, an exact one to state.",
         "",
-        "| problem | take | error of two-order | of no gas | of auto 0.001 | regret of two-order | of auto 0.001 | uneven speed |",
+        "| problem | take | error of two-order | of no gas | of auto 0.001 | regret of two-order | of auto 0.001 "
+        "| uneven speed |",
         "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     for found in trades:

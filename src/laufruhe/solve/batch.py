@@ -111,7 +111,7 @@ def _merged(rows: Array, weights: Array) -> tuple[Array, Array]:
     order = np.argsort(first)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    total = np.bincount(rank[inverse.ravel()], weights=weights, minlength=len(order))
+    total: Array = np.bincount(rank[inverse.ravel()], weights=weights, minlength=len(order)).astype(float)
     return rows[:, :, first[order]], total
 
 

@@ -220,4 +220,4 @@ def _or(values: Array | None, given: float, count: int) -> Array:
 
 def _cut(arrays: EngineArrays, part: slice) -> EngineArrays:
     given = {field.name: getattr(arrays, field.name) for field in fields(arrays)}
-    return EngineArrays(**{name: None if values is None else values[part] for name, values in given.items()})
+    return replace(arrays, **{name: values[part] for name, values in given.items() if values is not None})

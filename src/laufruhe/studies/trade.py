@@ -18,7 +18,7 @@ from laufruhe.problem.automatic import choose
 from laufruhe.problem.error_bounds import REFERENCE_SAMPLES, error_bound, reference
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.model import Problem
-from laufruhe.solve.affine import AffineModel
+from laufruhe.solve.affine import AffineModel, AffineNorm
 from laufruhe.studies.digits import rigid_part_error
 
 Array = NDArray[np.float64]
@@ -165,13 +165,10 @@ def _row(problem: Problem, name: str, fidelity: Fidelity, best: Evaluation, opti
     )
 
 
-def _value_and_gradient(terms: tuple[tuple[float, object], ...], x: Array) -> tuple[float, Array]:
+def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -> tuple[float, Array]:
     """Objective and a subgradient of it: B^T Z at the rows' own directions (P2)."""
-    from laufruhe.solve.affine import AffineNorm
-
     value, gradient = 0.0, np.zeros(len(x))
     for weight, norm in terms:
-        assert isinstance(norm, AffineNorm)
         rows = norm.rows(x)
         z = mixed_norms.subgradient(norm.norm, norm.weights, rows)
         value += weight * float(np.vdot(z, rows))
