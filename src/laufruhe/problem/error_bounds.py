@@ -30,10 +30,10 @@ ROUNDING = 2e-13
 """Relative error that sums of a few thousand rounded terms may have (F9)."""
 
 
-def reference(problem: Problem, engine: Engine | None = None) -> Evaluation:
+def reference(problem: Problem, engine: Engine | None = None, samples: int = REFERENCE_SAMPLES) -> Evaluation:
     """The highest fidelity: every order, rigid rod, gas at many steps; uneven speed where the problem has it."""
     f = problem.fidelity
-    best = replace(f, kinematics="exact", samples=REFERENCE_SAMPLES, orders=None, rod="rigid", gas=True,
+    best = replace(f, kinematics="exact", samples=samples, orders=None, rod="rigid", gas=True,
                    gas_samples=None, tolerance=None)  # fmt: skip
     return evaluate(replace(problem, fidelity=best), engine)
 
@@ -76,7 +76,7 @@ def difference(a: Sequence[Spectrum], b: Sequence[Spectrum]) -> list[Spectrum]:
     return [x + Spectrum(y.base, -y.coefficients) for x, y in zip(a, b, strict=True)]
 
 
-def sampling_bound(quantity: Quantity, evaluation: Evaluation) -> float:
+def sampling_bound(quantity: Quantity, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
     """Largest error of a quantity that its samples can make (F7, F8), in its own unit.
 
     Compared with many more samples, at every place that the coarse ones could have
@@ -90,7 +90,7 @@ def sampling_bound(quantity: Quantity, evaluation: Evaluation) -> float:
     if quantity.norm is Norm.RMS:
         exact = norm_above(quantity, found, share)
         return abs(evaluation.value(quantity) - exact)
-    times = max(2, math.ceil(REFERENCE_SAMPLES / coarse))
+    times = max(2, math.ceil(finest / coarse))
     errors, curvature = [], []
     for signal, weight in zip(found, share, strict=True):
         if weight == 0.0:
@@ -133,7 +133,7 @@ def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> f
         value += term.weight * evaluation.value(term.quantity)
         bound += term.weight * (
             left_out(term.quantity, evaluation, best)
-            + sampling_bound(term.quantity, evaluation)
+            + sampling_bound(term.quantity, evaluation, best.samples)
             + gas_doubt(term.quantity, best, half)
         )
     floor = ROUNDING * value
