@@ -103,20 +103,27 @@ def evaluate(
 
 
 @app.command()
-def check(problem: ProblemArgument) -> None:
+def check(problem: ProblemArgument, json: JsonOption = None) -> None:
     """Validate a problem file.
 
-    Says what it leaves open; nothing is solved or written.
+    Says what it leaves open; nothing is solved, and no results folder is made.
     """
-    with _exit_statuses(problem):
-        from laufruhe.problem.evaluation import evaluate
+    with _exit_statuses(problem), ExitStack() as places:
         from laufruhe.problem.reader import load
+        from laufruhe.report import files
+        from laufruhe.report.json_result import as_json
         from laufruhe.report.wording import one_line
+        from laufruhe.solve import state
 
+        json_file = _json_file(_Request("check", problem, json, None, False), places)
         given = load(problem)
         # a load that no mount carries, or a gas cycle that cannot be met, shows only here
-        evaluate(given)
-        typer.echo(f"ok: {one_line(given)}")
+        stated = state(given)
+        if json_file is not None:
+            files.write(json_file, as_json(stated))
+        if json == "-":
+            sys.stdout.write(as_json(stated))
+        typer.echo(f"ok: {one_line(given)}", err=json == "-")
 
 
 FidelityTolerance = Annotated[

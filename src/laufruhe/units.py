@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
 _DEFINITIONS = (
     "@alias kilogram_force = kp = kilopond",
+    "newton_metre = newton * meter = Nm",
     "pferdestaerke = 75 * kilogram_force * meter / second = PS",
 )
 
@@ -36,17 +37,26 @@ def _factor(unit: str, wanted: str) -> float:
     """SI value of one `unit` of the dimension of `wanted`."""
     registry = _registry()
     try:
-        one = registry.Quantity(1.0, registry.parse_units(unit))
+        parsed = registry.parse_units(unit)
+        one = registry.Quantity(1.0, parsed)
         target = registry.parse_units(wanted) if wanted else registry.dimensionless
         ratio = float(one.to(target).magnitude)
         doubled = float((2.0 * one).to(target).magnitude)
     except Exception as error:
         if type(error).__name__ == "DimensionalityError":
-            raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {_advice(wanted)}") from None
-        raise UnitError(f"unit '{unit}' is not known; {_advice(wanted)}") from None
+            raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}") from None
+        raise UnitError(f"unit '{unit}' is not known; {advice(wanted)}") from None
+    if _turns(str(parsed)) != (wanted in ("rad", "rad/s")):
+        # a radian has no dimension, so 50 Hz would pass for 50 rad/s and 15 deg for a ratio
+        raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}")
     if not math.isclose(doubled, 2.0 * ratio):
-        raise UnitError(f"'{unit}' has a zero of its own; {_advice(wanted)}")
+        raise UnitError(f"'{unit}' has a zero of its own; {advice(wanted)}")
     return ratio
+
+
+def _turns(unit: str) -> bool:
+    """Whether a unit's full name speaks of an angle."""
+    return re.search(r"radian|degree|turn|revolution|minute_of_arc|arcminute|arcsecond|gradian|grade", unit) is not None
 
 
 _EXAMPLES = {
@@ -61,6 +71,7 @@ _EXAMPLES = {
     "rad": ("an angle", "90 deg"),
     "rad/s": ("a speed of rotation", "2500 rpm"),
     "m/s": ("a speed", "10 m/s"),
+    "s": ("a time", "60 s"),
     "": ("a plain number", "0.26"),
 }
 
@@ -75,7 +86,8 @@ def example(unit: str) -> str:
     return _EXAMPLES.get(unit, ("", f"1 {unit}"))[1]
 
 
-def _advice(unit: str) -> str:
+def advice(unit: str) -> str:
+    """How to write a value of this dimension."""
     return f'write for example "{example(unit)}"'
 
 
@@ -89,16 +101,17 @@ def parse(text: str, unit: str) -> float:
     """
     match = _QUANTITY.match(text)
     if match is None:
-        raise UnitError(f"is not a number with a unit; {_advice(unit)}")
+        raise UnitError(f"is not a number with a unit; {advice(unit)}")
     number, divisor, name = match.groups()
-    if divisor is not None and int(divisor) == 0:
-        raise UnitError(f"divides by zero; {_advice(unit)}")
-    value = float(number) / (int(divisor) if divisor else 1)
+    below = float(divisor or 1)
+    if below == 0.0:
+        raise UnitError(f"divides by zero; {advice(unit)}")
+    value = float(number) / below
     if name is None and unit:
-        raise UnitError(f"has no unit, {dimension_name(unit)} needs one; {_advice(unit)}")
+        raise UnitError(f"has no unit, {dimension_name(unit)} needs one; {advice(unit)}")
     value *= _factor(name.strip(), unit) if name else 1.0
-    if not math.isfinite(value):
-        raise UnitError(f"is not finite; {_advice(unit)}")
+    if not math.isfinite(value) or not math.isfinite(below):
+        raise UnitError(f"is not finite; {advice(unit)}")
     return value
 
 

@@ -292,3 +292,11 @@ def test_the_process_ends_with_the_status(tmp_path: Path) -> None:
     assert done.returncode == 0
     # a pipe gets neither a spinner nor colours
     assert "\x1b" not in done.stdout + done.stderr
+
+
+def test_check_answers_in_json_and_makes_no_folder(here: Path) -> None:
+    """`check --json -` prints the design as given, pure JSON, and leaves nothing behind."""
+    answer = run("check", scenes.READY, "--json", "-")
+    assert answer.exit_code == 0
+    assert json.loads(answer.stdout)["status"] == "feasible"
+    assert tree(here) == set()

@@ -15,8 +15,8 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.reader import load
 
-TIMES = 1500
-BATCHES = 4
+TIMES = 1000
+BATCHES = 3
 
 
 def read(path: Path) -> Problem | None:

@@ -91,6 +91,7 @@ class TestEveryNorm:
         weights, _, z = data
         inside = dual_feasible(norm, weights, scale * z)
         assert dual_norm(norm, weights, inside) <= 1.0 + ROUNDING
+        assert dual_norm(norm, weights, dual_feasible(norm, weights, 1.5 * inside)) <= 1.0 + ROUNDING
         again = dual_feasible(norm, weights, 0.9 * inside)
         assert np.array_equal(again, 0.9 * inside)
 

@@ -100,7 +100,7 @@ def bodies(draw: st.DrawFn, cycle: Cycle, shafts: Sequence[Shaft], number: int, 
 
 @st.composite
 def mechanisms(draw: st.DrawFn) -> tuple[float, ...]:
-    """Radius, rod ratio (0 a Scotch yoke), offset as a share of what turns, piston mass, rod mass, its c.g., inertia."""
+    """Radius, rod ratio (0 a yoke), offset as a share of what turns, masses of piston and rod, its c.g., inertia."""
     return (
         draw(st.floats(0.02, 0.2)),
         draw(st.one_of(st.just(0.0), st.floats(0.05, 0.6))),

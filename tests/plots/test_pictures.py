@@ -14,10 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from cli import scenes
-from laufruhe.physics.metrics import cycle_measures
 from laufruhe.plots import bars, draw, polar, spectrum
 from laufruhe.plots.style import DPI, fitted
-from laufruhe.report.measures import mount_orders, mount_samples
+from laufruhe.report.measures import measured, mount_orders, mount_samples
 from laufruhe.solve import Result
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -84,8 +83,7 @@ def test_bars_are_mean_and_maximum() -> None:
     axes = bars.figure(result).axes[0]
     heights = [[bar.get_height() for bar in container] for container in axes.containers]
     for k, design in enumerate((result.initial, result.final)):
-        samples = mount_samples(design, 0)
-        each = [cycle_measures(samples[:, m]) for m in range(4)]
+        each = measured(design, 0)
         assert heights[2 * k][:4] == [measures.mean for measures in each]
         assert heights[2 * k + 1][:4] == [measures.max for measures in each]
         assert heights[2 * k + 1][4] == max(measures.max for measures in each)

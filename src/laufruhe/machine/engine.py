@@ -13,7 +13,7 @@ from laufruhe.machine.gas import GasModel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.numerics.turns import as_turn
+from laufruhe.numerics.turns import as_turn, within
 
 
 class Cycle(Enum):
@@ -92,7 +92,7 @@ class Engine:
                 raise ModelError(f"two {kind.replace('_', '-')} are called '{double[0]}'; give each its own name")
         places: dict[object, str] = {}
         for part in self.slider_cranks:
-            place = (part.shaft, part.x, as_turn(part.bank) % 1)
+            place = (part.shaft.y, part.shaft.z, part.x, within(as_turn(part.bank), 1))
             if place in places:
                 raise ModelError(f"{part.name} stands in the place of {places[place]}; move one of them")
             places[place] = part.name
@@ -127,6 +127,6 @@ class Engine:
     def firing_intervals(self) -> tuple[float, ...]:
         """Crank angles from each firing to the next over a cycle [rad]."""
         whole = self.cycle.turns
-        turns = sorted(as_turn(part.firing_angle) % whole for part in self.slider_cranks)
+        turns = sorted(within(as_turn(part.firing_angle), whole) for part in self.slider_cranks)
         following = [*turns[1:], turns[0] + whole] if turns else []
         return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))

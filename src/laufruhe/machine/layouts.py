@@ -15,7 +15,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.rotor import Role, Rotor
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.numerics.turns import Turn, angle_of, as_turn, cis
+from laufruhe.numerics.turns import SAME_TURN, Turn, angle_of, as_turn, cis, within
 
 
 @dataclass(frozen=True)
@@ -149,16 +149,16 @@ def firing_angles(
     ModelError
         If these throws cannot fire in this order within one cycle.
     """
-    previous: Turn = Fraction(-1, 10**9)
+    previous: Turn = Fraction(-1)
     angles = [0.0] * len(layout.positions)
     start: Turn | None = None
     for number in firing_order:
         k = number - 1
-        centre = _dead_centre(layout, throws, k) % 1
-        while centre <= previous:
+        centre = within(_dead_centre(layout, throws, k), 1)
+        while centre <= previous + SAME_TURN:
             centre += 1
         start = centre if start is None else start
-        if centre >= start + cycle.turns:
+        if centre >= start + cycle.turns - SAME_TURN:
             raise ModelError(
                 f"throws {[round(math.degrees(t), 3) for t in throws]} deg cannot fire in the order "
                 f"{list(firing_order)} within {cycle.turns} turn(s): cylinder {number} would come after "
@@ -262,7 +262,7 @@ def build(
     fires = (
         firing_angles(cycle, layout, angles, firing_order)
         if firing_order
-        else tuple(angle_of(_dead_centre(layout, angles, k) % 1) for k in cylinders)
+        else tuple(angle_of(within(_dead_centre(layout, angles, k), 1)) for k in cylinders)
     )
     slider_cranks = tuple(
         SliderCrank(

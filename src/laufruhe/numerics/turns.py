@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 MAX_DENOMINATOR = 20_000
+SAME_TURN = 1e-9
 _EPS = float(np.finfo(float).eps)
 
 Turn: TypeAlias = Fraction | float
@@ -33,6 +34,12 @@ def as_turn(angle: float) -> Turn:
     turns = angle / math.tau
     nearest = Fraction(turns).limit_denominator(MAX_DENOMINATOR)
     return nearest if abs(float(nearest) - turns) <= 4 * _EPS * max(abs(turns), 1.0) else turns
+
+
+def within(turn: Turn, whole: int) -> Turn:
+    """The turn reduced to 0 ... whole; what a rounding leaves just under whole is zero."""
+    rest = turn % whole
+    return rest if whole - rest > SAME_TURN else Fraction(0)
 
 
 def angle_of(turn: Turn) -> float:

@@ -13,7 +13,7 @@ from laufruhe.machine import Mount
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.shaking_loads import WRENCH
 
-FREE_STIFFNESS = 1e-12
+FREE_STRETCH = 1e-10
 UNCARRIED_SHARE = 1e-9
 
 
@@ -50,19 +50,17 @@ class RigidMounting:
         """Refuse a wrench that some direction lets through."""
         scaled = wrench.coefficients / _scales(self.arm)
         size = float(np.abs(scaled).max(initial=0.0))
-        for direction in self.free:
-            drive = np.abs(scaled @ direction)
-            if size > 0.0 and drive.max(initial=0.0) > UNCARRIED_SHARE * size:
-                order = float(wrench.orders[int(np.argmax(drive))])
-                name = WRENCH[int(np.argmax(np.abs(direction)))]
-                raise UncarriedLoadError(
-                    f"order {order:g} drives the engine along {name}, which no mount carries; "
-                    "give a mount stiffness in that direction or a second place"
-                )
+        uncarried = np.abs(scaled @ self.free.T @ self.free)
+        if size > 0.0 and uncarried.max(initial=0.0) > UNCARRIED_SHARE * size:
+            order, component = np.unravel_index(int(np.argmax(uncarried)), uncarried.shape)
+            raise UncarriedLoadError(
+                f"order {float(wrench.orders[order]):g} drives the engine along {WRENCH[component]}, which no mount "
+                "carries; give a mount stiffness in that direction or a second place"
+            )
 
 
 def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:
-    """F_i = K_i G_i (sum_j G_j^T K_j G_j)^+ w (M1, M2).
+    """F_i = K_i G_i (sum_j G_j^T K_j G_j)^+ w, by singular values (M1, M2).
 
     Directions that no mount carries are left to `check_carried`; the scene may not
     drive them.
@@ -72,14 +70,15 @@ def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:
     scales = _scales(arm)
     # displacements of the mount points per scaled motion (translation, arm * rotation)
     geometry = np.array([_point_motion(position) for position in positions]) / scales
-    stiffness = np.array([mount.stiffness_matrix for mount in mounts])
-    stiffness = stiffness / np.abs(stiffness).max()
-    total = np.einsum("mai,mab,mbj->ij", geometry, stiffness, geometry)
-    values, vectors = np.linalg.eigh(total)
-    carried = values > FREE_STIFFNESS * values[-1]
-    inverse = (vectors[:, carried] / values[carried]) @ vectors[:, carried].T
-    maps = np.einsum("mab,mbj,jk->mak", stiffness, geometry, inverse) / scales
-    return RigidMounting(maps, vectors[:, ~carried].T, arm)
+    # K = L^T L, and A = L G instead of A^T A: half the digits that stiffness ratios cost are kept
+    largest = max(max(mount.stiffness) for mount in mounts)
+    roots = np.array([np.sqrt(np.divide(m.stiffness, largest))[:, None] * np.array(m.orientation) for m in mounts])
+    stretches = np.einsum("mab,mbj->maj", roots, geometry)
+    left, values, right = np.linalg.svd(stretches.reshape(-1, 6), full_matrices=True)
+    rank = int(np.sum(values > FREE_STRETCH * values[0]))
+    shares = (left[:, :rank] / values[:rank]).reshape(len(mounts), 3, rank)
+    maps = np.einsum("mba,mbr,rk->mak", roots, shares, right[:rank]) / scales
+    return RigidMounting(maps, right[rank:], arm)
 
 
 def rigid_mount_maps(mounts: Sequence[Mount]) -> NDArray[np.float64]:

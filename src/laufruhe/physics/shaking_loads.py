@@ -86,10 +86,7 @@ def rod_inertia_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) 
     """Roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
 
     def roll(part: SliderCrank) -> NDArray[np.complex128]:
-        if fidelity.kinematics == "two-order":
-            return np.array([0.0, -1j * part.rod_ratio])
-        highest = _highest(part, fidelity)
-        return order_coefficients.rod_roll_orders(part.rod_ratio, part.offset_ratio, part.shaft.ratio, highest)
+        return _rod_roll(part, fidelity)
 
     swinging = [
         part
@@ -231,6 +228,33 @@ def _highest(part: SliderCrank, fidelity: Fidelity) -> int:
     needed = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
     asked = fidelity.local_orders(part.shaft.ratio)
     return needed if asked is None else min(needed, asked)
+
+
+def _rod_roll(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
+    if fidelity.kinematics == "two-order":
+        return np.array([0.0, -1j * part.rod_ratio])
+    highest = _highest(part, fidelity)
+    return order_coefficients.rod_roll_orders(part.rod_ratio, part.offset_ratio, part.shaft.ratio, highest)
+
+
+def inertia_coefficients(
+    part: SliderCrank, speed: float, fidelity: Fidelity = EXACT
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Force along the axis [N] and roll moment [N m] of one cylinder, by order of its own crank angle (L2-L4).
+
+    Returns
+    -------
+    Two arrays of one length: the coefficients that `reciprocating_loads` and
+    `rod_inertia_loads` multiply by the phase and place of each cylinder.
+    """
+    square = _square(part, speed)
+    force = -part.reciprocating_mass * part.crank_radius * square * _acceleration(part, fidelity)
+    roll = part.reciprocating_mass * part.crank_radius**2 * square * _roll(part, fidelity)
+    swinging = fidelity.rod == "rigid" and part.rod_inertia_deficit != 0.0 and part.rod_ratio > 0.0
+    rod = part.rod_inertia_deficit * square * _rod_roll(part, fidelity) if swinging else np.zeros(1, dtype=complex)
+    size = max(len(force), len(roll), len(rod))
+    padded = [np.pad(series, (0, size - len(series))) for series in (force, roll, rod)]
+    return padded[0], padded[1] + padded[2]
 
 
 def _star_loads(

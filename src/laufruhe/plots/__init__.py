@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from laufruhe.plots import bars, polar, spectrum
+from laufruhe.plots import bars, polar, spectrum, star
 from laufruhe.plots.style import save
 from laufruhe.solve.result import Result
 
@@ -18,6 +18,10 @@ def draw(result: Result, folder: Path) -> tuple[str, ...]:
     """
     makers = {"polar.png": polar.figure, "bars.png": bars.figure} if result.problem.engine.mounts else {}
     makers["spectrum.png"] = spectrum.figure
+    if result.phasing is not None and result.phasing.ranking:
+        makers = {"star.png": star.figure, "firings.png": star.firings, **makers}
+        if len(result.phasing.trade) > 1:
+            makers["trade.png"] = star.trade
     for name, figure in makers.items():
         save(figure(result), folder / name)
     return tuple(makers)

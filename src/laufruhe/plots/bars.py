@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from laufruhe.physics.metrics import cycle_measures
 from laufruhe.plots.style import FAINT, colours_of, fitted, heading, names_of, page, source_line, thin
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.report.measures import changed, hardest_point, mount_samples
+from laufruhe.report.measures import changed, hardest_point, measured
 from laufruhe.report.wording import number
 from laufruhe.solve.result import Result
 
@@ -45,8 +44,7 @@ def figure(result: Result) -> Figure:
 
 def _measures(design: Evaluation, k: int) -> Array:
     """Mean and maximum of every mount and of all, shape (2, mounts + 1) [N]."""
-    samples = mount_samples(design, k)
-    each = [cycle_measures(samples[:, m]) for m in range(samples.shape[1])]
+    each = measured(design, k)
     mean, most = np.array([m.mean for m in each]), np.array([m.max for m in each])
     return np.array([[*mean, mean.mean()], [*most, most.max()]])
 

@@ -58,13 +58,14 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     if table.layout == "parts":
         parts = _free_parts(table)
         return parts, tuple(Throw(p.x, p.throw, (k,)) for k, p in enumerate(parts) if p.shaft == CRANKSHAFT)
-    layout = _layout(table)
+    layout = layout_of(table)
     throws = _throws(table, layout)
-    with blamed_on("engine.firing_order" if table.firing_order else "engine"):
-        return build(cycle_of(table), layout, _mechanism(table), throws, table.firing_order)
+    with blamed_on("engine.firing_order" if table.given_order else "engine"):
+        return build(cycle_of(table), layout, _mechanism(table), throws, table.given_order)
 
 
-def _layout(table: EngineTable) -> Layout:
+def layout_of(table: EngineTable) -> Layout:
+    """Places, banks and pins, without masses."""
     count = _cylinders(table)
     spacing = table.cylinder_spacing
     if spacing is None:
@@ -78,17 +79,17 @@ def _layout(table: EngineTable) -> Layout:
             if table.bank_stagger is None:
                 raise Refused("engine.bank_stagger", None, "is missing", "add the distance between opposed cylinders")
             return boxer(count, spacing, table.bank_stagger)
-        if table.bank_angle is None:
+        if table.given_bank is None:
             raise Refused("engine.bank_angle", None, "is missing", "add the angle between the banks")
-        return vee(count, spacing, table.bank_angle, table.split_pin_angle or 0.0, table.bank_stagger or 0.0)
+        return vee(count, spacing, table.given_bank, table.given_split or 0.0, table.bank_stagger or 0.0)
 
 
 def _cylinders(table: EngineTable) -> int:
     throws_per_cylinder = 2 if table.layout == "vee" else 1
     told = {
         "engine.cylinders": table.cylinders,
-        "engine.firing_order": len(table.firing_order) if table.firing_order is not None else None,
-        "engine.throws": len(table.throws) * throws_per_cylinder if table.throws is not None else None,
+        "engine.firing_order": len(table.given_order) if table.given_order is not None else None,
+        "engine.throws": len(table.given_throws) * throws_per_cylinder if table.given_throws is not None else None,
     }
     given = {key: count for key, count in told.items() if count is not None}
     if not given:
@@ -99,21 +100,21 @@ def _cylinders(table: EngineTable) -> int:
             raise Refused(
                 key, None, f"makes {other} cylinder(s), but {next(iter(given))} makes {count}", "let them agree"
             )
-    order = table.firing_order
+    order = table.given_order
     if order is not None and sorted(order) != list(range(1, count + 1)):
         raise Refused("engine.firing_order", order, f"is no permutation of 1 to {count}", "name every cylinder once")
     return count
 
 
 def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
-    if table.throws is not None:
-        return tuple(table.throws)
-    if table.firing_order is None:
+    if table.given_throws is not None:
+        return tuple(table.given_throws)
+    if table.given_order is None:
         if len(layout.throw_positions) == 1:
             return (layout.banks[0] - layout.pin_offsets[0],)
         raise Refused("engine.throws", None, "is missing", "add it, or firing_order for even firing")
     with blamed_on("engine.firing_order"):
-        return even_throws(cycle_of(table), layout, table.firing_order)
+        return even_throws(cycle_of(table), layout, table.given_order)
 
 
 def _mechanism(table: EngineTable) -> Mechanism:
@@ -170,6 +171,9 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
         raise Refused("engine.slider_cranks", None, "is missing", "list at least one [[engine.slider_cranks]]")
     shafts = {"crankshaft": CRANKSHAFT}
     for k, shaft in enumerate(table.shafts):
+        if shaft.name in shafts:
+            rule = "is the name of another shaft"
+            raise Refused(f"engine.shafts[{k + 1}].name", shaft.name, rule, "give each its own name")
         with blamed_on(f"engine.shafts[{k + 1}]"):
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
     return tuple(_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks))
@@ -227,9 +231,8 @@ def mounts_of(table: MountsTable | None) -> tuple[Mount, ...]:
     for k, (name, place) in enumerate(zip(names, places, strict=True)):
         stiffness = place.relative_stiffness or table.relative_stiffness
         if not any(stiffness):
-            raise Refused(
-                f"mounts.places[{k + 1}].relative_stiffness", stiffness, "carries nothing", "give one a value"
-            )
+            own = f"places[{k + 1}]." if place.relative_stiffness else ""
+            raise Refused(f"mounts.{own}relative_stiffness", stiffness, "carries nothing", "give one a value")
         x, y, z = place.position
         mounts.append(Mount(name, (x, y, z), (stiffness[0], stiffness[1], stiffness[2]), _turned(place.turned)))
     _all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place")

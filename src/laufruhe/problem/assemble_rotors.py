@@ -183,6 +183,7 @@ def _place(
     direction = cis(as_turn(reference))
     low, high, start_angle = (angle.lower, angle.upper, angle.start) if isinstance(angle, Open) else (angle,) * 3
     _check_convex(size, low, high, where)
+    high = low + math.tau if _is_whole_turn(low, high) else high
     start = size.start * _direction(start_angle)
     into.add(Rotor(name, x, size.gain * direction * start, shaft, role, table.radius), f"{where}.name")
     if size.open:
@@ -196,6 +197,10 @@ def _place(
 def _direction(angle: float) -> complex:
     turn = as_turn(angle)
     return cis(turn) if not isinstance(turn, float) else cmath.exp(1j * angle)
+
+
+def _is_whole_turn(low: float, high: float) -> bool:
+    return high - low >= math.tau * (1.0 - 1e-9)
 
 
 def _check_convex(size: _Size, low: float, high: float, where: str) -> None:
@@ -212,8 +217,7 @@ def _check_convex(size: _Size, low: float, high: float, where: str) -> None:
             "is a least size above zero while the angle is open",
             "let the size start at zero, or fix the angle",
         )
-    width = high - low
-    if width > math.pi * (1.0 + 1e-9) and width < math.tau * (1.0 - 1e-9):
+    if high - low > math.pi * (1.0 + 1e-9) and not _is_whole_turn(low, high):
         raise Refused(
             f"{where}.angle",
             f"{math.degrees(low):g} to {math.degrees(high):g} deg",

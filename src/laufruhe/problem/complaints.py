@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from laufruhe.errors import Complaint, LaufruheError, ModelError
 
+_CLOSE = 0.6
 _RULES = {
     "missing": "is missing",
     "int_type": "must be a whole number",
@@ -29,10 +30,19 @@ _RULES = {
 def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Complaint, ...]:
     """One complaint for every key that is wrong, in the order of the file."""
     found: dict[str, Complaint] = {}
-    for detail in error.errors(include_url=False):
-        loc = _without_tags(detail["loc"])
+    details = [(_without_tags(detail["loc"]), detail) for detail in error.errors(include_url=False)]
+    unknown = [loc for loc, detail in details if detail["type"] == "extra_forbidden"]
+    for loc, detail in details:
+        if detail["type"] == "missing" and _is_misspelt(loc, unknown):
+            continue
         found.setdefault(key_path(loc), _complaint(detail, loc, model))
     return tuple(found.values())
+
+
+def _is_misspelt(loc: tuple[str | int, ...], unknown: Sequence[tuple[str | int, ...]]) -> bool:
+    """Whether a missing key is there in another spelling: what is wrong is said once."""
+    words = [str(other[-1]) for other in unknown if other[:-1] == loc[:-1]]
+    return bool(difflib.get_close_matches(str(loc[-1]), words, n=1, cutoff=_CLOSE))
 
 
 def key_path(loc: Sequence[str | int]) -> str:
@@ -55,7 +65,7 @@ def short(value: Any) -> str:
 
 def nearest(word: str, words: Sequence[str]) -> str:
     """A remedy that names the nearest right word, or all of them."""
-    close = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(word, words, n=1, cutoff=_CLOSE)
     # a name may hold what no terminal should be sent
     shown = "".join(c if c.isprintable() else "?" for c in close[0]) if close else ""
     return f"did you mean '{shown}'?" if close else "use one of: " + ", ".join(sorted(words))

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
 
 # SI; squares and products of what is smaller stay finite.
 LARGEST = 1e12
+# Ratios are taken as fractions with a denominator of at most a thousand.
+SLOWEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -86,24 +89,27 @@ class Quantity:
 
     def _number(self, given: Any) -> float:
         if isinstance(given, bool) or not isinstance(given, int | float | str):
-            raise _complaint(f"is no {'number' if not self.unit else 'number with a unit'}; {units._advice(self.unit)}")
+            raise _complaint(f"is no {'number' if not self.unit else 'number with a unit'}; {units.advice(self.unit)}")
         if isinstance(given, str):
             try:
                 return units.parse(given, self.unit)
             except units.UnitError as error:
                 raise _complaint(str(error)) from None
         if self.unit and self.plain is None:
-            raise _complaint(f"has no unit, {units.dimension_name(self.unit)} needs one; {units._advice(self.unit)}")
-        value = float(given) * (self.plain if self.plain is not None else 1.0)
+            raise _complaint(f"has no unit, {units.dimension_name(self.unit)} needs one; {units.advice(self.unit)}")
+        try:
+            value = float(given) * (self.plain if self.plain is not None else 1.0)
+        except OverflowError:
+            value = math.inf
         if not math.isfinite(value):
             raise _complaint("is not finite; give a number")
         return value
 
     def _bounded(self, value: float) -> float:
         if abs(value) > LARGEST:
-            raise _complaint(f"is beyond any engine; {units._advice(self.unit)}")
+            raise _complaint(f"is beyond any engine; {units.advice(self.unit)}")
         if value <= self.above:
-            raise _complaint(f"must be more than {units.shown(self.above, self.unit)}; {units._advice(self.unit)}")
+            raise _complaint(f"must be more than {units.shown(self.above, self.unit)}; {units.advice(self.unit)}")
         if value < self.least:
             raise _complaint(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
         if value > self.most:
@@ -130,9 +136,46 @@ class Quantity:
         return Open(low, high, start)
 
 
+@dataclass(frozen=True)
+class OrOpen:
+    """A pydantic field that reads a list, or the word "open" in its place.
+
+    Attributes
+    ----------
+    inner
+        Type of the list.
+    example
+        As a user would write it.
+    """
+
+    inner: Any
+    example: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(self.inner))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [handler(schema), {"const": "open"}]}
+
+    def _read(self, given: Any, inner: Callable[[Any], Any]) -> Any:
+        if isinstance(given, str):
+            if given == "open":
+                return given
+            raise _complaint(f'is neither a list nor "open"; write for example {self.example} or "open"')
+        return inner(given)
+
+
 def _complaint(text: str) -> PydanticCustomError:
     # braces would be read as a template
     return PydanticCustomError("laufruhe", "{text}", {"text": text})
+
+
+def _turning(ratio: float) -> float:
+    if abs(ratio) < SLOWEST:
+        raise _complaint(f"is a shaft that hardly turns; give at least {SLOWEST:g} either way")
+    return ratio
 
 
 _DEG = math.radians(1.0)
@@ -149,9 +192,11 @@ Angle: TypeAlias = Annotated[float, Quantity("rad", plain=_DEG)]
 OpenAngle: TypeAlias = Annotated[float | Open, Quantity("rad", plain=_DEG, openable=True)]
 Speed: TypeAlias = Annotated[float, Quantity("rad/s", above=0.0)]
 PistonSpeed: TypeAlias = Annotated[float, Quantity("m/s", above=0.0)]
-Ratio: TypeAlias = Annotated[float, Quantity("", least=-100.0, most=100.0)]
+Time: TypeAlias = Annotated[float, Quantity("s", above=0.0)]
+Ratio: TypeAlias = Annotated[float, Quantity("", least=-100.0, most=100.0), AfterValidator(_turning)]
 NonNegative: TypeAlias = Annotated[float, Quantity("", least=0.0)]
 Positive: TypeAlias = Annotated[float, Quantity("", above=0.0)]
 Fraction: TypeAlias = Annotated[float | Open, Quantity("", least=-10.0, most=10.0, openable=True)]
 OpenUnbalance: TypeAlias = Annotated[float | Open, Quantity("kg m", least=0.0, openable=True)]
 OpenMass: TypeAlias = Annotated[float | Open, Quantity("kg", least=0.0, openable=True)]
+Throws: TypeAlias = Annotated[list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]")]

@@ -14,6 +14,7 @@ MASS_NAMES = tuple(str(s) for s in MASSES)
 QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": [*LOAD_NAMES, *MASS_NAMES]})]
 Count: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
+FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
 Place: TypeAlias = Annotated[list[f.Length], Field(min_length=3, max_length=3)]
 Triple: TypeAlias = Annotated[list[f.NonNegative], Field(min_length=3, max_length=3)]
 Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60)]
@@ -79,13 +80,63 @@ class EngineTable(Table):
     cylinder_spacing: f.PositiveLength | None = Field(
         default=None, description="Between throws; in a boxer, of a bank."
     )
-    bank_angle: f.Angle | None = Field(default=None, description="Between the banks of a vee.")
-    split_pin_angle: f.Angle | None = None
+    bank_angle: f.OpenAngle | None = Field(default=None, description="Between the banks of a vee.")
+    split_pin_angle: f.OpenAngle | None = Field(default=None, description="By which the right bank's pin leads.")
     bank_stagger: f.Length | None = None
-    throws: list[f.Angle] | None = Field(default=None, description="At phi = 0; even firing where left out.")
-    firing_order: list[CylinderNumber] | None = None
+    throws: f.Throws | None = Field(default=None, description="At phi = 0; even firing where left out.")
+    firing_order: FiringOrder | None = None
     shafts: list[ShaftTable] = Field(default_factory=list)
     slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
+
+    @property
+    def given_throws(self) -> list[float] | None:
+        """Throws, where every one is a number."""
+        if self.throws is None or self.throws == "open":
+            return None
+        angles = [angle for angle in self.throws if isinstance(angle, float)]
+        return angles if len(angles) == len(self.throws) else None
+
+    @property
+    def given_order(self) -> list[int] | None:
+        """Firing order, where it is a list."""
+        return None if self.firing_order is None or self.firing_order == "open" else self.firing_order
+
+    @property
+    def given_bank(self) -> float | None:
+        """Bank angle, where it is a number."""
+        return self.bank_angle if isinstance(self.bank_angle, float) else None
+
+    @property
+    def given_split(self) -> float | None:
+        """Angle between split pins, where it is a number."""
+        return self.split_pin_angle if isinstance(self.split_pin_angle, float) else None
+
+
+class IntervalsTable(Table):
+    """Bounds on the crank angle from each firing to the next."""
+
+    min: f.Angle | None = None
+    max: f.Angle | None = None
+    largest_deviation: f.Angle | None = Field(default=None, description="From equal intervals.")
+
+
+class PhasingTable(Table):
+    """How open throws, firing orders and shafts are decided."""
+
+    phases: Annotated[int, Field(ge=1, le=96)] | None = Field(
+        default=None, description="Equal steps of a turn that throws stand on; those of even firing where left out."
+    )
+    intervals: IntervalsTable | None = Field(default=None, description="Even firing where left out.")
+    best: Annotated[int, Field(ge=1, le=200)] = Field(default=10, description="How many stars are ranked.")
+    rank_orders_by: list[Literal["roll moment", "neighbours", "longest gap"]] = Field(
+        default=["neighbours", "longest gap"], min_length=1, description="Of firing orders; the first counts most."
+    )
+    most_shafts: Annotated[int, Field(ge=0, le=48)] | None = Field(
+        default=None, description="Optional balancer shafts that may be built."
+    )
+    most_shaft_mass: f.Mass | None = Field(default=None, description="Of the optional shafts that are built.")
+    time_limit: f.Time = Field(default=600.0, description="Of the search.")
+    method: Literal["auto", "search", "program", "enumeration"] = "auto"
 
 
 class OperatingPointTable(Table):
@@ -205,6 +256,8 @@ class BalancerShaftTable(Table):
     ratio: f.Ratio
     position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
     unbalances: list[UnbalanceTable] = Field(min_length=1)
+    optional: bool = Field(default=False, description="Whether it is built is decided too.")
+    shaft_mass: f.Mass = Field(default=0.0, description="Of an optional shaft, its unbalances not included.")
 
 
 class QuantityTable(Table):
@@ -264,6 +317,7 @@ class ProblemFile(Table):
     assumptions: list[str] = Field(default_factory=list)
     tolerance: f.Positive = Field(default=1e-4, description="Relative gap at which an optimum counts as proven.")
     engine: EngineTable
+    phasing: PhasingTable | None = None
     operating_points: list[OperatingPointTable] = Field(min_length=1)
     gas: GasTable | None = None
     mounts: MountsTable | None = None

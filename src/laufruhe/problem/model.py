@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.shaking_loads import EXACT, Fidelity
+from laufruhe.problem.phasing import Phasing
 from laufruhe.problem.quantity import Quantity
 
 Array = NDArray[np.float64]
@@ -116,6 +117,8 @@ class Problem:
         What of the physics is kept.
     tolerance
         Relative gap at which an optimum counts as proven.
+    phasing
+        What of throws, firing order and the choice of shafts is open; None if nothing is.
     """
 
     name: str
@@ -129,6 +132,7 @@ class Problem:
     assumptions: tuple[str, ...] = ()
     fidelity: Fidelity = EXACT
     tolerance: float = 1e-4
+    phasing: Phasing | None = None
 
     @property
     def start(self) -> tuple[complex, ...]:

@@ -19,6 +19,7 @@ from laufruhe.problem.file_models import LOAD_NAMES, MASS_NAMES, ConstraintTable
 from laufruhe.problem.model import Limit, Problem, Term
 from laufruhe.problem.quantity import MEASURES, Quantity, Subject, counted_rotors
 from laufruhe.problem.read_fidelity import at_fidelity
+from laufruhe.problem.read_phasing import is_open, opened
 
 
 def load(path: str | Path) -> Problem:
@@ -32,6 +33,8 @@ def load(path: str | Path) -> Problem:
     path = Path(path)
     file = _parsed(path)
     try:
+        if is_open(file):
+            return opened(file, lambda closed: _assembled(closed, path))
         return _assembled(file, path)
     except Refused as refused:
         raise InputError(str(path), (refused.complaint,)) from None
@@ -54,6 +57,9 @@ def _parsed(path: Path) -> ProblemFile:
         raise _unreadable(path, f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise _unreadable(path, f"is no TOML: {error}", "correct it there") from None
+    except ValueError:
+        # the one that is no TOMLDecodeError
+        raise _unreadable(path, "holds a whole number of thousands of digits", "write it shorter") from None
     except RecursionError:
         raise _unreadable(path, "is nested too deeply", "flatten it") from None
     try:
@@ -76,13 +82,16 @@ def _assembled(file: ProblemFile, path: Path) -> Problem:
     engine = Engine(file.title, cycle_of(file.engine), cylinders, tuple(collected.rotors), mounts)
     points = operating_points(file, path.parent)
     scene = _Scene(mounts, points, tuple(collected.rotors))
+    objective = _objective(file, scene)
+    if collected.decisions and not objective:
+        raise Refused("objective", None, "is missing while numbers are open", "say what is to be minimised")
     problem = Problem(
         name=path.stem,
         title=file.title,
         engine=engine,
         points=points,
         decisions=tuple(collected.decisions),
-        objective=_objective(file, scene),
+        objective=objective,
         limits=tuple(_limit(table, k, scene) for k, table in enumerate(file.constraints)),
         source=file.source,
         assumptions=tuple(file.assumptions),
@@ -131,7 +140,10 @@ class _Scene:
                 raise Refused(f"{at}.{key}", None, "means nothing for a mass", "leave it out")
         self._known(of, [rotor.name for rotor in self.rotors], f"{at}.of", "counterweight or balancer")
         quantity = Quantity(Subject(name), MEASURES["mean"], rotors=_tuple(of))
-        for rotor in counted_rotors(quantity, self.rotors):
+        counted = counted_rotors(quantity, self.rotors)
+        if not counted:
+            raise Refused(f"{at}", name, "counts nothing in this engine", "add what it counts, or leave it out")
+        for rotor in counted:
             if rotor.radius is None:
                 raise Refused(f"{at}", name, f"counts the mass of '{rotor.name}', which has no radius", "give it one")
         return quantity

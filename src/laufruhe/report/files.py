@@ -13,7 +13,7 @@ from laufruhe.errors import Complaint, InputError
 
 RESULT = "result.json"
 REPORT = "report.md"
-PICTURES = ("polar.png", "bars.png", "spectrum.png")
+PICTURES = ("polar.png", "bars.png", "spectrum.png", "star.png", "firings.png", "trade.png")
 RESULT_FILES = (RESULT, REPORT, *PICTURES)
 
 

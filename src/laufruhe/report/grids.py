@@ -41,7 +41,10 @@ class Grid:
 def grids_of(result: Result) -> list[Grid]:
     """Every table that this result fills."""
     candidates = [_decisions(result), _limits(result), _mounts(result), _orders(result)]
-    return [grid for grid in candidates if grid.rows]
+    # an import above would be circular: the ranking makes grids too
+    from laufruhe.report.ranking import phasing_grids
+
+    return [grid for grid in [*phasing_grids(result), *candidates] if grid.rows]
 
 
 def _decisions(result: Result) -> Grid:
@@ -54,7 +57,7 @@ def _decisions(result: Result) -> Grid:
 def _decision_row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str, ...]:
     name, factor = readable(d.unit)
     bounds = f"{trimmed(d.lower * factor)} to {trimmed(d.upper * factor)} {name}".rstrip()
-    is_angle = d.unit == "rad" and before is not None
+    is_angle = d.name.endswith(".angle") and before is not None
     if is_angle and before is not None and is_nothing(before):
         return d.name, _given_angle(before, d), DASH, bounds, DASH, DASH
     given = _given_angle(before, d) if is_angle and before is not None else with_unit(d.initial, d.unit)

@@ -12,16 +12,17 @@ import numpy as np
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.metrics import CycleMeasures, cycle_measures
+from laufruhe.physics.metrics import CycleMeasures
 from laufruhe.physics.shaking_loads import WRENCH
 from laufruhe.report.measures import (
     PRESENT,
     is_met,
     limits_of,
+    measured,
     mount_orders,
-    mount_samples,
     shaking_orders,
 )
+from laufruhe.report.ranking import phasing_record
 from laufruhe.report.versions import versions
 from laufruhe.solve.result import Result
 
@@ -53,6 +54,7 @@ def as_dict(result: Result) -> dict[str, Any]:
         "shaking": _largest([point["shaking"] for point in points]),
         "points": [{key: point[key] for key in own} for point in points],
         "firing_intervals": list(engine.firing_intervals),
+        **phasing_record(result),
         "fidelity": {
             **fidelity_dict(problem.fidelity),
             "measured_at": result.final.samples,
@@ -144,17 +146,17 @@ def _mounts(result: Result, k: int) -> list[dict[str, Any]]:
     forces = result.final.loads[k].mount_forces
     if forces is None:
         return []
-    before, after = mount_samples(result.initial, k), mount_samples(result.final, k)
+    before, after = measured(result.initial, k), measured(result.final, k)
     amplitudes = mount_orders(forces)
     kept = np.flatnonzero(np.any(amplitudes > PRESENT * amplitudes.max(initial=0.0), axis=1))
     return [
         {
             "name": name,
-            **_measures(cycle_measures(after[:, m])),
+            **_measures(after[m]),
             "orders": [
                 {"order": float(forces.orders[j]), "amplitude": float(amplitudes[j, m])} for j in kept
             ],
-            "initial": _measures(cycle_measures(before[:, m])),
+            "initial": _measures(before[m]),
         }
         for m, name in enumerate(result.final.mount_names)
     ]  # fmt: skip

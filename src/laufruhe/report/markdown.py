@@ -14,6 +14,9 @@ _CAPTIONS = {
     "polar.png": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",
     "bars.png": "Mean and maximum of each mount's force over one cycle.",
     "spectrum.png": "What orders of crank speed the loads are made of.",
+    "star.png": "The best crank stars, from the front and from the side.",
+    "firings.png": "Firing orders of the best stars over one working cycle.",
+    "trade.png": "What slightly uneven firing buys.",
 }
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures, order_amplitude
-from laufruhe.problem.evaluation import Evaluation, PointLoads, over
+from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, PointLoads, over
 from laufruhe.problem.model import Limit
 from laufruhe.solve.result import LimitValue, Result
 
@@ -29,24 +29,30 @@ class MountMeasures:
     final: CycleMeasures
 
 
-def mount_samples(evaluation: Evaluation, k: int) -> Array:
+def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
     """Mount forces at operating point k over the whole cycle, shape (samples, mounts, 3) [N]."""
     forces = evaluation.loads[k].mount_forces
     if forces is None:
         raise ValueError("an engine without mounts has no mount forces")
-    return over(evaluation.engine.cycle.base_order, [forces])[0].sample(evaluation.samples)
+    return over(evaluation.engine.cycle.base_order, [forces])[0].sample(finer * evaluation.samples)
+
+
+def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
+    """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
+    samples, fine = mount_samples(evaluation, k), mount_samples(evaluation, k, PEAK_REFINEMENT)
+    return [replace(cycle_measures(samples[:, m]), max=cycle_measures(fine[:, m]).max) for m in range(samples.shape[1])]
 
 
 def mount_measures(result: Result) -> list[MountMeasures]:
     """Of every operating point and mount, in the order of the problem."""
-    out = []
-    for k, point in enumerate(result.problem.points if result.problem.engine.mounts else ()):
-        before, after = mount_samples(result.initial, k), mount_samples(result.final, k)
-        for m, name in enumerate(result.initial.mount_names):
-            out.append(
-                MountMeasures(point.name, name, cycle_measures(before[:, m]), cycle_measures(after[:, m]))
-            )  # fmt: skip
-    return out
+    if not result.problem.engine.mounts:
+        return []
+    names = result.initial.mount_names
+    return [
+        MountMeasures(point.name, name, before, after)
+        for k, point in enumerate(result.problem.points)
+        for name, before, after in zip(names, measured(result.initial, k), measured(result.final, k), strict=True)
+    ]
 
 
 def hardest_point(result: Result) -> int:

@@ -72,11 +72,11 @@ def index(trades: Sequence[Trade]) -> str:
         "Which fidelity to take, measured on every ready problem. In short:",
         "",
         "- `auto` is the safe choice: it says how wrong it can be, and is not more wrong than that.",
-        "- The two-order formulas of textbooks cost 0.2 to 2 % of the number and, as starting point of a design, "
-        "little regret. Not of engines whose second order cancels: what is left there is what they leave out.",
+        "- The two-order formulas of textbooks cost up to 2 % of the number, and up to 2 % of the design. Not so of engines whose second order cancels: what is left there is what they leave out.",
         "- Leaving gas out is what costs most: it decides how the roll moment is balanced.",
         "- More than 720 steps a cycle serve peaks and proofs, not means.",
-        "- Regret is far smaller than error: an optimum is flat. A cheap fidelity to search, an exact one to state.",
+        "- Regret may be far below the error, for an optimum is flat, and far above it: what a shaft is wrongly made "
+        "to balance stays. Read both columns.",
         "",
         "| problem | take | error of two-order | of no gas | of auto 0.001 | regret of two-order | of auto 0.001 "
         "| uneven speed |",

@@ -12,6 +12,8 @@ from laufruhe.solve.result import DecisionValue, Result, Status
 
 DASH = "-"
 NOTHING = 1e-9
+# A change that would be printed as 0.0 %.
+UNFELT = 5e-4
 _SHOWN = {"rad": ("deg", math.degrees(1.0)), "rad/s": ("rpm", 30.0 / math.pi), "m": ("mm", 1e3)}
 
 
@@ -37,7 +39,7 @@ def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
 
 def aligned(value: float, largest: float, digits: int = 5) -> str:
     """As many decimals as the largest number of its column needs for `digits` figures."""
-    if largest <= 0.0 or not math.isfinite(largest) or not -4 <= math.log10(largest) < digits:
+    if value == 0.0 or largest <= 0.0 or not math.isfinite(largest) or not -4 <= math.log10(largest) < digits:
         return number(value, scale=largest)
     return f"{value:.{digits - 1 - math.floor(math.log10(largest))}f}"
 
@@ -89,6 +91,8 @@ def headline(result: Result) -> str:
     name = o.name[:1].upper() + o.name[1:]
     if not changed(result):
         return f"{name} of the design as given: {number(o.value)} {o.unit}."
+    if abs(o.reduction) < UNFELT:
+        return f"{name} stays at {number(o.initial)} {o.unit}, {_proven(result.certificate)}."
     change = percent(-o.reduction)
     sentence = f"{name} falls from {number(o.initial)} {o.unit} to {number(o.value, scale=o.initial)} {o.unit}"
     if o.value > o.initial:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.solve.accuracy import error_of, solve_within
@@ -23,11 +24,15 @@ def solve(problem: Problem) -> Result:
     ModelError
         If the engine as given cannot be evaluated.
     """
+    if problem.phasing is not None:
+        from laufruhe.solve.phasing import solve_phasing
+
+        return solve_within(problem, solve_phasing)
+    if problem.decisions and not problem.objective:
+        raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
     if not problem.decisions:
         return state(problem)
-    if problem.fidelity.tolerance is not None:
-        return solve_within(problem, solve_unbalances)
-    return solve_unbalances(problem)
+    return solve_within(problem, solve_unbalances)
 
 
 def state(problem: Problem) -> Result:

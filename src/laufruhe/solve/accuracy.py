@@ -47,11 +47,14 @@ def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result
     """
     asked = problem.fidelity.tolerance
     result = solve(problem)
+    if asked is None or result.certificate is None:
+        return result
     for _ in range(_ROUNDS):
-        if asked is None or result.certificate is None or result.error_estimate <= asked:
+        result = replace(result, error_estimate=error_of(result.problem, result.final))
+        if result.error_estimate <= asked:
             break
         better = choose(problem, asked, result.final.engine).fidelity
         if better == result.problem.fidelity:
             break
         result = solve(replace(problem, fidelity=better))
-    return result
+    return replace(result, error_estimate=error_of(result.problem, result.final))

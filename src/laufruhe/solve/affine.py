@@ -45,7 +45,7 @@ class AffineNorm:
 
     def rows(self, x: Array) -> Array:
         """V0 + B x, shape (k, d)."""
-        moved = self.slope.reshape(-1, self.slope.shape[-1]) @ x
+        moved = self.slope.reshape(self.constant.size, len(x)) @ x
         return self.constant + moved.reshape(self.constant.shape)
 
     def value(self, x: Array) -> float:
@@ -100,8 +100,10 @@ class AffineModel:
         Rows over the whole working cycle, even where the loads repeat within it.
     """
 
-    def __init__(self, problem: Problem, whole_cycle: bool = False) -> None:
+    def __init__(self, problem: Problem, keep_all: bool = False, whole_cycle: bool = False) -> None:
         self.problem = problem
+        # components that are zero are dropped, unless models are to be added up
+        self._keep_all = keep_all
         self.domains = domains_of(problem.decisions)
         bare = evaluate(problem, problem.design([0.0] * len(problem.decisions)))
         mounting = rigid_mounting(problem.engine.mounts) if problem.engine.mounts else None
@@ -141,7 +143,7 @@ class AffineModel:
         if quantity.subject in MASSES:
             bare = mass_rows(quantity, self._bare.engine.rotors)
             slopes = [mass_rows(quantity, _only(self._bare.engine, rotors)).vectors for rotors in self._changes]
-            return _stacked(bare, slopes)
+            return _stacked(bare, slopes, self._keep_all)
         subject = Subject.MOUNT_FORCE if quantity.subject is Subject.MOUNT_FORCE else Subject.SHAKING_FORCE
         bare = self._rows(quantity, [loads.signal(quantity.subject) for loads in self._bare.loads], samples)
         by_point = self._slopes[subject]
@@ -149,7 +151,7 @@ class AffineModel:
             self._rows(quantity, [by_point[p][k] for p in range(len(by_point))], samples).vectors
             for k in range(len(self._changes))
         ]
-        return _stacked(bare, slopes)
+        return _stacked(bare, slopes, self._keep_all)
 
     def _rows(self, quantity: Quantity, signals: Sequence[Spectrum], samples: int) -> Rows:
         finest = common_base([self.base, *(signal.base for signal in signals)])
@@ -186,9 +188,10 @@ def _slope(
     return mounting.forces(wrench) if mounting and subject is Subject.MOUNT_FORCE else wrench
 
 
-def _stacked(bare: Rows, slopes: Sequence[Array]) -> AffineNorm:
+def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
     slope = np.stack(slopes, axis=-1) if slopes else np.zeros((*bare.vectors.shape, 0))
     used = np.any(bare.vectors != 0.0, axis=0) | np.any(slope != 0.0, axis=(0, 2))
-    if not used.any():
+    if keep_all or not used.any():
+        used[:] = keep_all
         used[:1] = True
     return AffineNorm(bare.norm, bare.vectors[:, used], np.ascontiguousarray(slope[:, used]), bare.weights)

@@ -9,6 +9,7 @@ from enum import StrEnum
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.model import Problem
 from laufruhe.solve.certificate import Certificate
+from laufruhe.solve.ranking import PhasingResult
 
 
 class Status(StrEnum):
@@ -95,6 +96,8 @@ class Result:
         Relative error of the objective from sampling the cycle.
     timing
         Seconds by what they were spent on.
+    phasing
+        Ranking of stars and firing orders, where these were open.
     """
 
     problem: Problem
@@ -109,6 +112,7 @@ class Result:
     conflict: tuple[str, ...] = ()
     error_estimate: float = 0.0
     timing: dict[str, float] = field(default_factory=dict)
+    phasing: PhasingResult | None = None
 
     def __repr__(self) -> str:
         lines = [f"<Result {self.problem.name}: {self.status}"]

@@ -1,0 +1,223 @@
+"""Even firing as a lattice: which stars fire evenly, and in which orders (S6-S8).
+
+Cylinders that fire at equal intervals of turns/n have their dead centres on multiples
+of 1/R of a turn, R of them, and every multiple is taken by as many cylinders as there
+are firings on it. That is all: a star is even if and only if its counts add up.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.engine import Cycle
+from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.turns import Turn, angle_of, as_turn
+
+MOST_ORDERS = 4096
+ORDERS_LOOKED_AT = 200_000
+_SAME = 1e-9
+
+
+class NoEvenStarError(ModelError):
+    """No star of this layout fires evenly."""
+
+
+@dataclass(frozen=True)
+class FiringLattice:
+    """Where cylinders may fire when all intervals are equal (S6).
+
+    Attributes
+    ----------
+    steps
+        R, the number of different crank angles at which something fires, a turn apart
+        counted as one.
+    slots
+        Step of each of the n firings of a cycle, in their order.
+    capacity
+        Firings on every step.
+    """
+
+    steps: int
+    slots: tuple[int, ...]
+
+    @property
+    def capacity(self) -> tuple[int, ...]:
+        """Firings on every step, the same for all."""
+        return tuple(self.slots.count(step) for step in range(self.steps))
+
+
+def firing_lattice(cycle: Cycle, cylinders: int) -> FiringLattice:
+    """Of `cylinders` equal intervals."""
+    steps = cylinders // math.gcd(cycle.turns, cylinders)
+    interval = cycle.turns * steps // cylinders
+    return FiringLattice(steps, tuple(s * interval % steps for s in range(cylinders)))
+
+
+def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], ...]:
+    """Dead centres of a throw's cylinders after that of cylinder 1, the throw beside throw 1, in steps (S6).
+
+    Raises
+    ------
+    NoEvenStarError
+        If two cylinders of one throw are apart by no whole number of steps.
+    """
+    first = _own_turn(layout, 0)
+    out = []
+    for pin in range(len(layout.throw_positions)):
+        steps = []
+        for k in (k for k, own in enumerate(layout.pins) if own == pin):
+            apart = (_own_turn(layout, k) - first) * lattice.steps
+            nearest = round(float(apart))
+            if abs(float(apart) - nearest) > _SAME * lattice.steps:
+                raise NoEvenStarError(
+                    f"even firing needs bank angle plus split pins to be a multiple of {360.0 / lattice.steps:g} deg, "
+                    f"and they make {math.degrees(angle_of(_own_turn(layout, 0) - _own_turn(layout, k))):.6g} deg; "
+                    "leave split_pin_angle open, or allow uneven intervals"
+                )
+            steps.append(nearest % lattice.steps)
+        out.append(tuple(steps))
+    return tuple(out)
+
+
+def _own_turn(layout: Layout, k: int) -> Turn:
+    """Dead centre of a cylinder whose throw is at zero."""
+    return as_turn(layout.banks[k]) - as_turn(layout.pin_offsets[k])
+
+
+def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
+    """How many throws may stand on every step so that the firing is even (S7).
+
+    Returns
+    -------
+    Shape (patterns, R), the first throw on step 0.
+
+    Raises
+    ------
+    NoEvenStarError
+        If there is none.
+    """
+    lattice = firing_lattice(cycle, len(layout.positions))
+    pins = pin_steps(layout, lattice)
+    if len(set(pins)) > 1:
+        raise NoEvenStarError("open throws need throws that are alike; use layout inline or vee")
+    found = tuple(_patterns(lattice, pins[0], len(layout.throw_positions)))
+    if not found:
+        raise NoEvenStarError(
+            f"no star of {len(layout.throw_positions)} throw(s) fires evenly with cylinders of one throw "
+            f"{' and '.join(f'{360.0 * s / lattice.steps:g}' for s in pins[0])} deg apart"
+        )
+    return found
+
+
+def _patterns(lattice: FiringLattice, own: tuple[int, ...], throws: int) -> Iterator[tuple[int, ...]]:
+    steps, most = lattice.steps, lattice.capacity[0]
+
+    def grow(counts: list[int], load: list[int], left: int) -> Iterator[tuple[int, ...]]:
+        if len(counts) == steps:
+            if left == 0 and all(x == most for x in load):
+                yield tuple(counts)
+            return
+        p = len(counts)
+        for count in range(1 if p == 0 else 0, min(left, most) + 1):
+            after = load.copy()
+            for step in own:
+                after[(step - p) % steps] += count
+            if max(after) <= most:
+                yield from grow([*counts, count], after, left - count)
+
+    yield from grow([], [0] * steps, throws)
+
+
+def star_throws(layout: Layout, steps: Sequence[int], lattice_steps: int) -> tuple[float, ...]:
+    """Throw angles of a star [rad], cylinder 1 at its dead centre when phi = 0 (C5)."""
+    first = _own_turn(layout, 0)
+    return tuple(angle_of((first + Fraction(int(step), lattice_steps)) % 1) for step in steps)
+
+
+def even_orders(cycle: Cycle, layout: Layout, steps: Sequence[int]) -> Iterator[tuple[int, ...]]:
+    """Firing orders that belong to a star, cylinder 1 first (S8): each cylinder on a free firing of its step."""
+    lattice = firing_lattice(cycle, len(layout.positions))
+    pins = pin_steps(layout, lattice)
+    seen = [0] * len(pins)
+    cylinders: dict[int, list[int]] = {step: [] for step in range(lattice.steps)}
+    for k, pin in enumerate(layout.pins):
+        step = (pins[pin][seen[pin]] - int(steps[pin])) % lattice.steps
+        seen[pin] += 1
+        cylinders[step].append(k)
+    free = {step: [s for s, at in enumerate(lattice.slots) if at == step] for step in cylinders}
+    if any(len(cylinders[step]) != len(free[step]) for step in cylinders):
+        return
+    choices = [list(itertools.permutations(cylinders[step])) for step in cylinders]
+    for chosen in itertools.islice(itertools.product(*choices), ORDERS_LOOKED_AT):
+        order = [0] * len(lattice.slots)
+        for step, members in zip(cylinders, chosen, strict=True):
+            for slot, k in zip(free[step], members, strict=True):
+                order[slot] = k + 1
+        if order[0] == 1:
+            yield tuple(order)
+
+
+def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) -> tuple[float, ...]:
+    """Turn of the crank at which each cylinder of the order fires, ascending from 0."""
+    start, out = None, []
+    previous = -_SAME
+    for number in order:
+        k = number - 1
+        turn = float((_own_turn(layout, k) - as_turn(throws[layout.pins[k]])) % 1)
+        turn = turn - 1.0 if turn > 1.0 - _SAME else turn
+        while turn < previous - _SAME:
+            turn += 1.0
+        start = turn if start is None else start
+        out.append(turn - start)
+        previous = turn
+    return tuple(out)
+
+
+def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterator[tuple[int, ...]]:
+    """Firing orders of throws at any angles: each cylinder on one of the turns of the cycle, cylinder 1 first."""
+    cylinders = range(len(layout.positions))
+    turns = [float((_own_turn(layout, k) - as_turn(throws[layout.pins[k]])) % 1) for k in cylinders]
+    relative = [(t - turns[0]) % 1.0 for t in turns]
+    relative = [0.0 if t > 1.0 - _SAME else t for t in relative]
+    laps = itertools.product(range(cycle.turns), repeat=len(relative) - 1)
+    for chosen in itertools.islice(laps, ORDERS_LOOKED_AT):
+        whole = [relative[0], *(t + lap for t, lap in zip(relative[1:], chosen, strict=True))]
+        yield tuple(k + 1 for k in sorted(cylinders, key=lambda k: (whole[k], k)))
+
+
+def intervals_of(cycle: Cycle, turns: Sequence[float]) -> tuple[float, ...]:
+    """Crank angles from each firing to the next [rad]."""
+    following = [*turns[1:], turns[0] + cycle.turns]
+    return tuple(math.tau * (b - a) for a, b in zip(turns, following, strict=True))
+
+
+def successive_neighbours(layout: Layout, order: Sequence[int]) -> int:
+    """How often cylinders on one throw, or on throws side by side, fire in succession."""
+    pins = [layout.pins[number - 1] for number in order]
+    return sum(abs(a - b) <= 1 for a, b in zip(pins, [*pins[1:], pins[0]], strict=True)) if len(pins) > 2 else 0
+
+
+def longest_bank_gap(cycle: Cycle, layout: Layout, order: Sequence[int], turns: Sequence[float]) -> float:
+    """Largest crank angle in which one bank does not fire [rad]."""
+    gaps = []
+    for bank in sorted(set(layout.banks)):
+        own = [t for number, t in zip(order, turns, strict=True) if layout.banks[number - 1] == bank]
+        gaps.append(max(intervals_of(cycle, own)))
+    return max(gaps)
+
+
+def order_content(cycle: Cycle, turns: Sequence[float]) -> float:
+    """Largest share of a torque order below the firing order that is not cancelled, 0 to 1 (S9).
+
+    Equal impulses at these turns add up to |sum_k e^{-i h 2 pi t_k}| / n in order h.
+    """
+    orders = np.arange(1, len(turns)) / cycle.turns
+    left = np.abs(np.exp(-2j * np.pi * np.outer(orders, turns)).sum(axis=1)) / len(turns)
+    return float(left.max(initial=0.0))

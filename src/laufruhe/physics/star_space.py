@@ -1,0 +1,158 @@
+"""Every star that throws may form, grown throw by throw in blocks of bounded memory (S2, S3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.physics.crank_stars import Stars, canonical
+
+Prune = Callable[["Partial"], NDArray[np.bool_]]
+BLOCK = 1 << 14
+
+
+@dataclass(frozen=True)
+class StarSpace:
+    """Stars of identical throws on equal steps of a turn.
+
+    Attributes
+    ----------
+    phases
+        Steps P of a turn.
+    patterns
+        How many throws stand on each step, shape (patterns, P); the first throw is on
+        step 0.
+    places
+        Of the throws along x [m].
+    mirror, reflect
+        Whether a star equals its front-back mirror image, and the star that turns the
+        other way round, in all that is asked of it (S2).
+    """
+
+    phases: int
+    patterns: tuple[tuple[int, ...], ...]
+    places: tuple[float, ...]
+    mirror: bool = False
+    reflect: bool = False
+
+    @property
+    def throws(self) -> int:
+        """Throws of a star."""
+        return len(self.places)
+
+    @property
+    def size(self) -> int:
+        """Stars with the first throw on step 0, images counted."""
+        total = 0
+        for pattern in self.patterns:
+            rest = [pattern[0] - 1, *pattern[1:]]
+            total += math.factorial(sum(rest)) // math.prod(math.factorial(count) for count in rest)
+        return total
+
+    def canonical(self, stars: Stars) -> Stars:
+        """One of each star's images, the same for all of them."""
+        return canonical(stars, self.phases, self.mirror, self.reflect)
+
+    def blocks(self, prune: Prune | None = None) -> Iterator[Stars]:
+        """All stars, one of each set of images, in blocks (n, throws).
+
+        Parameters
+        ----------
+        prune
+            Tells which partial stars need not be grown further.
+        """
+        for pattern in self.patterns:
+            for block in _grown(self, pattern, prune):
+                own = np.all(self.canonical(block) == block, axis=1)
+                if own.any():
+                    yield block[own]
+
+
+@dataclass(frozen=True, eq=False)
+class Partial:
+    """Stars whose outer throws are placed.
+
+    Attributes
+    ----------
+    stars
+        Shape (n, throws), steps; undefined where not yet placed.
+    counts
+        Shape (n, P): throws that each step still takes.
+    placed
+        Indices of the placed throws, in the order in which they were placed.
+    open
+        Indices of the others.
+    """
+
+    stars: Stars
+    counts: NDArray[np.uint8]
+    placed: tuple[int, ...]
+    open: tuple[int, ...]
+
+
+def outside_in(throws: int) -> tuple[int, ...]:
+    """First, last, second, last but one ...: the long levers first, so that bounds bite early."""
+    return tuple(k // 2 if k % 2 == 0 else throws - 1 - k // 2 for k in range(throws))
+
+
+def _grown(space: StarSpace, pattern: tuple[int, ...], prune: Prune | None) -> Iterator[Stars]:
+    order = outside_in(space.throws)
+    first = np.zeros((1, space.throws), dtype=np.uint8)
+    left = np.array([pattern], dtype=np.uint8)
+    left[0, 0] -= 1
+    # depth first over blocks: what waits never exceeds a block for every throw and step
+    waiting = [Partial(first, left, order[:1], order[1:])]
+    while waiting:
+        partial = waiting.pop()
+        if not partial.open:
+            yield partial.stars
+            continue
+        child = _children(partial)
+        child = _kept(child, _first_of_images(space, child))
+        if prune is not None and child.open:
+            child = _kept(child, ~prune(child))
+        for start in range(0, len(child.stars), BLOCK):
+            part = slice(start, start + BLOCK)
+            waiting.append(Partial(child.stars[part], child.counts[part], child.placed, child.open))
+
+
+def _children(partial: Partial) -> Partial:
+    rows, steps = np.nonzero(partial.counts)
+    stars, counts = partial.stars[rows], partial.counts[rows]
+    stars[:, partial.open[0]] = steps
+    counts[np.arange(len(rows)), steps] -= 1
+    return Partial(stars, counts, (*partial.placed, partial.open[0]), partial.open[1:])
+
+
+def _kept(partial: Partial, keep: NDArray[np.bool_]) -> Partial:
+    if keep.all():
+        return partial
+    return Partial(partial.stars[keep], partial.counts[keep], partial.placed, partial.open)
+
+
+def _first_of_images(space: StarSpace, partial: Partial) -> NDArray[np.bool_]:
+    """Whether no image of the whole star can already be seen to come earlier (S2).
+
+    An image compares with its star throw by throw from the front; as far as the steps
+    that both need are placed, the comparison is already decided.
+    """
+    keep = np.ones(len(partial.stars), dtype=bool)
+    placed, last = set(partial.placed), space.throws - 1
+    steps = partial.stars.astype(np.int16)
+    for swap, turn in ((False, True), (True, False), (True, True)):
+        if (swap and not space.mirror) or (turn and not space.reflect):
+            continue
+        undecided = np.ones(len(steps), dtype=bool)
+        for k in range(1, space.throws):
+            source = last - k if swap else k
+            if not {k, source} <= placed or (swap and last not in placed):
+                break
+            image = steps[:, source] - (steps[:, last] if swap else 0)
+            image = (-image if turn else image) % space.phases
+            keep &= ~(undecided & (image < steps[:, k]))
+            undecided &= image == steps[:, k]
+    return keep

@@ -1,0 +1,195 @@
+"""What of throws, firing order, banks and shafts is open (S6-S10). No solver in here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from laufruhe.machine import Cycle
+from laufruhe.machine.layouts import Layout
+
+if TYPE_CHECKING:
+    from laufruhe.problem.model import Problem
+
+
+class Method(StrEnum):
+    """How the discrete part is decided."""
+
+    AUTO = "auto"
+    SEARCH = "search"
+    PROGRAM = "program"
+    ENUMERATION = "enumeration"
+
+
+class OrderCriterion(StrEnum):
+    """What firing orders of one star are ranked by."""
+
+    ROLL_MOMENT = "roll moment"
+    NEIGHBOURS = "neighbours"
+    LONGEST_GAP = "longest gap"
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Bounds on every firing interval [rad]."""
+
+    least: float
+    most: float
+
+    def holds(self, intervals: Sequence[float], slack: float = 1e-7) -> bool:
+        """Whether all of them lie within the bounds."""
+        return min(intervals) >= self.least - slack and max(intervals) <= self.most + slack
+
+    @property
+    def forbid_unevenness(self) -> bool:
+        """Whether only equal intervals are left."""
+        return self.most - self.least <= 1e-9
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Throws, firing order, banks and shafts of one design, everything else open as before.
+
+    Attributes
+    ----------
+    throws
+        [rad] (C3).
+    firing_order
+        Cylinder numbers; None leaves the firing to the first dead centres.
+    bank_angle, split_pin
+        [rad]; None where the layout has none.
+    left_out
+        Names of the optional shafts that are not built.
+    motored
+        Whether gas is left out, for parts of an engine that could not run.
+    """
+
+    throws: tuple[float, ...]
+    firing_order: tuple[int, ...] | None = None
+    bank_angle: float | None = None
+    split_pin: float | None = None
+    left_out: tuple[str, ...] = ()
+    motored: bool = False
+
+
+@dataclass(frozen=True)
+class ShaftChoice:
+    """Which optional shafts may be built together (S10).
+
+    Attributes
+    ----------
+    optional
+        Sets of shafts that are built together or not at all: their unbalances are coupled.
+    masses
+        Of each set, its unbalances not included [kg].
+    most
+        Shafts that may be built; infinite when not limited.
+    most_mass
+        [kg].
+    """
+
+    optional: tuple[tuple[str, ...], ...] = ()
+    masses: tuple[float, ...] = ()
+    most: float = math.inf
+    most_mass: float = math.inf
+
+    def allows(self, built: Sequence[int]) -> bool:
+        """Whether these sets keep the limits on number and mass."""
+        number = sum(len(self.optional[k]) for k in built)
+        return number <= self.most and sum(self.masses[k] for k in built) <= self.most_mass * (1.0 + 1e-12)
+
+
+@dataclass(frozen=True, eq=False)
+class Phasing:
+    """The open part of an engine's phasing.
+
+    Attributes
+    ----------
+    cycle
+        Two- or four-stroke.
+    layout
+        Of bank angle [rad] and split pin [rad].
+    cylinders
+        Number of cylinders.
+    throws
+        Given throws [rad]; None when the star is open.
+    throw_bounds
+        Bounds of every throw [rad] where they are open one by one, else None.
+    firing_order
+        Given order; None when it is open.
+    bank, split
+        Bounds [rad]; equal when given, None where the layout has none.
+    intervals
+        Bounds of the firing intervals.
+    steps
+        Steps of a turn that the user wants throws to stand on; None for those of even firing.
+    shafts
+        The choice of shafts.
+    best
+        How many stars are ranked.
+    criteria
+        What firing orders are ranked by, the first counting most.
+    time_limit
+        Of the search [s].
+    method
+        Of the search.
+    realise
+        The problem with a candidate's numbers in it.
+    """
+
+    cycle: Cycle
+    layout: Callable[[float | None, float | None], Layout]
+    cylinders: int
+    throws: tuple[float, ...] | None
+    throw_bounds: tuple[tuple[float, float], ...] | None
+    firing_order: tuple[int, ...] | None
+    bank: tuple[float, float] | None
+    split: tuple[float, float] | None
+    intervals: Intervals
+    realise: Callable[[Candidate], Problem]
+    steps: int | None = None
+    shafts: ShaftChoice = ShaftChoice()
+    best: int = 10
+    criteria: tuple[OrderCriterion, ...] = (OrderCriterion.NEIGHBOURS, OrderCriterion.LONGEST_GAP)
+    time_limit: float = 600.0
+    method: Method = Method.AUTO
+
+    @property
+    def even_interval(self) -> float:
+        """Crank angle between firings when all are equal [rad]."""
+        return self.cycle.angle / self.cylinders
+
+    @property
+    def continuous(self) -> bool:
+        """Whether throws may leave the even steps."""
+        return self.throw_bounds is not None or (self.throws is None and not self.intervals.forbid_unevenness)
+
+    @property
+    def geometries(self) -> tuple[tuple[float | None, float | None], ...]:
+        """Bank angles and split pins between their bounds that let the firing be even (S6).
+
+        With one of the two open there is a finite number; with neither, the given pair.
+        """
+        if self.bank is None:
+            return ((None, None),)
+        split = self.split or (0.0, 0.0)
+        bank_open, split_open = self.bank[0] < self.bank[1], split[0] < split[1]
+        if not bank_open and not split_open:
+            return ((self.bank[0], split[0]),)
+        step = math.tau / (self.cylinders // math.gcd(self.cycle.turns, self.cylinders))
+        if bank_open and split_open:
+            banks = sorted({self.bank[0], self.bank[1], 0.5 * (self.bank[0] + self.bank[1])})
+            return tuple((b, s) for b in banks for s in _multiples(step, split, b))
+        if bank_open:
+            return tuple((b, split[0]) for b in _multiples(step, self.bank, split[0]))
+        return tuple((self.bank[0], s) for s in _multiples(step, split, self.bank[0]))
+
+
+def _multiples(step: float, bounds: tuple[float, float], other: float) -> list[float]:
+    """Values between bounds that make a multiple of `step` together with `other`."""
+    low = math.ceil((bounds[0] + other) / step - 1e-9)
+    high = math.floor((bounds[1] + other) / step + 1e-9)
+    return [m * step - other for m in range(low, high + 1)]

@@ -1,0 +1,209 @@
+"""The best stars side by side, and the firing orders that belong to each (S8, S9, S17)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe.machine import firing
+from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.turns import as_turn, star_sum
+from laufruhe.problem.phasing import OrderCriterion, Phasing
+
+ORDERS = (1, 2, 4)
+ORDERS_LISTED = 6
+
+
+@dataclass(frozen=True)
+class RankedOrder:
+    """A firing order and what it is judged by.
+
+    Attributes
+    ----------
+    order
+        Cylinder numbers, cylinder 1 first.
+    neighbours
+        Firings in succession on one throw or on throws side by side.
+    longest_gap
+        Largest crank angle in which one bank does not fire [rad].
+    roll_content
+        Largest share of a roll-moment order below the firing order, 0 to 1.
+    intervals
+        Crank angles from firing to firing [rad].
+    """
+
+    order: tuple[int, ...]
+    neighbours: int
+    longest_gap: float
+    roll_content: float
+    intervals: tuple[float, ...]
+
+    def by(self, criterion: OrderCriterion) -> float:
+        """What a criterion sees, small is good."""
+        if criterion is OrderCriterion.NEIGHBOURS:
+            return float(self.neighbours)
+        exact = self.longest_gap if criterion is OrderCriterion.LONGEST_GAP else self.roll_content
+        return round(exact, 9)
+
+
+@dataclass(frozen=True)
+class RankedStar:
+    """One design of a ranking.
+
+    Attributes
+    ----------
+    throws
+        Angles [rad] (C3).
+    bank_angle, split_pin
+        [rad]; None where the layout has none.
+    shafts
+        Optional shafts that are built.
+    value, lower_bound
+        Objective with everything else at its optimum, and what no design of this star
+        goes under [SI].
+    proven
+        Whether no design left out of the ranking before this one is better.
+    forces, couples
+        |F_h| in forces of one throw, and |C_h| in that force times the spacing of the
+        throws, of every order in `orders`.
+    orders
+        Orders h.
+    firing_orders
+        The best ones first.
+    order_count
+        How many firing orders belong to the star.
+    even
+        Whether all firing intervals are equal.
+    """
+
+    throws: tuple[float, ...]
+    bank_angle: float | None
+    split_pin: float | None
+    shafts: tuple[str, ...]
+    value: float
+    lower_bound: float
+    proven: bool
+    forces: tuple[float, ...]
+    couples: tuple[float, ...]
+    orders: tuple[int, ...]
+    firing_orders: tuple[RankedOrder, ...]
+    order_count: int
+    even: bool = True
+
+
+@dataclass(frozen=True)
+class TradePoint:
+    """One design on the trade of objective against unevenness [rad, SI]."""
+
+    allowed: float
+    deviation: float
+    value: float
+    throws: tuple[float, ...]
+    kkt_residual: float
+
+
+@dataclass(frozen=True)
+class PhasingResult:
+    """What was decided of stars and firing orders, and how.
+
+    Attributes
+    ----------
+    ranking
+        Best first; the first one is the design of the result.
+    places, banks
+        Of the throws along x [m], and of the cylinders [rad], for pictures.
+    designs
+        How many stars, times sets of shafts, were to choose from.
+    looked_at
+        Partial and whole stars that the search looked at, or cone programs solved.
+    method
+        In words.
+    trade
+        Objective against the largest deviation from even firing.
+    even_value
+        Objective of the best even star, where the design is uneven [SI].
+    """
+
+    ranking: tuple[RankedStar, ...]
+    places: tuple[float, ...]
+    banks: tuple[float, ...]
+    designs: int
+    looked_at: int
+    method: str
+    trade: tuple[TradePoint, ...] = ()
+    even_value: float | None = None
+
+
+def ranked_orders(
+    phasing: Phasing, layout: Layout, throws: Sequence[float], steps: Sequence[int] | None
+) -> tuple[tuple[RankedOrder, ...], int]:
+    """Firing orders of a star that keep the intervals, best first, and their number (S8).
+
+    Parameters
+    ----------
+    throws
+        Angles [rad].
+    steps
+        Steps of an even star; None for throws at any angle.
+    """
+    orders: Iterable[tuple[int, ...]]
+    if phasing.firing_order is not None:
+        orders = [phasing.firing_order]
+    elif steps is not None:
+        orders = firing.even_orders(phasing.cycle, layout, steps)
+    else:
+        orders = firing.lap_orders(phasing.cycle, layout, throws)
+    found = []
+    for order in itertools.islice(orders, firing.MOST_ORDERS):
+        turns = firing.firing_turns(layout, throws, order)
+        intervals = firing.intervals_of(phasing.cycle, turns)
+        if phasing.intervals.holds(intervals, 1e-6):
+            found.append(_judged(phasing, layout, order, turns, intervals))
+    found.sort(key=lambda o: (*(o.by(criterion) for criterion in phasing.criteria), o.order))
+    return tuple(found), len(found)
+
+
+def _judged(
+    phasing: Phasing, layout: Layout, order: tuple[int, ...], turns: tuple[float, ...], intervals: tuple[float, ...]
+) -> RankedOrder:
+    return RankedOrder(
+        order,
+        firing.successive_neighbours(layout, order),
+        firing.longest_bank_gap(phasing.cycle, layout, order, turns),
+        firing.order_content(phasing.cycle, turns),
+        intervals,
+    )
+
+
+def free_balance(places: Sequence[float], throws: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """|F_h| and |C_h| of the orders of a ranking, for one force a throw and unit spacing (S1)."""
+    x = np.array(places)
+    spacing = float(np.abs(np.diff(x)).max()) if len(x) > 1 else 1.0
+    weights = np.stack([np.ones_like(x), x / spacing], axis=1)
+    sums = np.abs(star_sum(weights, [as_turn(angle) for angle in throws], np.array(ORDERS)))
+    return tuple(float(v) for v in sums[:, 0]), tuple(float(v) for v in sums[:, 1])
+
+
+def ranked_star(
+    phasing: Phasing,
+    layout: Layout,
+    throws: tuple[float, ...],
+    steps: Sequence[int] | None,
+    value: float,
+    bound: float,
+    proven: bool,
+    shafts: tuple[str, ...] = (),
+    geometry: tuple[float | None, float | None] = (None, None),
+) -> RankedStar:
+    """One entry of a ranking."""
+    orders, count = ranked_orders(phasing, layout, throws, steps)
+    forces, couples = free_balance(layout.throw_positions, throws)
+    intervals = orders[0].intervals if orders else ()
+    even = bool(intervals) and max(intervals) - min(intervals) <= 1e-9 * math.tau
+    return RankedStar(
+        throws, *geometry, shafts, value, bound, proven, forces, couples, ORDERS, orders[:ORDERS_LISTED], count, even
+    )

@@ -1,0 +1,316 @@
+"""Exact search for the best stars by branch and bound over partial stars (S3-S5).
+
+The objective is a sum of norms of the couples of several orders. Any direction v in the
+dual ball bounds it from below by Re sum_h conj(v_h) C_h, which for the throws not yet
+placed is sum_k x_k a_p: levers times numbers, least when the longest lever meets the
+smallest number. That least value is exact for the direction, so the bound is valid, and
+the best of many directions is nearly tight.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.physics.crank_stars import Array, Stars, phase_waves, star_sums
+from laufruhe.physics.star_space import Partial, StarSpace
+
+DIRECTIONS = 400
+SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class AmplitudeTerm:
+    """w sqrt(sum_h (f_h |F_h|)^2 + (c_h |C_h|)^2), one norm of the objective (S3).
+
+    Attributes
+    ----------
+    force, couple
+        f_h and c_h of every order.
+    """
+
+    weight: float
+    force: tuple[float, ...]
+    couple: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class AmplitudeObjective:
+    """A sum of norms of forces and couples of a star by order (S3)."""
+
+    orders: tuple[int, ...]
+    terms: tuple[AmplitudeTerm, ...]
+
+    def values(self, space: StarSpace, stars: Stars) -> Array:
+        """Of many stars, shape (n,)."""
+        sums = star_sums(stars, space.phases, space.places, self.orders)
+        squares = np.square(sums.real) + np.square(sums.imag)
+        out = np.zeros(len(stars))
+        for term in self.terms:
+            factors = np.stack([np.square(term.force), np.square(term.couple)], axis=-1)
+            out += term.weight * np.sqrt(np.einsum("nhc,hc->n", squares, factors))
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class StarsFound:
+    """The best stars, in ascending order of the objective.
+
+    Attributes
+    ----------
+    stars, values
+        Shapes (n, throws) and (n,).
+    lower_bound
+        No star has a smaller objective.
+    complete
+        Whether the search ended by itself, so that these are proven the best.
+    nodes
+        Partial and whole stars that were looked at.
+    seconds
+        Spent.
+    """
+
+    stars: Stars
+    values: Array
+    lower_bound: float
+    complete: bool
+    nodes: int
+    seconds: float
+
+
+@dataclass
+class _Best:
+    """The best stars so far, and the value that a new one has to beat."""
+
+    count: int
+    throws: int
+    stars: Stars = field(init=False)
+    values: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.stars, self.values = np.zeros((0, self.throws), dtype=np.uint8), np.zeros(0)
+
+    @property
+    def cut(self) -> float:
+        return float(self.values[-1]) if len(self.values) >= self.count else float("inf")
+
+    def offer(self, stars: Stars, values: Array) -> None:
+        if not len(values) or float(values.min()) > self.cut * (1.0 + SLACK):
+            return
+        near = np.argsort(values, kind="stable")[: 4 * self.count]
+        both = np.concatenate([self.stars, stars[near]])
+        value = np.concatenate([self.values, values[near]])
+        _, first = np.unique(both, axis=0, return_index=True)
+        # equal values to a rounding are told apart by the star alone, so that runs repeat
+        scale = float(np.abs(value).max()) or 1.0
+        keys = (*(both[first, k] for k in range(self.throws - 1, -1, -1)), np.round(value[first] / scale, 11))
+        kept = first[np.lexsort(keys)[: self.count]]
+        self.stars, self.values = both[kept], value[kept]
+
+
+def enumerate_stars(space: StarSpace, objective: AmplitudeObjective, count: int = 1) -> StarsFound:
+    """The best stars by looking at every one, in blocks."""
+    started = time.perf_counter()
+    best, seen = _Best(count, space.throws), 0
+    for block in space.blocks():
+        best.offer(block, objective.values(space, block))
+        seen += len(block)
+    least = float(best.values[0]) if len(best.values) else float("inf")
+    return StarsFound(best.stars, best.values, least, True, seen, time.perf_counter() - started)
+
+
+def search_stars(
+    space: StarSpace, objective: AmplitudeObjective, count: int = 1, time_limit: float = float("inf")
+) -> StarsFound:
+    """The best stars, proven by branch and bound (S5).
+
+    Parameters
+    ----------
+    space
+        Stars allowed.
+    objective
+        What is to be least.
+    count
+        How many distinct stars are wanted.
+    time_limit
+        Seconds after which the search stops; what it has then is not complete.
+    """
+    started = time.perf_counter()
+    best, bounds = _Best(count, space.throws), _Bounds(space, objective)
+    for start in _good_starts(space, objective):
+        best.offer(space.canonical(start), objective.values(space, space.canonical(start)))
+    looked_at = 0
+    ended = False
+
+    def prune(partial: Partial) -> NDArray[np.bool_]:
+        nonlocal looked_at, ended
+        looked_at += len(partial.stars)
+        ended = ended or time.perf_counter() - started > time_limit
+        if ended:
+            return np.ones(len(partial.stars), dtype=bool)
+        limit = best.cut
+        # stars equal to the last one wanted are kept out: any of them will do
+        return (
+            bounds.beyond(partial, limit * (1.0 - SLACK))
+            if np.isfinite(limit)
+            else np.zeros(len(partial.stars), dtype=bool)
+        )
+
+    for block in space.blocks(prune):
+        if not ended:
+            best.offer(block, objective.values(space, block))
+            looked_at += len(block)
+    least = float(best.values[0]) if len(best.values) else float("inf")
+    bound = least if not ended else bounds.root()
+    return StarsFound(best.stars, best.values, min(bound, least), not ended, looked_at, time.perf_counter() - started)
+
+
+class _Bounds:
+    """Lower bounds of partial stars over a fixed set of directions (S4)."""
+
+    def __init__(self, space: StarSpace, objective: AmplitudeObjective) -> None:
+        self._space, self._objective = space, objective
+        self._directions = directions(objective)
+        waves = phase_waves(space.phases, objective.orders)
+        # a_p of every direction: what one unit of lever on step p adds to the bound
+        self._steps = (self._directions.conj() @ waves).real
+        self._columns = np.concatenate([self._directions.real, self._directions.imag], axis=1).T
+
+    def beyond(self, partial: Partial, limit: float) -> NDArray[np.bool_]:
+        """Which partial stars cannot lead to a star under the limit."""
+        out = np.zeros(len(partial.stars), dtype=bool)
+        codes = _codes(partial.counts)
+        kinds, which = np.unique(codes, return_inverse=True)
+        table = self._open_part(partial, which, len(kinds))
+        x = np.array(self._space.places)[list(partial.placed)]
+        constant = self._constant(partial)
+        step = max(1, (1 << 22) // len(self._directions))
+        for start in range(0, len(out), step):
+            part = slice(start, start + step)
+            placed = partial.stars[part][:, list(partial.placed)]
+            # the placed throws: levers times the numbers of their steps
+            sums = _placed_sums(placed, x, self._space.phases, self._objective.orders)
+            value = sums @ self._columns + table[which[part]]
+            out[part] = value.max(axis=1) + constant > limit
+        return out
+
+    def root(self) -> float:
+        """A bound of every star."""
+        values = []
+        for pattern in self._space.patterns:
+            counts = np.array([pattern], dtype=np.uint8)
+            counts[0, 0] -= 1
+            star = np.zeros((1, self._space.throws), dtype=np.uint8)
+            partial = Partial(star, counts, (0,), tuple(range(1, self._space.throws)))
+            low, high = 0.0, 1.0 + 2.0 * float(self._objective.values(self._space, star)[0])
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if self.beyond(partial, middle)[0] else (low, middle)
+            values.append(low)
+        return min(values)
+
+    def _open_part(self, partial: Partial, which: NDArray[np.intp], kinds: int) -> Array:
+        """Least sum of lever times number over the open throws, shape (kinds, directions)."""
+        first = np.zeros(kinds, dtype=np.intp)
+        first[which[::-1]] = np.arange(len(which))[::-1]
+        levers = np.sort(np.array(self._space.places)[list(partial.open)])
+        out = np.empty((kinds, len(self._directions)))
+        for kind, row in enumerate(first):
+            steps = np.repeat(np.arange(self._space.phases), partial.counts[row])
+            numbers = np.sort(self._steps[:, steps], axis=1)[:, ::-1]
+            out[kind] = numbers @ levers
+        return out
+
+    def _constant(self, partial: Partial) -> float:
+        """Terms of forces alone, which the pattern fixes before a throw is placed."""
+        orders = self._objective.orders
+        steps = np.bincount(partial.stars[0, list(partial.placed)], minlength=self._space.phases) + partial.counts[0]
+        forces = np.abs(phase_waves(self._space.phases, orders) @ steps)
+        forces[forces <= 1e-12 * self._space.throws] = 0.0
+        pure = [term for term in self._objective.terms if not any(term.couple)]
+        return sum(term.weight * float(np.linalg.norm(np.multiply(term.force, forces))) for term in pure)
+
+
+def _codes(counts: NDArray[np.uint8]) -> NDArray[np.int64]:
+    base = int(counts.max(initial=1)) + 1
+    return np.asarray(counts.astype(np.int64) @ (base ** np.arange(counts.shape[1], dtype=np.int64)))
+
+
+def _placed_sums(placed: Stars, x: Array, phases: int, orders: Sequence[int]) -> Array:
+    """Couples of the placed throws, real parts before imaginary ones, shape (n, 2 orders)."""
+    waves = phase_waves(phases, orders).T
+    total = np.zeros((len(placed), len(orders)), dtype=complex)
+    for column, lever in enumerate(x):
+        total += lever * waves[placed[:, column]]
+    return np.concatenate([total.real, total.imag], axis=1)
+
+
+def directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
+    """Points of the dual ball: v_h = sum_t w_t c_th u_th with sum_h |u_th|^2 <= 1 (S4).
+
+    Returns
+    -------
+    Shape (directions, orders). The orders that weigh little are left at zero, which is
+    allowed and costs tightness only.
+    """
+    total = np.sum([np.multiply(t.weight, t.couple) for t in objective.terms], axis=0)
+    heavy = [int(h) for h in np.argsort(total)[::-1] if total[h] > 0.0][:3]
+    if not heavy:
+        return np.zeros((1, len(objective.orders)), dtype=complex)
+    angles = max(4, int((DIRECTIONS / 3 if len(heavy) > 1 else DIRECTIONS) ** (1.0 / len(heavy))))
+    out = []
+    for shares in _shares(objective, heavy):
+        for turn in itertools.product(range(angles), repeat=len(heavy)):
+            v = np.zeros(len(objective.orders), dtype=complex)
+            for h, size, t in zip(heavy, shares, turn, strict=True):
+                v[h] = size * np.exp(2j * np.pi * t / angles)
+            out.append(v)
+    return np.unique(np.array(out), axis=0)
+
+
+def _shares(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Array]:
+    """Sizes of v on the heavy orders: a term of several orders divides its unit between them."""
+    grid = [np.array(s) for s in itertools.product((0.25, 0.6, 0.95), repeat=len(heavy))] if len(heavy) > 1 else []
+    grid = (
+        [np.ones(len(heavy)), *grid]
+        if any(_orders_of(t, heavy) > 1 for t in objective.terms)
+        else [np.ones(len(heavy))]
+    )
+    for raw in grid:
+        sizes = np.zeros(len(heavy))
+        for term in objective.terms:
+            mine = np.array([term.couple[h] for h in heavy])
+            unit = np.where(mine > 0.0, raw, 0.0)
+            length = float(np.sqrt((unit**2).sum()))
+            sizes += term.weight * mine * (unit / length if length > 0.0 else unit)
+        yield sizes
+
+
+def _orders_of(term: AmplitudeTerm, heavy: Sequence[int]) -> int:
+    return sum(1 for h in heavy if term.couple[h] > 0.0)
+
+
+def _good_starts(space: StarSpace, objective: AmplitudeObjective) -> Iterator[Stars]:
+    """Stars that swapping any two throws does not improve, from a few random ones."""
+    rng = np.random.default_rng(1964)
+    pairs = np.array(list(itertools.combinations(range(1, space.throws), 2)) or [(0, 0)])
+    for pattern in space.patterns:
+        rest = np.repeat(np.arange(space.phases), [pattern[0] - 1, *pattern[1:]]).astype(np.uint8)
+        for _ in range(12):
+            star = np.concatenate([[0], rng.permutation(rest)]).astype(np.uint8)
+            value = float(objective.values(space, star[None])[0])
+            while True:
+                near = np.repeat(star[None], len(pairs), axis=0)
+                rows = np.arange(len(pairs))
+                near[rows, pairs[:, 0]], near[rows, pairs[:, 1]] = star[pairs[:, 1]], star[pairs[:, 0]]
+                values = objective.values(space, near)
+                least = int(np.argmin(values))
+                if values[least] >= value * (1.0 - SLACK):
+                    break
+                star, value = near[least], float(values[least])
+            yield star[None]

@@ -1,0 +1,128 @@
+"""Engines that cannot exist are refused, in words that say what to change."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, Rotor, Shaft, SliderCrank
+
+PART = SliderCrank("cylinder 1", 0.0, 0.06, 0.2, 1.0)
+OTHER = replace(PART, name="cylinder 2", x=0.1)
+
+
+def engine(*parts: SliderCrank, cycle: Cycle = Cycle.FOUR_STROKE, rotors: tuple[Rotor, ...] = ()) -> Engine:
+    return Engine("any", cycle, parts, rotors)
+
+
+class TestCycle:
+    @pytest.mark.parametrize(
+        ("cycle", "turns", "base"), [(Cycle.TWO_STROKE, 1, Fraction(1)), (Cycle.FOUR_STROKE, 2, Fraction(1, 2))]
+    )
+    def test_turns_and_orders(self, cycle: Cycle, turns: int, base: Fraction) -> None:
+        """A two-stroke works every turn, a four-stroke every second one, with half orders (C6)."""
+        assert (cycle.turns, cycle.base_order) == (turns, base)
+        assert cycle.angle == turns * math.tau
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("make", "message"),
+        [
+            (lambda: engine(PART, replace(PART, x=1.0)), r"two slider-cranks are called 'cylinder 1'; give each"),
+            (
+                lambda: engine(PART, rotors=(Rotor("w", 0.0, 1.0), Rotor("w", 0.1, 1.0))),
+                r"two rotors are called 'w'; give each its own name",
+            ),
+            (
+                lambda: Engine("any", Cycle.TWO_STROKE, (PART,), mounts=(Mount("m", (0, 0, 0)), Mount("m", (1, 0, 0)))),
+                r"two mounts are called 'm'; give each its own name",
+            ),
+            (
+                lambda: engine(PART, replace(OTHER, x=0.0)),
+                r"cylinder 2 stands in the place of cylinder 1; move one of them",
+            ),
+            (
+                lambda: engine(PART, replace(OTHER, x=0.0, bank=math.tau, throw=0.0)),
+                r"cylinder 2 stands in the place of cylinder 1",
+            ),
+            (
+                lambda: engine(PART, rotors=(Rotor("w", 0.0, 1.0, Shaft("s", 0.3)),)),
+                r"shaft 's' with ratio 0\.3 does not return within the cycle of 2 turns; use a multiple of 1/2",
+            ),
+            (
+                lambda: engine(PART, cycle=Cycle.TWO_STROKE, rotors=(Rotor("w", 0.0, 1.0, Shaft("s", 0.5)),)),
+                r"use a multiple of 1/1",
+            ),
+            (
+                lambda: engine(replace(PART, firing_angle=0.1)),
+                r"cylinder 1 fires at 5\.7\d* deg, 5\.7\d* deg from its dead centre",
+            ),
+            (lambda: Shaft("still", 0.0), r"shaft 'still' has ratio 0"),
+        ],
+        ids=range(9),
+    )
+    def test_message(self, make: Callable[[], object], message: str) -> None:
+        with pytest.raises(ModelError, match=message):
+            make()
+
+    def test_cylinders_in_one_place_on_geared_cranks(self) -> None:
+        """Shafts of two names on one axis do not make room for two cylinders."""
+        second = replace(OTHER, x=0.0, shaft=Shaft("crank 2", 1.0))
+        with pytest.raises(ModelError, match="stands in the place of"):
+            engine(PART, second)
+
+    @pytest.mark.parametrize("ratio", [0.5, 1.5, -2.0, 4.0])
+    def test_shafts_that_return_are_taken(self, ratio: float) -> None:
+        assert engine(PART, rotors=(Rotor("w", 0.0, 1.0, Shaft("s", ratio)),)).shafts[1].ratio == ratio
+
+    def test_opposed_cylinders_share_a_place_along_the_crank(self) -> None:
+        """Two banks at one x are no collision; neither are two cranks."""
+        opposite = replace(OTHER, x=0.0, bank=math.pi, throw=math.pi)
+        second = replace(OTHER, x=0.0, shaft=Shaft("crank 2", -1.0, y=0.3), name="cylinder 3")
+        assert len(engine(PART, opposite, second).shafts) == 2
+
+    def test_every_dead_centre_may_fire(self) -> None:
+        assert engine(replace(PART, firing_angle=math.tau)).slider_cranks[0].firing_angle == math.tau
+
+
+class TestFiringIntervals:
+    @pytest.mark.parametrize(
+        ("fires", "cycle", "intervals"),
+        [
+            ((0, 180), Cycle.FOUR_STROKE, (180, 540)),
+            ((0, 360), Cycle.FOUR_STROKE, (360, 360)),
+            ((0,), Cycle.TWO_STROKE, (360,)),
+            ((450, 0, 270, 180), Cycle.FOUR_STROKE, (180, 90, 180, 270)),
+        ],
+    )
+    def test_from_each_firing_to_the_next(
+        self, fires: tuple[int, ...], cycle: Cycle, intervals: tuple[int, ...]
+    ) -> None:
+        """In the order of firing, back to the first: they add up to the cycle."""
+        parts = tuple(
+            replace(PART, name=f"{k}", x=float(k), throw=math.radians(-f), firing_angle=math.radians(f))
+            for k, f in enumerate(fires)
+        )
+        found = engine(*parts, cycle=cycle).firing_intervals
+        assert [math.degrees(a) for a in found] == pytest.approx(intervals)
+        assert sum(found) == pytest.approx(cycle.angle)
+
+    def test_nothing_that_fires(self) -> None:
+        assert engine().firing_intervals == ()
+
+
+class TestRotor:
+    def test_mass_at_its_radius(self) -> None:
+        rotor = Rotor("w", 0.0, complex(0.03, 0.04), radius=0.02)
+        assert rotor.mass == pytest.approx(2.5)
+        assert rotor.shaft is CRANKSHAFT
+
+    def test_mass_needs_a_radius(self) -> None:
+        with pytest.raises(ModelError, match="rotor 'w' has no radius, so its mass is not known"):
+            _ = Rotor("w", 0.0, 0.05).mass

@@ -1,0 +1,120 @@
+"""What cannot be: one clear line, the right status, and nothing sold for more than it is."""
+
+import pytest
+
+from laufruhe.errors import InputError
+from laufruhe.problem.reader import load
+from laufruhe.solve import solve
+from laufruhe.solve.result import Status
+from phasing import engines
+
+OPEN = 'throws = "open"\nfiring_order = "open"'
+GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "80 bar"\nimep = "6 bar"\n'
+
+
+@pytest.mark.parametrize(
+    ("cylinders", "cycle", "engine", "phasing", "layout", "said"),
+    [
+        (5, "four-stroke", OPEN, 'intervals = { min = "150 deg" }', "inline", "no star can meet the intervals: 5.*144"),
+        (5, "four-stroke", OPEN, 'intervals = { max = "140 deg" }', "inline", "no star can meet the intervals"),
+        (4, "two-stroke", OPEN, "phases = 8", "inline", "phases = 8 conflicts with 4 throws: 8 phases are more than 4"),
+        (6, "two-stroke", OPEN, "phases = 3", "inline", "phases = 3 conflicts with 6 throws.*stands on 6"),
+        (4, "four-stroke", 'throws = [0, 90, 270, 180]\nfiring_order = "open"', "", "inline",
+         r"throws \[0, 90, 270, 180\] deg contradict the firing intervals allowed, 180 to 180 deg; the most even"),
+        (6, "four-stroke", f"bank_angle = 90\n{OPEN}", "", "vee", "multiple of 120 deg, and they make 90 deg"),
+        (6, "four-stroke", f"bank_angle = 90\nsplit_pin_angle = {{ between = [0, 20] }}\n{OPEN}", "", "vee",
+         "no bank angle and split pin within the bounds let the firing be even"),
+    ],
+)  # fmt: skip
+def test_infeasible_says_what_conflicts(tmp_path, cylinders, cycle, engine, phasing, layout, said):
+    result = solve(engines.problem(tmp_path, cylinders, cycle, engine, phasing, layout=layout))
+    assert result.status is Status.INFEASIBLE
+    assert result.certificate is None
+    with pytest.raises(AssertionError, match=said):
+        raise AssertionError(result.message)
+    assert "\n" not in result.message
+
+
+def test_limits_that_no_star_keeps_are_named(tmp_path):
+    rest = (
+        engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
+        + '[[constraints]]\nname = "quiet"\nlimit = "rms rocking couple"\norders = [2]\nmax = "1 N m"\n'
+    )  # fmt: skip
+    result = solve(engines.problem(tmp_path, 3, rest=rest))
+    assert result.status is Status.INFEASIBLE
+    assert result.conflict == ("quiet",)
+    assert "'quiet'" in result.message
+
+
+def test_no_time_for_any_design_is_a_failure(tmp_path):
+    rest = engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
+    result = solve(engines.problem(tmp_path, 4, phasing='time_limit = "1e-9 s"', rest=rest))
+    assert result.status is Status.FAILED
+    assert "phasing.time_limit = 1e-09 s" in result.message
+
+
+def test_a_search_cut_short_names_its_gap(tmp_path):
+    result = solve(engines.problem(tmp_path, 10, phasing='time_limit = "1e-9 s"'))
+    assert result.status is Status.FEASIBLE
+    assert str(result.certificate.kind) == "global within gap"
+    assert result.certificate.gap > 0.01
+    assert not any(star.proven for star in result.phasing.ranking)
+
+
+@pytest.mark.parametrize(
+    ("cylinders", "engine", "phasing", "rest", "said"),
+    [
+        (
+            4,
+            'throws = "opne"\nfiring_order = "open"',
+            "",
+            engines.COUPLE,
+            'engine.throws = "opne": is neither a list nor "open"',
+        ),
+        (
+            4,
+            'throws = "open"\nfiring_order = [1, 2, 2, 4]',
+            "",
+            engines.COUPLE,
+            "engine.firing_order.*no permutation of 1 to 4",
+        ),
+        (4, 'throws = [0, 90, 180]\nfiring_order = "open"', "", engines.COUPLE, "engine.throws: has 3 of 4 throws"),
+        (4, OPEN, "intervals = { }", engines.COUPLE, "phasing.intervals: says nothing"),
+        (
+            4,
+            OPEN,
+            'intervals = { min = "100 deg", max = "80 deg" }',
+            engines.COUPLE,
+            "phasing.intervals.min: is more than max",
+        ),
+        (4, OPEN, 'intervals = { largest_deviation = "-1 deg" }', engines.COUPLE, "largest_deviation = .*is negative"),
+        (4, OPEN, "most_shafts = 1", engines.COUPLE, "phasing.most_shafts: limits optional shafts, and none is"),
+        (4, OPEN, "best = 0", engines.COUPLE, "phasing.best"),
+        (4, OPEN, 'method = "magic"', engines.COUPLE, "phasing.method.*is not allowed"),
+        (
+            4,
+            OPEN,
+            'intervals = { largest_deviation = "5 deg" }',
+            GAS + engines.MOUNTS + engines.MOUNT_FORCE,
+            "gas: acts on",
+        ),
+        (2, "throws = [0, { between = [90, 270] }]", "", engines.COUPLE, "phasing.intervals: is missing, and throws"),
+    ],
+)
+def test_refused(tmp_path, cylinders, engine, phasing, rest, said):
+    with pytest.raises(InputError, match=said) as refusal:
+        engines.problem(tmp_path, cylinders, engine=engine, phasing=phasing, rest=rest)
+    assert len(str(refusal.value).splitlines()) == 1
+
+
+def test_cylinders_are_asked_for(tmp_path):
+    engines.problem(tmp_path, 4, engine='throws = "open"')
+    path = tmp_path / "none.toml"
+    path.write_text((tmp_path / "test.toml").read_text().replace("cylinders = 4\n", ""), encoding="utf-8")
+    with pytest.raises(InputError, match=r"engine\.cylinders: is missing, and open throws do not tell it"):
+        load(path)
+
+
+def test_layouts_without_stars_are_refused(tmp_path):
+    with pytest.raises(InputError, match="cannot be open in layout 'boxer'"):
+        engines.problem(tmp_path, 4, engine='bank_stagger = "30 mm"\nthrows = "open"', layout="boxer")

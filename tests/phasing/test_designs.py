@@ -1,0 +1,175 @@
+"""Stars, shafts and unbalances together: cuts, listing and the mixed-integer program agree."""
+
+import numpy as np
+import pytest
+
+from laufruhe.errors import SolverError
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.solve import solve
+from laufruhe.solve.certificate import Multipliers, Proof
+from laufruhe.solve.mixed_conic import solve_program
+from laufruhe.solve.result import Status
+from laufruhe.solve.star_cuts import bound_of, cut_of, owners_of, search_designs, solve_design
+from laufruhe.solve.star_families import families_of
+from laufruhe.solve.star_model import StarModel
+from phasing import engines
+
+TWO_SHAFTS = engines.shaft("against", -1) + engines.shaft("second", 2)
+CASES = {
+    "mean": engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE,
+    "rms": engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE.replace("mean", "rms"),
+    "maximum": engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE.replace("mean", "maximum"),
+    "couple, mean": engines.WEIGHTS + engines.COUPLE.replace("rms", "mean"),
+    "balance fraction": engines.MOUNTS
+    + '[[counterweights]]\nname = "all"\nbalance_fraction = { between = [-0.2, 0.8] }\n'
+    + engines.MOUNT_FORCE,
+    "limited": engines.MOUNTS
+    + engines.WEIGHTS.replace("angle", 'radius = "80 mm"\nangle')
+    + engines.MOUNT_FORCE
+    + '[[constraints]]\nlimit = "counterweight mass"\nmax = "0.5 kg"\n',
+    "shafts": engines.MOUNTS + engines.WEIGHTS + TWO_SHAFTS + engines.MOUNT_FORCE,
+}
+
+
+def model_of(problem):
+    (family,), _ = families_of(problem.phasing)
+    return StarModel(problem.phasing, family.space, family.geometry), family.stars
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("cylinders", [3, 4])
+def test_search_equals_solving_every_design(tmp_path, cylinders, name):
+    choice = "most_shafts = 1" if name == "shafts" else ""
+    problem = engines.problem(tmp_path, cylinders, phasing=choice, rest=CASES[name])
+    model, stars = model_of(problem)
+    scale = objective_value(problem, evaluate(problem))
+    every = search_designs(model, stars, 10**9, 1e-4, floor=1e-3 * scale)
+    found = search_designs(model, stars, 1, 1e-4, floor=1e-3 * scale)
+    assert len(every.solved) == every.designs
+    assert found.solved[0].value == pytest.approx(every.solved[0].value, rel=2e-4, abs=2e-7 * scale)
+    assert found.lower_bound <= every.solved[0].value * (1.0 + 1e-9)
+    assert found.solved[0].value - found.lower_bound <= 2e-4 * max(found.solved[0].value, 1e-3 * scale)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_rows_of_a_star_are_those_of_the_exact_model(tmp_path, name):
+    problem = engines.problem(tmp_path, 5, "four-stroke", rest=CASES[name])
+    model, stars = model_of(problem)
+    rng = np.random.default_rng(3)
+    for star in stars[rng.integers(0, len(stars), 4)]:
+        x = np.concatenate([0.2 * d.scale * rng.uniform(0.0, 1.0, d.width) for d in model.domains])
+        given = model.phasing.realise(model.candidate(star))
+        unbalances = [domain.complex_value(x) for domain in model.domains]
+        # decisions at any angle are counted from upright in the model: with equal drives that is the same rotor
+        turned = [u if not d.free_angle else u * _turn(d) for u, d in zip(unbalances, given.decisions, strict=True)]
+        value = objective_value(given, evaluate(given, given.design(turned)))
+        again = model.at(model.samples).at(star).objective(x)
+        tolerance = 2e-3 if name == "maximum" else 1e-9
+        assert again == pytest.approx(value, rel=tolerance)
+
+
+def _turn(decision):
+    gain = decision.drives[0].gain
+    return (gain / abs(gain)).conjugate()
+
+
+@pytest.mark.parametrize("name", ["mean", "maximum", "balance fraction", "limited"])
+def test_a_cut_is_the_certificate_of_every_star(tmp_path, name):
+    problem = engines.problem(tmp_path, 4, rest=CASES[name])
+    model, stars = model_of(problem)
+    fine = model.at(model.samples)
+    rng = np.random.default_rng(5)
+    multipliers = Multipliers(
+        tuple(rng.standard_normal(n.constant.shape) for _, n in fine.terms),
+        tuple(0.1 * np.abs(rng.standard_normal(n.constant.shape)) for _, n in fine.limits),
+    )
+    bounds = cut_of(fine, multipliers).bounds(stars, [()], owners_of(model))[:, 0]
+    for star, bound in zip(stars, bounds, strict=True):
+        assert bound == pytest.approx(bound_of(fine.at(star), multipliers), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["rms", "mean"])
+def test_cuts_never_exceed_an_optimum(tmp_path, name):
+    problem = engines.problem(tmp_path, 4, rest=CASES[name])
+    model, stars = model_of(problem)
+    owners = owners_of(model)
+    answers = [solve_design(model, tuple(star), (), owners, 1e-6) for star in stars.tolist()]
+    for _, cut in answers:
+        bounds = cut.bounds(stars, [()], owners)[:, 0]
+        assert np.all(bounds <= [s.value * (1.0 + 1e-9) for s, _ in answers])
+        assert cut.least(model.space) <= min(s.value for s, _ in answers) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("cylinders", [3, 4, 5, 6, 7, pytest.param(8, marks=pytest.mark.validation)])
+def test_program_and_search_agree_on_couples(tmp_path, cylinders):
+    by = {}
+    for method in ("search", "program"):
+        problem = engines.problem(tmp_path, cylinders, phasing=f'method = "{method}"\nbest = 1')
+        by[method] = solve(problem)
+        assert by[method].status is Status.OPTIMAL
+    scale = by["search"].objective.initial
+    assert by["program"].objective.value == pytest.approx(by["search"].objective.value, rel=1e-6, abs=1e-6 * scale)
+    assert by["program"].certificate.lower_bound <= by["search"].objective.value * (1.0 + 1e-9)
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("cylinders", [9, 10])
+def test_program_and_search_agree_up_to_ten(tmp_path, cylinders):
+    test_program_and_search_agree_on_couples(tmp_path, cylinders)
+
+
+@pytest.mark.parametrize("cylinders", [4, 5])
+def test_program_and_cuts_agree_with_unbalances_and_shafts(tmp_path, cylinders):
+    rest = engines.MOUNTS + engines.WEIGHTS + TWO_SHAFTS + engines.MOUNT_FORCE.replace("mean", "rms")
+    values = []
+    for method in ("search", "program"):
+        problem = engines.problem(
+            tmp_path, cylinders, phasing=f'method = "{method}"\nbest = 1\nmost_shafts = 1', rest=rest
+        )
+        result = solve(problem)
+        assert sum(d.value for d in result.decisions if d.name.endswith("built")) <= 1
+        values.append(result.objective.value)
+    assert values[1] == pytest.approx(values[0], rel=1e-3)
+
+
+def test_a_program_out_of_time_is_not_sold_as_an_optimum(tmp_path):
+    problem = engines.problem(tmp_path, 12)
+    space = families_of(problem.phasing)[0][0].space
+    model = StarModel(problem.phasing, space, (None, None))
+    with pytest.raises(SolverError, match=r"no feasible point in 1e-06 s"):
+        solve_program(model.at(model.samples), space, time_limit=1e-6)
+    result = solve(engines.problem(tmp_path, 12, phasing='method = "program"\ntime_limit = "1 s"\nbest = 1'))
+    assert result.status is Status.FEASIBLE
+    assert result.certificate.kind is Proof.WITHIN_GAP
+    proven = solve(engines.problem(tmp_path, 12, phasing="best = 1")).objective.value
+    assert result.certificate.lower_bound <= proven + 1e-9 * result.objective.initial
+
+
+def test_sampled_norms_are_not_certified_by_scip(tmp_path):
+    problem = engines.problem(
+        tmp_path, 4, phasing='method = "program"\nbest = 1', rest=engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
+    )
+    result = solve(problem)
+    proven = engines.problem(
+        tmp_path, 4, phasing="best = 1", rest=engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
+    )
+    assert result.certificate.lower_bound <= solve(proven).objective.value * (1.0 + 1e-9)
+    if result.certificate.kind is Proof.GLOBAL:
+        assert result.certificate.gap <= 2.0 * problem.tolerance
+    else:
+        assert result.status is Status.FEASIBLE
+
+
+def test_shafts_keep_the_limits_on_number_and_mass(tmp_path):
+    rest = (
+        engines.MOUNTS + engines.WEIGHTS + engines.shaft("against", -1, mass="3 kg")
+        + engines.shaft("second", 2, mass="1 kg") + engines.shaft("second back", -2, mass="1 kg") + engines.MOUNT_FORCE
+    )  # fmt: skip
+    built = {}
+    for name, limit in (("none", "most_shafts = 0"), ("light", 'most_shaft_mass = "2 kg"'), ("all", "")):
+        result = solve(engines.problem(tmp_path, 4, phasing=f"best = 1\n{limit}", rest=rest))
+        built[name] = {d.name for d in result.decisions if d.name.endswith("built") and d.value}
+        assert result.certificate.kind is Proof.GLOBAL
+    assert built["none"] == set()
+    assert "against built" not in built["light"]
+    assert "against built" in built["all"]

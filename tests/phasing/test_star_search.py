@@ -1,0 +1,95 @@
+"""Branch and bound finds what looking at every star finds, for every objective offered."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from laufruhe.machine.layouts import inline
+from laufruhe.physics.star_space import Partial, StarSpace, outside_in
+from laufruhe.solve import star_search
+from laufruhe.solve.star_search import AmplitudeObjective, AmplitudeTerm, enumerate_stars, search_stars
+
+NONE = (0.0,) * 4
+ORDERS = (1, 2, 3, 4)
+OBJECTIVES = {
+    "one order": AmplitudeObjective((1,), (AmplitudeTerm(1.0, (0.0,), (1.0,)),)),
+    "second order": AmplitudeObjective((2,), (AmplitudeTerm(2.5, (0.0,), (1.0,)),)),
+    "rms of two": AmplitudeObjective((1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)),)),
+    "sum of two": AmplitudeObjective(
+        (1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.0)), AmplitudeTerm(1.0, (0.0, 0.0), (0.0, 1.0)))
+    ),
+    "rms of four": AmplitudeObjective(ORDERS, (AmplitudeTerm(1.0, NONE, (1.0, 0.3, 0.05, 0.02)),)),
+    "mixed": AmplitudeObjective(
+        ORDERS,
+        (AmplitudeTerm(1.0, NONE, (1.0, 0.3, 0.0, 0.0)), AmplitudeTerm(0.5, NONE, (0.0, 1.0, 0.0, 0.4))),
+    ),
+    "with force": AmplitudeObjective(
+        (1, 2), (AmplitudeTerm(1.0, (1.0, 1.0), (0.0, 0.0)), AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)))
+    ),
+}
+
+
+def whole(throws):
+    return StarSpace(throws, ((1,) * throws,), inline(throws, 1.0).throw_positions, True, True)
+
+
+def in_pairs(throws):
+    return StarSpace(throws // 2, ((2,) * (throws // 2),), inline(throws, 1.0).throw_positions, True, True)
+
+
+@pytest.mark.parametrize("name", OBJECTIVES)
+@pytest.mark.parametrize("throws", [2, 3, 4, 5, 6, 7, 8, 9])
+def test_search_equals_enumeration(throws, name):
+    objective = OBJECTIVES[name]
+    for space in (whole(throws), *((in_pairs(throws),) if throws % 2 == 0 else ())):
+        all_of, found = (how(space, objective, 5) for how in (enumerate_stars, search_stars))
+        assert found.complete
+        scale = float(all_of.values.max()) or 1.0
+        np.testing.assert_allclose(found.values, all_of.values, rtol=1e-9, atol=1e-9 * scale)
+        np.testing.assert_allclose(objective.values(space, found.stars), found.values, rtol=1e-12, atol=1e-12 * scale)
+        assert found.lower_bound <= found.values[0] * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("throws", [4, 5, 6, 7])
+def test_enumeration_equals_plain_permutations(throws):
+    objective = OBJECTIVES["rms of two"]
+    every = np.array([(0, *rest) for rest in itertools.permutations(range(1, throws))], dtype=np.uint8)
+    space = whole(throws)
+    x, steps = np.array(space.places), 2.0 * np.pi * every / throws
+    couples = np.stack([np.abs((x * np.exp(1j * h * steps)).sum(axis=1)) for h in (1, 2)])
+    least = np.sqrt(couples[0] ** 2 + (0.25 * couples[1]) ** 2).min()
+    assert enumerate_stars(space, objective).values[0] == pytest.approx(least, rel=1e-12)
+
+
+@settings(max_examples=40)
+@given(st.permutations(range(6)), st.integers(1, 5), st.sampled_from(sorted(OBJECTIVES)))
+def test_no_completion_lies_under_the_bound(star, placed, name):
+    space, objective = whole(6), OBJECTIVES[name]
+    order = outside_in(6)
+    fixed = order[:placed]
+    every = np.array(list(itertools.permutations(range(6))), dtype=np.uint8)
+    match = np.all(every[:, fixed] == np.array(star, dtype=np.uint8)[list(fixed)], axis=1)
+    least = float(objective.values(space, every[match]).min())
+    counts = np.ones((1, 6), dtype=np.uint8)
+    for k in fixed:
+        counts[0, star[k]] -= 1
+    partial = Partial(np.array([star], dtype=np.uint8), counts, fixed, order[placed:])
+    bounds = star_search._Bounds(space, objective)
+    assert not bounds.beyond(partial, least * (1.0 + 1e-9) + 1e-12)[0]
+
+
+def test_a_search_out_of_time_claims_no_proof():
+    objective = OBJECTIVES["rms of two"]
+    found = search_stars(whole(11), objective, 1, time_limit=0.0)
+    proven = search_stars(whole(11), objective)
+    assert not found.complete
+    assert found.lower_bound <= proven.values[0] <= found.values[0]
+
+
+@pytest.mark.parametrize("throws", [7, 9, 11])
+def test_longest_levers_first(throws):
+    x = np.abs(np.array(inline(throws, 1.0).throw_positions))[list(outside_in(throws))]
+    assert np.all(np.diff(x) <= 0.0)

@@ -1,0 +1,148 @@
+"""Uneven throws: never worse than the start, never beyond the intervals, exact where it counts."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.phasing import Candidate, Intervals
+from laufruhe.problem.reader import load
+from laufruhe.solve import solve
+from laufruhe.solve.certificate import Proof
+from laufruhe.solve.uneven import Start, _rides, local_optimum
+from laufruhe.solve.uneven_model import Symbols, UnevenModel
+from phasing import engines
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+SPLIT = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"
+
+
+@pytest.mark.parametrize("name", ["inline-seven-uneven", "inline-nine-uneven", "two-stroke-eight-uneven"])
+def test_slightly_uneven_angles_cut_the_couple(name):
+    """The marine trick: a few degrees take most of the couple."""
+    problem = load(PROBLEMS / f"{name}.toml")
+    result = solve(problem)
+    allowed = problem.phasing.intervals
+    intervals = result.final.engine.firing_intervals
+    assert allowed.holds(intervals, 1e-7)
+    assert max(intervals) - min(intervals) > math.radians(0.5)
+    assert result.objective.value < 0.5 * result.phasing.even_value
+    for limit in problem.limits:
+        assert result.final.value(limit.quantity) <= limit.maximum * (1.0 + 1e-6)
+    trade = result.phasing.trade
+    values = [point.value for point in trade]
+    assert values == sorted(values, reverse=True)
+    assert trade[0].value == pytest.approx(result.phasing.even_value, rel=1e-12)
+    assert all(point.deviation <= point.allowed + 1e-7 for point in trade)
+    assert all(point.kkt_residual < 1e-6 for point in trade)
+    assert result.certificate.kind in (Proof.LOCAL, Proof.GLOBAL)
+    if result.certificate.kind is Proof.GLOBAL:
+        assert result.objective.value <= 1e-6 * result.phasing.even_value
+
+
+def test_zero_is_reached_cleanly():
+    """Four-stroke nine: both couples vanish within the intervals, and below zero there is nothing."""
+    result = solve(load(PROBLEMS / "inline-nine-uneven.toml"))
+    assert result.objective.value <= 1e-6 * result.phasing.even_value
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.kkt_residual < 1e-6
+
+
+@pytest.mark.parametrize("cylinders", [5, 7])
+def test_hardly_any_freedom_gives_the_even_optimum(tmp_path, cylinders):
+    even = solve(engines.problem(tmp_path, cylinders, "four-stroke"))
+    almost = 'intervals = { largest_deviation = "0.0001 deg" }'
+    uneven = solve(engines.problem(tmp_path, cylinders, "four-stroke", phasing=almost))
+    assert uneven.objective.value <= even.objective.value
+    assert uneven.objective.value == pytest.approx(even.objective.value, rel=1e-3)
+
+
+def test_forbidden_unevenness_is_even_firing(tmp_path):
+    even = solve(engines.problem(tmp_path, 5, "four-stroke"))
+    none = solve(engines.problem(tmp_path, 5, "four-stroke", phasing='intervals = { largest_deviation = "0 deg" }'))
+    assert none.objective.value == even.objective.value
+    assert none.certificate.kind is Proof.GLOBAL
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_optimum_lies_above_its_start(tmp_path, seed):
+    phasing = engines.problem(tmp_path, 6, phasing='intervals = { largest_deviation = "8 deg" }').phasing
+    steps = np.random.default_rng(seed).permutation(np.arange(1, 6))
+    throws = tuple(math.tau * p / 6 for p in (0, *steps))
+    order = tuple(int(k) + 1 for k in np.argsort([-angle % math.tau for angle in throws]))
+    start = Candidate(throws, order)
+    problem = phasing.realise(start)
+    given = evaluate(problem).value(problem.objective[0].quantity)
+    found = local_optimum(phasing, Start(start), phasing.intervals)
+    assert found.value <= given
+    assert found.moved
+    assert found.kkt_residual < 1e-6
+    assert phasing.intervals.holds(found.result.final.engine.firing_intervals)
+    still = local_optimum(phasing, Start(start), Intervals(phasing.even_interval, phasing.even_interval))
+    assert still.value == pytest.approx(given, rel=1e-12)
+
+
+MODELS = {
+    "couple": (engines.COUPLE, 1e-9),
+    "all orders": ('[objective]\nminimise = "rms rocking couple"\n', 1e-6),
+    "mount": (engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", "rms"), 1e-6),
+    "mean": (engines.MOUNTS + engines.MOUNT_FORCE, 1e-4),
+    "fraction": (
+        engines.MOUNTS
+        + '[[counterweights]]\nname = "all"\nbalance_fraction = 0.3\n'
+        + engines.MOUNT_FORCE.replace("mean", "rms"),
+        1e-6,
+    ),
+    "weights": (engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE.replace("mean", "rms"), 1e-6),
+}
+
+
+@pytest.mark.parametrize("layout", ["inline", "vee"])
+@pytest.mark.parametrize("name", MODELS)
+def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
+    rest, tolerance = MODELS[name]
+    open_ = 'throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n' + (SPLIT if layout == "vee" else "")
+    allowed = 'intervals = { largest_deviation = "40 deg" }'
+    phasing = engines.problem(tmp_path, 6, "four-stroke", open_, allowed, rest, layout, 480).phasing
+    rng = np.random.default_rng(11)
+    bank, split = (math.radians(81.0), math.radians(22.0)) if layout == "vee" else (None, None)
+    count = 3 if layout == "vee" else 6
+    start = Candidate(tuple(rng.uniform(0.0, math.tau, count)), None, bank, split)
+    problem = replace(phasing.realise(start), phasing=None)
+    model = UnevenModel(problem, phasing.layout(bank, split), _rides(phasing, start))
+    moved = tuple(rng.uniform(0.0, math.tau, count))
+    bank, split = (math.radians(70.0), math.radians(41.0)) if layout == "vee" else (None, None)
+    columns = np.concatenate([[0.0], *(0.3 * d.scale * rng.uniform(0.1, 1.0, d.width) for d in model.domains)])[1:]
+    at = Symbols([ca.DM(angle) for angle in moved], bank, split, ca.DM(columns))
+    quantity = problem.objective[0].quantity
+    smooth = float(model.norm(quantity, at, 1e-9))
+    exact = phasing.realise(Candidate(moved, None, bank, split))
+    design = exact.design([d.complex_value(columns) for d in model.domains])
+    assert smooth == pytest.approx(evaluate(exact, design).value(quantity), rel=tolerance)
+    squares = model.squares(quantity, at)
+    if squares is not None:
+        assert float(squares) == pytest.approx(smooth**2, rel=1e-6)
+
+
+def test_throws_between_bounds_of_their_own(tmp_path):
+    engine = "throws = [0, { between = [60, 180] }, { between = [180, 300] }]\nfiring_order = [1, 3, 2]"
+    result = solve(engines.problem(tmp_path, 3, "two-stroke", engine, 'intervals = { largest_deviation = "25 deg" }'))
+    for decision in result.decisions:
+        assert decision.lower - 1e-9 <= decision.value <= decision.upper + 1e-9
+    assert result.objective.value <= result.objective.initial * (1.0 + 1e-9)
+
+
+def test_bank_and_split_pins_move_within_bounds(tmp_path):
+    engine = f'{SPLIT}throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n'
+    allowed = 'intervals = { largest_deviation = "10 deg" }\nbest = 2'
+    result = solve(
+        engines.problem(tmp_path, 6, "four-stroke", engine, allowed, engines.WEIGHTS + engines.COUPLE, "vee")
+    )
+    values = {d.name: d for d in result.decisions}
+    for name in ("bank angle", "split pin angle"):
+        assert values[name].lower - 1e-9 <= values[name].value <= values[name].upper + 1e-9
+    assert result.objective.value <= result.phasing.even_value

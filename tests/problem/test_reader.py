@@ -1,0 +1,431 @@
+"""Bad input: one line with file, key, value, rule and remedy, and nothing computed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from _pytest.mark.structures import ParameterSet
+
+from laufruhe.errors import InputError, ModelError, UncarriedLoadError
+from laufruhe.machine import Cycle
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.reader import load
+
+WHOLE = """
+title = "Four in line"
+
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+bore = "100 mm"
+stroke = "120 mm"
+rod_ratio = 0.26
+reciprocating_mass = "1.25 kg"
+cylinder_spacing = "125 mm"
+throws = [0, 180, 180, 0]
+firing_order = [1, 3, 4, 2]
+
+[[operating_points]]
+name = "rated"
+speed = "2500 rpm"
+
+[gas]
+model = "seiliger"
+peak_pressure = "80 kp/cm^2"
+imep = "5.5 kp/cm^2"
+
+[mounts]
+positions = [
+    ["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"],
+    ["-1 m", "250 mm", "0 mm"], ["-1 m", "-250 mm", "0 mm"],
+]
+
+[[counterweights]]
+name = "web"
+opposite_throw = 1
+radius = "80 mm"
+mass = { between = ["0 kg", "3 kg"] }
+angle = { between = [0, 360] }
+
+[[balancer_shafts]]
+name = "left"
+ratio = 2
+position = ["100 mm", "-100 mm"]
+[[balancer_shafts.unbalances]]
+radius = "20 mm"
+unbalance = { between = ["0 kg m", "0.05 kg m"] }
+angle = { between = [0, 360] }
+
+[[balancer_shafts]]
+name = "right"
+ratio = -2
+position = ["-100 mm", "-100 mm"]
+[[balancer_shafts.unbalances]]
+coupled = { to = "left", as = "mirrored" }
+
+[objective]
+minimise = "mean mount force"
+
+[[constraints]]
+limit = "balancer mass"
+max = "4 kg"
+"""
+PARTS = """
+title = "Two geared cranks"
+[engine]
+layout = "parts"
+cycle = "two-stroke"
+stroke = "90 mm"
+rod_length = "170 mm"
+reciprocating_mass = "0.6 kg"
+shafts = [{ name = "second", ratio = -1, position = ["0 mm", "400 mm"] }]
+slider_cranks = [{ x = "0 mm" }, { x = "0 mm", shaft = "second", throw = 180, bank_angle = 180 }]
+[[operating_points]]
+speed = "3000 rpm"
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def changed(text: str, old: str, new: str) -> str:
+    assert text.count(old) >= 1, old
+    return text.replace(old, new, 1)
+
+
+def complaint_about(path: Path) -> str:
+    """The one line that a file is refused with, the file's name taken off."""
+    with pytest.raises(InputError) as caught:
+        load(path)
+    (line,) = str(caught.value).splitlines()
+    file, _, rest = line.partition(".toml: ")
+    assert file + ".toml" == str(path)
+    return rest
+
+
+def test_what_is_changed_below_is_right_as_it_stands(tmp_path: Path) -> None:
+    for text in (WHOLE, PARTS):
+        problem = load(written(tmp_path, text))
+        assert evaluate(problem).loads
+
+
+def bad(name: str, old: str, new: str, said: str) -> ParameterSet:
+    """One change to a right file, and how the line about it begins: key, value, rule, remedy."""
+    return pytest.param(old, new, said, id=name)
+
+
+BAD = [
+    bad("misspelt key that is needed", "stroke =", "strok =",
+        """engine.strok = "120 mm": is not a key here; did you mean 'stroke'?"""),
+    bad("misspelt key", "throws =", "thorws =",
+        "engine.thorws = [0, 180, 180, 0]: is not a key here; did you mean 'throws'?"),
+    bad("misspelt table", "[objective]", "[objektive]",
+        """objektive = {"minimise": "mean mount force"}: is not a key here; did you mean 'objective'?"""),
+    bad("misspelt key of a tagged table", "imep =", "imp =",
+        """gas.imp = "5.5 kp/cm^2": is not a key here; did you mean 'imep'?"""),
+    bad("misspelt key deep down", "as = ", "ass = ",
+        """balancer_shafts[2].unbalances[1].coupled.ass = "mirrored": is not a key here; did you mean 'as'?"""),
+    bad("unknown key", "\"1.25 kg\"\n", "\"1.25 kg\"\nzylinder = 4\n",
+        "engine.zylinder = 4: is not a key here; did you mean 'cylinders'?"),
+    bad("missing key", "stroke = \"120 mm\"\n", "",
+        "engine.stroke: is missing; add it"),
+    bad("missing unit", '"120 mm"', "120",
+        'engine.stroke = 120: has no unit, a length needs one; write for example "120 mm"'),
+    bad("missing unit in text", '"120 mm"', '"120"',
+        'engine.stroke = "120": has no unit, a length needs one; write'),
+    bad("wrong dimension", '"120 mm"', '"120 kg"',
+        """engine.stroke = "120 kg": 'kg' is not a unit of a length; write"""),
+    bad("unknown unit", '"120 mm"', '"120 furlongz"',
+        """engine.stroke = "120 furlongz": unit 'furlongz' is not known; write"""),
+    bad("wrong dimension of a speed", '"2500 rpm"', '"2500 mm"',
+        """operating_points[1].speed = "2500 mm": 'mm' is not a unit of a speed of"""),
+    bad("not a number", "0.26", "nan",
+        "engine.rod_ratio = nan: is not finite; give a number"),
+    bad("infinite", "0.26", "inf",
+        "engine.rod_ratio = inf: is not finite; give a number"),
+    bad("an integer beyond floats", "0.26", "1" + "0" * 400,
+        "engine.rod_ratio = 1000"),
+    bad("infinite length", '"120 mm"', '"1e999 mm"',
+        'engine.stroke = "1e999 mm": is not finite; write'),
+    bad("an angle that is no number", "throws = [0, 180,", "throws = [0, nan,",
+        "engine.throws[2] = nan: is not finite; give a number"),
+    bad("lambda too large", "0.26", "1.0",
+        'engine.rod_ratio = "1": does not let the crank turn, (crank radius + |offset|) / rod length = '
+        "1 must be under 1; lengthen the rod"),
+    bad("rod too short", "rod_ratio = 0.26", 'rod_length = "55 mm"',
+        'engine.rod_length = "55 mm": does not let the crank turn'),
+    bad("offset too large", "0.26", "0.26\noffset = \"200 mm\"",
+        "engine.offset: no crank makes a stroke of 120 mm with an offset of"),
+    bad("no rod", "rod_ratio = 0.26", "",
+        "engine.rod_ratio: is missing; give rod_ratio or rod_length"),
+    bad("two rods", "0.26", "0.26\nrod_length = \"200 mm\"",
+        "engine.rod_ratio = 0.26: is given twice"),
+    bad("zero stroke", '"120 mm"', '"0 mm"',
+        'engine.stroke = "0 mm": must be more than 0 mm; write for'),
+    bad("negative mass", '"1.25 kg"', '"-1.25 kg"',
+        'engine.reciprocating_mass = "-1.25 kg": must be at least 0 kg; give a'),
+    bad("no speed", '"2500 rpm"', '"0 rpm"',
+        'operating_points[1].speed = "0 rpm": must be more than 0 rpm; write'),
+    bad("speed missing", 'speed = "2500 rpm"', "",
+        "operating_points[1].speed: is missing; give speed or mean_piston_speed"),
+    bad("firing order no permutation", "[1, 3, 4, 2]", "[1, 3, 4, 4]",
+        "engine.firing_order = [1, 3, 4, 4]: is no permutation of 1 to 4; name"),
+    bad("firing order counted wrongly", "[1, 3, 4, 2]", "[2, 3, 4, 5]",
+        "engine.firing_order = [2, 3, 4, 5]: is no permutation of 1 to 4; name"),
+    bad("firing order impossible", "[1, 3, 4, 2]", "[1, 2, 3, 4]",
+        "engine.firing_order: throws [0.0, 180.0, 180.0, 0.0] deg cannot fire"),
+    bad("throws and order differ in number", "[1, 3, 4, 2]", "[1, 3, 2]",
+        "engine.throws: makes 4 cylinder(s), but engine.firing_order makes 3; let"),
+    bad("throws and cylinders differ in number", "[0, 180, 180, 0]", "[0, 180, 180, 0]\ncylinders = 5",
+        "engine.firing_order: makes 4 cylinder(s), but engine.cylinders makes 5; let them agree"),
+    bad("a throw too few", "[0, 180, 180, 0]", "[0, 180, 180]",
+        "engine.throws: makes 3 cylinder(s), but engine.firing_order"),
+    bad("bounds reversed", '["0 kg", "3 kg"]', '["3 kg", "0 kg"]',
+        'counterweights[1].mass = {"between": ["3 kg", "0 kg"]}: has its bounds reversed; write the smaller one first'),
+    bad("angles reversed", "between = [0, 360]", "between = [90, 0]",
+        'counterweights[1].angle = {"between": [90, 0]}: has its'),
+    bad("one bound", '["0 kg", "3 kg"]', '["0 kg"]',
+        'counterweights[1].mass = {"between": ["0 kg"]}: needs two bounds; write'),
+    bad("start", '["0 kg", "3 kg"] }', '["0 kg", "3 kg"], start = "4 kg" }',
+        "counterweights[1].mass = {"),
+    bad("not to be left open", "0.26", "{ between = [0.2, 0.3] }",
+        'engine.rod_ratio = {"between": [0.2, 0.3]}: cannot be left open; give'),
+    bad("two mounts in one place", '["-1 m", "-250 mm", "0 mm"]', '["-1 m", "250 mm", "0 mm"]',
+        "mounts.positions[4] = (-1.0, 0.25, 0.0): two mounts stand in one place; move or rename one"),
+    bad("two mounts of one name", "[mounts]", "[mounts]\nnames = [\"a\", \"b\", \"b\", \"c\"]",
+        'mounts.names[3] = "b": two mounts have one name; move'),
+    bad("names of some mounts", "[mounts]", "[mounts]\nnames = [\"a\"]",
+        'mounts.names = ["a"]: names 1 of 4 mounts; name each once'),
+    bad("mounts of no stiffness", "[mounts]", "[mounts]\nrelative_stiffness = [0, 0, 0]",
+        "mounts.relative_stiffness = [0.0, 0.0, 0.0]: carries nothing; give one a value"),
+    bad("coupled to nobody", 'to = "left"', 'to = "lefty"',
+        'balancer_shafts[2].unbalances[1].coupled.to = "lefty": is no unbalance defined before this '
+        "one; did you mean 'left'?"),
+    bad("coupled to itself", 'to = "left"', 'to = "right"',
+        'balancer_shafts[2].unbalances[1].coupled.to = "right": is no unbalance'),
+    bad("coupled to a counterweight", 'to = "left"', 'to = "web"',
+        'balancer_shafts[2].unbalances[1].coupled.to = "web": is no unbalance'),
+    bad("coupled in no known way", 'as = "mirrored"', 'as = "mirored"',
+        """balancer_shafts[2].unbalances[1].coupled.as = "mirored": is not allowed; did you mean 'mirrored'?"""),
+    bad("coupled with an angle", 'as = "mirrored" }', "as = \"mirrored\" }\nangle = 90",
+        'balancer_shafts[2].unbalances[1].coupled = "left": does not go with a size or an angle of its own; leave'),
+    bad("two shafts of one name", 'name = "right"', 'name = "left"',
+        'balancer_shafts[2].name = "left": is the name of another shaft; give'),
+    bad("a second crankshaft", 'name = "right"', 'name = "crankshaft"',
+        'balancer_shafts[2].name = "crankshaft": is the name of another'),
+    bad("a shaft at rest", "ratio = -2", "ratio = 0",
+        "balancer_shafts[2].ratio = 0: is a shaft"),
+    bad("a shaft that does not return", "ratio = -2", "ratio = 0.3",
+        "engine: shaft 'right' with ratio 0.3 does not return within the cycle"),
+    bad("opposite no throw", "opposite_throw = 1", "opposite_throw = 7",
+        "counterweights[1].opposite_throw = 7: is no throw, the crankshaft has 4; count them from the front"),
+    bad("counterweight nowhere", "opposite_throw = 1\n", "",
+        "counterweights[1].x: is missing; give its place, or opposite_throw"),
+    bad("mass without radius", "radius = \"80 mm\"\n", "",
+        "counterweights[1].radius: is missing, and a mass needs one; add it"),
+    bad("two sizes", '["0 kg", "3 kg"] }', "[\"0 kg\", \"3 kg\"] }\nunbalance = \"1 kg m\"",
+        "counterweights[1].unbalance: is given twice, also as mass; give unbalance or mass"),
+    bad("no size", "mass = { between = [\"0 kg\", \"3 kg\"] }\n", "",
+        "counterweights[1].unbalance: is missing; give"),
+    bad("fraction and size", '["0 kg", "3 kg"] }', "[\"0 kg\", \"3 kg\"] }\nbalance_fraction = 0.5",
+        "counterweights[1].opposite_throw: does not go with balance_fraction; leave one of them out"),
+    bad("throws of a single weight", "opposite_throw = 1", "opposite_throw = 1\nthrows = [1]",
+        "counterweights[1].throws: goes with balance_fraction"),
+    bad("no convex sector", "[0, 360]", "[0, 270]",
+        'counterweights[1].angle = "0 to 270 deg": leaves out a sector of less than half a turn; open '
+        "it by at most 180 deg, or wholly"),
+    bad("a ring is not convex", '["0 kg", "3 kg"]', '["1 kg", "3 kg"]',
+        'counterweights[1].mass = "1 kg": is a least size above zero while'),
+    bad("a circle is not convex", '{ between = ["0 kg", "3 kg"] }', '"1 kg"',
+        "counterweights[1].angle: is open while the size is fixed; leave"),
+    bad("unknown objective", '"mean mount force"', '"mean mount forces"',
+        """objective.minimise = "mean mount forces": is no quantity; did you mean 'mean mount force'?"""),
+    bad("unknown limit", '"balancer mass"', '"balancing mass"',
+        """constraints[1].limit = "balancing mass": is no quantity; did you mean 'balancer mass'?"""),
+    bad("limit of another dimension", '"4 kg"', '"4 N"',
+        """constraints[1].max = "4 N": 'N' is not a unit of a mass; write for example"""),
+    bad("negative limit", '"4 kg"', '"-4 kg"',
+        'constraints[1].max = "-4 kg": is negative, and no norm is; give'),
+    bad("limit of nobody", '"4 kg"', "\"4 kg\"\nof = [\"lefty\"]",
+        'constraints[1].of = "lefty": is no counterweight or balancer here; did'),
+    bad("mass that is not known", "radius = \"20 mm\"\n", "",
+        """constraints[1] = "balancer mass": counts the mass of 'left', which has no radius"""),
+    bad("unknown mount", '"mean mount force"', "\"mean mount force\"\nmounts = [\"mount 5\"]",
+        'objective.mounts = "mount 5": is no mount'),
+    bad("unknown operating point", '"mean mount force"', "\"mean mount force\"\noperating_points = [\"idle\"]",
+        'objective.operating_points = "idle": is no operating point here'),
+    bad("weights of a moment", '"mean mount force"', "\"mean roll moment\"\ndirection_weights = [1, 1, 0]",
+        "objective.mounts: goes with mount forces only; leave it out"),
+    bad("gas without bore", "bore = \"100 mm\"\n", "",
+        "engine.bore: is missing, and gas acts on it; add it"),
+    bad("unknown gas model", '"seiliger"', '"seliger"',
+        """gas.model = "seliger": is not allowed; did you mean 'seiliger'?"""),
+    bad("no gas model", "model = \"seiliger\"\n", "",
+        "gas.model: is missing; use one of: seiliger, wiebe, trace"),
+    bad("a vee's throws", '"inline"', '"vee"',
+        "engine.throws: makes 8 cylinder(s), but engine.firing_order makes 4"),
+    bad("key of another layout", '"inline"', "\"inline\"\nbank_angle = 90",
+        "engine.bank_angle: means nothing in layout 'inline'; leave it out"),
+    bad("no spacing", "cylinder_spacing = \"125 mm\"\n", "",
+        "engine.cylinder_spacing: is missing; add it"),
+    bad("no TOML", "title =", "title",
+        "file: is no TOML: Expected '=' after a key in a key/value pair (at line 2"),
+    bad("no end of text", 'title = "Four', "title = \"Four\ntitle = \"",
+        "file: is no TOML: "),
+    bad("long number", "0.26", "9" * 5000,
+        "file: holds a whole number of thousands of digits; write it shorter"),
+    bad("key given twice", "layout =", "cycle =",
+        "file: is no TOML: Cannot overwrite a value"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "said"), BAD)
+def test_one_line_for_one_mistake(old: str, new: str, said: str, tmp_path: Path) -> None:
+    line = complaint_about(written(tmp_path, changed(WHOLE, old, new)))
+    assert line.startswith(said)
+    rule, _, remedy = line.partition("; ")
+    assert ": " in rule
+    assert remedy
+    assert len(line) < 400
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        bad("a second crankshaft", '"second", ratio', '"crankshaft", ratio',
+            'engine.shafts[1].name = "crankshaft": is the name of another'),
+        bad("unknown shaft", 'shaft = "second"', 'shaft = "secnd"',
+            """engine.slider_cranks[2].shaft = "secnd": is no shaft of this engine; did you mean 'second'?"""),
+        bad("two cylinders in one place", 'x = "0 mm", shaft = "second", throw = 180, bank_angle = 180', 'x = "0 mm"',
+            "engine: cylinder 2 stands in the place of cylinder 1; move one of them"),
+        bad("a crank at rest", "ratio = -1", "ratio = 0",
+            "engine.shafts[1].ratio = 0: is a shaft"),
+        bad("firing beside the dead centre", "throw = 180", "throw = 180, firing_angle = 10",
+            "engine: cylinder 2 fires at 10 deg, "),
+        bad("key of another layout", '"two-stroke"', "\"two-stroke\"\nfiring_order = [1, 2]",
+            "engine.firing_order: means nothing in layout"),
+        bad("a crank that cannot turn", '{ x = "0 mm" }, ', '{ x = "0 mm", stroke = "400 mm" }, ',
+            'engine.rod_length = "170 mm": does not let'),
+    ],
+)  # fmt: skip
+def test_free_parts(old: str, new: str, said: str, tmp_path: Path) -> None:
+    assert complaint_about(written(tmp_path, changed(PARTS, old, new))).startswith(said)
+
+
+def test_two_cylinders_in_one_place_on_two_shafts(tmp_path: Path) -> None:
+    """A second shaft on the same axis leaves no more room."""
+    second = changed(PARTS, 'ratio = -1, position = ["0 mm", "400 mm"]', 'ratio = 1, position = ["0 mm", "0 mm"]')
+    alike = changed(second, ", throw = 180, bank_angle = 180", "")
+    assert "stands in the place of cylinder 1" in complaint_about(written(tmp_path, alike))
+
+
+class TestFiles:
+    def test_missing(self, tmp_path: Path) -> None:
+        path = tmp_path / "none.toml"
+        assert complaint_about(path) == "file: does not exist; check the path"
+
+    def test_a_folder(self, tmp_path: Path) -> None:
+        path = tmp_path / "folder.toml"
+        path.mkdir()
+        assert complaint_about(path) == "file: is a folder; name a problem file in it"
+
+    def test_no_text(self, tmp_path: Path) -> None:
+        path = tmp_path / "scene.toml"
+        path.write_bytes(b"title = '\xff'")
+        assert complaint_about(path) == "file: is no UTF-8 text (byte 10); save it as UTF-8"
+
+    def test_several_mistakes_get_a_line_each(self, tmp_path: Path) -> None:
+        """In the order of the file, so that all can be mended at once."""
+        text = changed(changed(WHOLE, '"100 mm"', "100"), '"80 kp/cm^2"', '"80 kg"')
+        with pytest.raises(InputError) as caught:
+            load(written(tmp_path, text))
+        lines = str(caught.value).splitlines()
+        assert [c.where for c in caught.value.complaints] == ["engine.bore", "gas.peak_pressure"]
+        assert len(lines) == 2
+
+
+class TestOnEvaluation:
+    """What only the physics can find."""
+
+    @pytest.mark.parametrize(
+        ("stiffness", "direction"),
+        [("[0, 1, 0]", "F[xz]|M[xy]"), ("[1, 0, 1]", "Mz|Fy"), ("[1, 0, 0]", "F[yz]|M[xyz]")],
+    )
+    def test_mounts_that_do_not_carry(self, stiffness: str, direction: str, tmp_path: Path) -> None:
+        text = changed(WHOLE, "[mounts]", f"[mounts]\nrelative_stiffness = {stiffness}")
+        # uneven throws shake in every direction
+        text = changed(text, "throws = [0, 180, 180, 0]", 'throws = [0, 190, 200, 0]\nrotating_mass = "1 kg"')
+        problem = load(written(tmp_path, text))
+        with pytest.raises(
+            UncarriedLoadError, match=rf"drives the engine along ({direction}), which no mount carries; give"
+        ):
+            evaluate(problem)
+
+    @pytest.mark.parametrize("imep", ["-5 kp/cm^2", "60 kp/cm^2"])
+    def test_imep_that_no_cut_off_reaches(self, imep: str, tmp_path: Path) -> None:
+        """The message names both pressures and the range."""
+        text = changed(changed(WHOLE, "5.5 kp/cm^2", imep), "80 kp/cm^2", "50 kp/cm^2")
+        problem = load(written(tmp_path, text))
+        with pytest.raises(
+            ModelError, match=r"imep .* bar cannot be reached with peak_pressure .* between .* and .*; .*"
+        ):
+            evaluate(problem)
+
+
+def trace(folder: Path, rows: str, cycle: str = "two-stroke") -> Path:
+    (folder / "pressure.csv").write_text(rows, encoding="utf-8")
+    text = changed(PARTS, "[[operating", '[gas]\nmodel = "trace"\nfile = "pressure.csv"\n[[operating')
+    text = changed(text, 'stroke = "90 mm"', 'stroke = "90 mm"\nbore = "80 mm"')
+    return written(folder, changed(text, '"two-stroke"', f'"{cycle}"'))
+
+
+def rows(last: int, step: int = 5) -> str:
+    return "angle,pressure\n" + "".join(f"{a},{1 + 20 * math.exp(-a / 40):.6f}\n" for a in range(0, last, step))
+
+
+class TestTrace:
+    def test_whole_cycle(self, tmp_path: Path) -> None:
+        problem = load(trace(tmp_path, rows(360)))
+        assert problem.engine.cycle is Cycle.TWO_STROKE
+        evaluation = evaluate(problem)
+        assert evaluation.loads[0].wrench.coefficients[0, 3].real != 0.0
+
+    def test_part_of_the_cycle(self, tmp_path: Path) -> None:
+        """One turn of a four-stroke's two is not enough."""
+        problem = load(trace(tmp_path, rows(360), "four-stroke"))
+        with pytest.raises(
+            ModelError, match=r"the trace runs from 0 to 355 deg, so 365 of the 720 deg .*; give the whole"
+        ):
+            evaluate(problem)
+
+    @pytest.mark.parametrize(
+        ("content", "said"),
+        [
+            ("angle,pressure\n0,1\n5,one\n", 'gas.file = "pressure.csv": row 3 is no pair of numbers; write'),
+            ("0,1\n5\n", 'gas.file = "pressure.csv": row 2 is no pair of numbers; write'),
+            ("", "gas: the trace has 0 points, too few for a cycle; give one every few degrees"),
+            (
+                "0,1\n90,2\n80,1\n270,1\n",
+                "gas: point 3 of the trace at 80 deg must come after the one before it at 90 deg; sort",
+            ),
+            ("0,1\n90,2\n180,-1\n270,1\n", "gas: point 3 of the trace has the pressure -1 bar, which must be positive"),
+            (
+                "0,1\n90,2\n180,nan\n270,1\n",
+                "gas: point 3 of the trace has the pressure nan bar, which must be positive",
+            ),
+        ],
+    )
+    def test_bad_rows(self, content: str, said: str, tmp_path: Path) -> None:
+        assert complaint_about(trace(tmp_path, content)).startswith(said)
+
+    def test_no_file(self, tmp_path: Path) -> None:
+        path = trace(tmp_path, rows(360))
+        (tmp_path / "pressure.csv").unlink()
+        assert complaint_about(path).startswith(
+            'gas.file = "pressure.csv": cannot be read (No such file or directory); give'
+        )

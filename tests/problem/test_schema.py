@@ -1,0 +1,89 @@
+"""The schema for editors: up to date, true of the ready problems, and no rubber stamp."""
+
+from __future__ import annotations
+
+import copy
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from laufruhe.problem import schema
+from laufruhe.problem.reader import load
+
+FILES = sorted(
+    path
+    for path in (Path(__file__).parents[2] / "problems").glob("*.toml")
+    if "engine" in tomllib.loads(path.read_text(encoding="utf-8"))
+)
+LANCHESTER = next(path for path in FILES if path.stem == "tractor-four-lanchester")
+
+
+@pytest.fixture(scope="module")
+def validator() -> jsonschema.Draft202012Validator:
+    found = json.loads(schema.shipped())
+    jsonschema.Draft202012Validator.check_schema(found)
+    return jsonschema.Draft202012Validator(found)
+
+
+def test_shipped_schema_is_the_generated_one() -> None:
+    """The file in the package says what the models say."""
+    assert schema.shipped() == schema.generated()
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_ready_problems_validate(path: Path, validator: jsonschema.Draft202012Validator) -> None:
+    """Editors find nothing wrong with what the reader takes."""
+    validator.validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    assert load(path).name == path.stem
+
+
+def _set(*keys: str | int, value: Any) -> Any:
+    def change(tables: Any) -> None:
+        for key in keys[:-1]:
+            tables = tables[key]
+        tables[keys[-1]] = value
+
+    return pytest.param(change, id=".".join(map(str, keys)))
+
+
+def _drop(*keys: str | int) -> Any:
+    def change(tables: Any) -> None:
+        for key in keys[:-1]:
+            tables = tables[key]
+        del tables[keys[-1]]
+
+    return pytest.param(change, id="without " + ".".join(map(str, keys)))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        _set("engine", "strok", value="120 mm"),
+        _set("engine", "stroke", value=120),
+        _set("engine", "layout", value="star"),
+        _set("engine", "throws", value="0, 180"),
+        _set("engine", "cylinders", value=0),
+        _set("gas", "model", value="otto"),
+        _set("mounts", "positions", 0, value=["1 m", "2 m"]),
+        _set("counterweights", 0, "mass", value={"between": ["0 kg"]}),
+        _set("counterweights", 0, "mass", value={"between": ["0 kg", "1 kg"], "from": "0 kg"}),
+        _set("objective", "minimise", value="mean mount farce"),
+        _set("balancer_shafts", 0, "unbalances", value=[]),
+        _set("constraints", 0, "max", value=4),
+        _drop("title"),
+        _drop("engine", "stroke"),
+        _drop("operating_points"),
+    ],
+)
+def test_damaged_problems_do_not(change: Any, validator: jsonschema.Draft202012Validator) -> None:
+    """One thing wrong is enough, for the editor and for the reader."""
+    tables = tomllib.loads(LANCHESTER.read_text(encoding="utf-8"))
+    damaged = copy.deepcopy(tables)
+    change(damaged)
+    assert damaged != tables
+    with pytest.raises(jsonschema.ValidationError):
+        validator.validate(damaged)

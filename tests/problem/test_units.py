@@ -1,0 +1,131 @@
+"""Text with a unit in, SI inside, readable text out (C1)."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from laufruhe.units import UnitError, dimension_name, example, parse, shown
+
+GRAVITY = 9.80665
+DIMENSIONS = ["m", "kg", "kg m", "kg m^2", "Pa", "N", "N m", "N/m", "rad", "rad/s", "m/s", ""]
+
+
+class TestParse:
+    @pytest.mark.parametrize(
+        ("text", "unit", "value"),
+        [
+            ("120 mm", "m", 0.12),
+            ("12cm", "m", 0.12),
+            ("  0.12   m  ", "m", 0.12),
+            ("5 in", "m", 0.127),
+            ("1.25 kg", "kg", 1.25),
+            ("750 g", "kg", 0.75),
+            ("20 kg mm", "kg m", 0.02),
+            ("20 kg*mm", "kg m", 0.02),
+            ("4.2 kg cm^2", "kg m^2", 4.2e-4),
+            ("4.2 kg cm**2", "kg m^2", 4.2e-4),
+            ("80 bar", "Pa", 8e6),
+            ("5.5 kp/cm^2", "Pa", 5.5e4 * GRAVITY),
+            ("1 at", "Pa", 1e4 * GRAVITY),
+            ("1 atm", "Pa", 101_325.0),
+            ("100 kp", "N", 100 * GRAVITY),
+            ("1 kilopond", "N", GRAVITY),
+            ("70 PS", "W", 70 * 75 * GRAVITY),
+            ("300 N/mm", "N/m", 3e5),
+            ("2500 rpm", "rad/s", 2500 * math.tau / 60),
+            ("90 deg", "rad", math.pi / 2),
+            ("90°", "rad", math.pi / 2),
+            ("1/3 turn", "rad", math.tau / 3),
+            ("-1/4 turn", "rad", -math.pi / 2),
+            ("10 m/s", "m/s", 10.0),
+            ("36 km/h", "m/s", 10.0),
+            ("0.26", "", 0.26),
+            ("26 %", "", 0.26),
+            ("1e-3 m", "m", 1e-3),
+            ("1E3 mm", "m", 1.0),
+            (".5 m", "m", 0.5),
+            ("5. m", "m", 5.0),
+            ("+5 m", "m", 5.0),
+            ("25 µm", "m", 25e-6),
+        ],
+    )
+    def test_units_of_the_field(self, text: str, unit: str, value: float) -> None:
+        assert parse(text, unit) == pytest.approx(value, rel=1e-13, abs=0.0)
+
+    @pytest.mark.parametrize(
+        ("text", "unit", "rule"),
+        [
+            ("120", "m", "has no unit, a length needs one"),
+            ("120 kg", "m", "'kg' is not a unit of a length"),
+            ("120 mmm", "m", "unit 'mmm' is not known"),
+            ("12,5 mm", "m", "is not a number with a unit"),
+            ("mm", "m", "is not a number with a unit"),
+            ("", "m", "is not a number with a unit"),
+            ("nan mm", "m", "is not a number with a unit"),
+            ("inf mm", "m", "is not a number with a unit"),
+            ("1e999 mm", "m", "is not finite"),
+            ("1/0 mm", "m", "divides by zero"),
+            ("1.5.2 mm", "m", "is not a number with a unit"),
+            ("0x10 mm", "m", "unit 'x10 mm' is not known"),
+            ("5 mm", "", "'mm' is not a unit of a plain number"),
+            ("20 degC", "m", "'degC' is not a unit of a length"),
+            ("20 kg", "kg m", "'kg' is not a unit of an unbalance"),
+            ("5 N m", "Pa", "'N m' is not a unit of a pressure"),
+            ("20 degC", "K", "unit 'degC' is not known"),
+            pytest.param("1/" + "9" * 400 + " mm", "m", "is", id="a divisor beyond floats"),
+            pytest.param("1/" + "9" * 5000 + " mm", "m", "is", id="a divisor beyond integers"),
+        ],
+    )
+    def test_refusals_name_the_rule_and_an_example(self, text: str, unit: str, rule: str) -> None:
+        with pytest.raises(UnitError) as caught:
+            parse(text, unit)
+        said, _, remedy = str(caught.value).partition("; ")
+        assert said.startswith(rule)
+        assert remedy == f'write for example "{example(unit)}"'
+
+    @pytest.mark.parametrize("text", ["50 Hz", "3000 min^-1", "50 s^-1", "3000/min"])
+    def test_a_frequency_is_no_angular_speed(self, text: str) -> None:
+        """Turns a second are either read as turns or refused, never taken for radians."""
+        with contextlib.suppress(UnitError):
+            assert parse(text, "rad/s") == pytest.approx(50 * math.tau)
+
+    def test_newton_metres_in_one_word(self) -> None:
+        """As engineers write them; a registry may take them for a count of yarn."""
+        assert parse("120 Nm", "N m") == 120.0
+
+    @given(st.floats(-1e300, 1e300), st.sampled_from(["m", "kg", "Pa", "N m"]))
+    def test_every_float_in_its_own_unit(self, value: float, unit: str) -> None:
+        """SI numbers come back to the last bit."""
+        assert parse(f"{value!r} {unit}", unit) == value
+
+    @pytest.mark.parametrize("unit", DIMENSIONS)
+    def test_examples_are_right(self, unit: str) -> None:
+        """What a message tells the user to write can be read."""
+        assert math.isfinite(parse(example(unit), unit))
+        assert dimension_name(unit)
+
+
+class TestShown:
+    @pytest.mark.parametrize(
+        ("value", "unit", "text"),
+        [
+            (0.12, "m", "120 mm"),
+            (math.pi / 2, "rad", "90 deg"),
+            (2500 * math.pi / 30, "rad/s", "2500 rpm"),
+            (1.25, "kg", "1.25 kg"),
+            (0.123456, "", "0.1235"),
+            (1234.56, "N", "1235 N"),
+            (0.0, "kg", "0 kg"),
+        ],
+    )
+    def test_as_a_report_prints_it(self, value: float, unit: str, text: str) -> None:
+        assert shown(value, unit) == text
+
+    @given(st.floats(-1e6, 1e6, allow_subnormal=False), st.sampled_from(["m", "rad", "rad/s", "kg", "N m", ""]))
+    def test_what_is_shown_can_be_read(self, value: float, unit: str) -> None:
+        assert parse(shown(value, unit, 17), unit) == pytest.approx(value, rel=1e-14, abs=0.0)
