@@ -72,7 +72,8 @@ def index(trades: Sequence[Trade]) -> str:
         "Which fidelity to take, measured on every ready problem. In short:",
         "",
         "- `auto` is the safe choice: it says how wrong it can be, and is not more wrong than that.",
-        "- The two-order formulas of textbooks cost up to 2 % of the number, and up to 2 % of the design. Not so of engines whose second order cancels: what is left there is what they leave out.",
+        "- The two-order formulas of textbooks cost up to 2 % of the number, and up to 2 % of the design. "
+        "Engines whose second order cancels are left with what these formulas leave out.",
         "- Leaving gas out is what costs most: it decides how the roll moment is balanced.",
         "- More than 720 steps a cycle serve peaks and proofs, not means.",
         "- Regret may be far below the error, for an optimum is flat, and far above it: what a shaft is wrongly made "
