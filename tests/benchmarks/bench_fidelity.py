@@ -14,7 +14,6 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import importlib  # noqa: E402
 import math  # noqa: E402
-import statistics  # noqa: E402
 import sys  # noqa: E402
 import time  # noqa: E402
 from collections.abc import Callable, Sequence  # noqa: E402
@@ -40,14 +39,14 @@ DESIGNS = 100_000
 
 
 def seconds(work: Callable[[], object], repeats: int = 5) -> float:
-    """Median of a few calls, after one that warms caches."""
+    """Least of a few calls, after one that warms caches: others may use the machine too."""
     work()
     times = []
     for _ in range(repeats):
         started = time.perf_counter()
         work()
         times.append(time.perf_counter() - started)
-    return statistics.median(times)
+    return min(times)
 
 
 def product_rate() -> float:
@@ -193,7 +192,7 @@ def draw(found: list[tuple[str, Sequence[int], list[float], float]], path: Path)
 
 def main() -> None:
     """Measure and write."""
-    lines = ["# Fidelity, batches and growth", "", "Medians on one core of one machine.", ""]
+    lines = ["# Fidelity, batches and growth", "", "Least of several calls on one core of one machine.", ""]
     table, found = growth()
     text = "\n".join([*lines, *four_cylinder(), *pruned(), *table]) + "\n"
     print(text)

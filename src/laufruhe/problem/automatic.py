@@ -216,9 +216,9 @@ def _parts_left_out(scale: _Scale, chosen: Fidelity) -> tuple[LeftOut, ...]:
 
 
 def _part(scale: _Scale, chosen: Fidelity, restored: Fidelity, what: str, why: str) -> LeftOut:
-    # both are sampled at the same steps, so both errors of sampling count
+    # of the objective itself; its samples see the part to within their own error
     both = scale.loses(chosen, scale.evaluation(restored))
-    return LeftOut(what, why, both, restored)
+    return LeftOut(what, why if both > 0.0 else "the objective does not count them", both, restored)
 
 
 def _never_there(scale: _Scale, chosen: Fidelity) -> list[LeftOut]:
