@@ -63,9 +63,9 @@ def _excess(seed: int) -> tuple[float, bool]:
     rng = random.Random(100_000 + seed)
     problem = random_problem(rng)
     own = replace(problem, fidelity=_fidelity(rng))
-    found, best = evaluate(own), reference(own, samples=1440)
+    found, best = evaluate(own), reference(own, samples=720)
     value = objective_value(own, found)
-    truth = objective_value(problem, evaluate(finer(problem, 1201)))
+    truth = objective_value(problem, evaluate(finer(problem, 1009)))
     has_gas = any(point.gas is not None for point in problem.points)
     return (abs(value - truth) / value if value else 0.0) - error_bound(own, found, best), has_gas
 
