@@ -126,6 +126,57 @@ def check(problem: ProblemArgument, json: JsonOption = None) -> None:
         typer.echo(f"ok: {one_line(given)}", err=json == "-")
 
 
+FidelityTolerance = Annotated[
+    float, typer.Option("--tolerance", metavar="X", help="Relative error of the objective that is allowed.")
+]
+
+
+@app.command()
+def explain(problem: ProblemArgument, json: JsonOption = None, tolerance: FidelityTolerance = 1e-3) -> None:
+    """Say what of the physics this scene needs, what it does not, and why."""
+    with _exit_statuses(problem):
+        from laufruhe.cli_fidelity import explained
+
+        _checked_tolerance(tolerance)
+        text, data = explained(problem, tolerance)
+        _hand_out(text, data, json)
+
+
+@app.command()
+def trade(
+    problems: Annotated[list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False)],
+    json: JsonOption = None,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--out", metavar="DIR", help="Folder of the pages.  [default: results/trade]"),
+    ] = None,
+) -> None:
+    """Measure speed against accuracy of every fidelity, on these problems."""
+    with _exit_statuses(problems[0]), _progress() as say:
+        from laufruhe.cli_fidelity import traded
+
+        text, data = traded(problems, out or Path("results") / "trade", say)
+        _hand_out(text, data, json)
+
+
+def _hand_out(text: str, data: str, json: str | None) -> None:
+    """Text on the screen, data where they were asked for."""
+    typer.echo(text, nl=False, err=json == "-")
+    if json == "-":
+        typer.echo(data, nl=False)
+    elif json is not None:
+        from laufruhe.report import files
+
+        with files.staged_file(Path(json), "--json") as place:
+            files.write(place, data)
+
+
+def _checked_tolerance(tolerance: float) -> None:
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        complaint = Complaint("--tolerance", f"{tolerance:g}", "must be a number above zero", "try 1e-3")
+        raise InputError("laufruhe", (complaint,))
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
         from laufruhe.report.versions import version_of
@@ -273,9 +324,7 @@ def _default_folder(problem: Problem) -> Path:
 def _with_tolerance(problem: Problem, tolerance: float | None) -> Problem:
     if tolerance is None:
         return problem
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
-        complaint = Complaint("--tolerance", f"{tolerance:g}", "must be a number above zero", "try 1e-4")
-        raise InputError("laufruhe", (complaint,))
+    _checked_tolerance(tolerance)
     return replace(problem, tolerance=tolerance)
 
 

@@ -123,5 +123,5 @@ def test_layouts_without_stars_are_refused(tmp_path):
 def test_a_sum_that_even_firing_leaves_open_is_refused(tmp_path):
     """Bank angle and split pin both open: even firing binds only their sum, so no search over them would be whole."""
     both = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"
-    with pytest.raises(InputError, match="split_pin_angle.*binds only their sum.*fix one of the two"):
+    with pytest.raises(InputError, match=r"split_pin_angle.*binds only their sum.*fix one of the two"):
         engines.problem(tmp_path, 6, "four-stroke", both + OPEN, layout="vee")

@@ -106,7 +106,8 @@ class Engine:
             self._check_firing(part)
 
     def _check_period(self, shaft: Shaft) -> None:
-        if (Fraction(shaft.ratio).limit_denominator(1000) * self.cycle.turns).denominator != 1:
+        turns = Fraction(shaft.ratio).limit_denominator(1000) * self.cycle.turns
+        if turns.denominator != 1 or turns == 0:
             raise ModelError(
                 f"shaft '{shaft.name}' with ratio {shaft.ratio:g} does not return within the cycle of "
                 f"{self.cycle.turns} turns; use a multiple of 1/{self.cycle.turns}"

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,28 +19,11 @@ from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, Sha
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.numerics.turns import Turn, as_turn, cancelling_sum, cis, star_sum
 from laufruhe.physics import order_coefficients, slider_crank
+from laufruhe.physics.fidelity import EXACT as EXACT
+from laufruhe.physics.fidelity import Fidelity as Fidelity
 from laufruhe.physics.gas_cycle import cylinder_pressure
 
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
-
-
-@dataclass(frozen=True)
-class Fidelity:
-    """What of the physics is kept.
-
-    Attributes
-    ----------
-    kinematics
-        "exact", or "two-order": cos alpha + lambda cos 2 alpha of the textbooks.
-    samples
-        Steps over the working cycle at which gas torque and mount forces are taken.
-    """
-
-    kinematics: Literal["exact", "two-order"] = "exact"
-    samples: int = 1440
-
-
-EXACT = Fidelity()
 
 
 def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -66,9 +47,20 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     ModelError
         If the gas model cannot be met, or a gas-loaded cylinder has no bore.
     """
+    if fidelity.is_uneven:
+        # late, for it builds on this file
+        from laufruhe.physics.uneven_speed import uneven_loads
+
+        return uneven_loads(engine, point, fidelity)
     total = reciprocating_loads(engine, point.speed, fidelity) + rod_inertia_loads(engine, point.speed, fidelity)
-    total = total + rotating_loads(engine, point.speed)
-    return total + gas_loads(engine, point.gas, fidelity) if point.gas is not None else total
+    if point.gas is not None and fidelity.gas:
+        total = total + gas_loads(engine, point.gas, fidelity)
+    return _kept(total, fidelity) + rotating_loads(engine, point.speed)
+
+
+def _kept(loads: Spectrum, fidelity: Fidelity) -> Spectrum:
+    """The orders that a fidelity keeps (F1)."""
+    return loads if fidelity.orders is None else loads.kept(fidelity.orders)
 
 
 def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -96,7 +88,11 @@ def rod_inertia_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) 
     def roll(part: SliderCrank) -> NDArray[np.complex128]:
         return _rod_roll(part, fidelity)
 
-    swinging = [part for part in engine.slider_cranks if part.rod_inertia_deficit != 0.0 and part.rod_ratio > 0.0]
+    swinging = [
+        part
+        for part in engine.slider_cranks
+        if fidelity.rod == "rigid" and part.rod_inertia_deficit != 0.0 and part.rod_ratio > 0.0
+    ]
     return _star_loads(engine.cycle, swinging, roll, lambda p: p.rod_inertia_deficit * _square(p, speed) * _ROLL)
 
 
@@ -129,6 +125,31 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
     return Spectrum(cycle.base_order, out)
 
 
+def unit_star_load(engine: Engine, order: int, coefficient: complex, roll: bool) -> Spectrum:
+    """Wrench of one order whose coefficient is the same at every cylinder (L6).
+
+    Parameters
+    ----------
+    coefficient
+        Of a force along each cylinder axis [N], or of a roll moment [N m].
+    """
+    series = np.zeros(order + 1, dtype=complex)
+    series[order] = coefficient
+    weight = (lambda _: _ROLL) if roll else _axial
+    return _star_loads(engine.cycle, engine.slider_cranks, lambda _: series, weight)
+
+
+def added_rotor_loads(
+    rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
+) -> Spectrum:
+    """Loads that rotors alone would add to an engine at an operating point, at even or uneven speed (L1, F5)."""
+    if fidelity.is_uneven:
+        from laufruhe.physics.uneven_speed import uneven_rotor_loads
+
+        return uneven_rotor_loads(rotors, engine, point, fidelity)
+    return rotor_loads(rotors, point.speed, engine.cycle)
+
+
 def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
     """Coefficient of order |n| of one rotor's wrench, shape (6,) (L1)."""
     shaft = rotor.shaft
@@ -140,7 +161,7 @@ def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
 
 def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
     """Roll moment of the gas, the reaction to its crank torque (L5; eq. 1). No net force."""
-    turns, samples = engine.cycle.turns, fidelity.samples
+    turns, samples = engine.cycle.turns, fidelity.gas_steps
     # equal mechanisms differ only in when they fire
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
     for part in engine.slider_cranks:
@@ -190,7 +211,7 @@ def _square(part: SliderCrank, speed: float) -> float:
 def _acceleration(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
     if fidelity.kinematics == "two-order":
         return np.array([0.0, -1.0, -part.rod_ratio], dtype=complex)
-    return order_coefficients.piston_acceleration_orders(part.rod_ratio, part.offset_ratio)
+    return order_coefficients.piston_acceleration_orders(part.rod_ratio, part.offset_ratio, _highest(part, fidelity))
 
 
 def _roll(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
@@ -198,14 +219,21 @@ def _roll(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
         ratio, lam = part.shaft.ratio, part.rod_ratio
         # (cos a + lam cos 2a)(-n)(sin a + lam/2 sin 2a), to first order in lam
         return ratio * 1j * np.array([0.0, -lam / 4.0, 0.5, 0.75 * lam])
-    highest = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
+    highest = _highest(part, fidelity)
     return order_coefficients.inertia_roll_orders(part.rod_ratio, part.offset_ratio, part.shaft.ratio, highest)
+
+
+def _highest(part: SliderCrank, fidelity: Fidelity) -> int:
+    """Last order of the local crank angle that is kept: all that matter, or fewer."""
+    needed = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
+    asked = fidelity.local_orders(part.shaft.ratio)
+    return needed if asked is None else min(needed, asked)
 
 
 def _rod_roll(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
     if fidelity.kinematics == "two-order":
         return np.array([0.0, -1j * part.rod_ratio])
-    highest = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
+    highest = _highest(part, fidelity)
     return order_coefficients.rod_roll_orders(part.rod_ratio, part.offset_ratio, part.shaft.ratio, highest)
 
 
@@ -222,7 +250,7 @@ def inertia_coefficients(
     square = _square(part, speed)
     force = -part.reciprocating_mass * part.crank_radius * square * _acceleration(part, fidelity)
     roll = part.reciprocating_mass * part.crank_radius**2 * square * _roll(part, fidelity)
-    swinging = part.rod_inertia_deficit != 0.0 and part.rod_ratio > 0.0
+    swinging = fidelity.rod == "rigid" and part.rod_inertia_deficit != 0.0 and part.rod_ratio > 0.0
     rod = part.rod_inertia_deficit * square * _rod_roll(part, fidelity) if swinging else np.zeros(1, dtype=complex)
     size = max(len(force), len(roll), len(rod))
     padded = [np.pad(series, (0, size - len(series))) for series in (force, roll, rod)]

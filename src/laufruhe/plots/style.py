@@ -114,7 +114,7 @@ def source_line(result: Result, note: str = "") -> str:
     """Where the data come from, after what the picture leaves out."""
     problem = result.problem
     described = f"Engine: {problem.source}. " if problem.source else ""
-    return f"{note}{described}Computed with Laufruhe, {problem.fidelity.kinematics} kinematics."
+    return f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
 
 
 def fitted(text: str, inches: float, points: float) -> str:

@@ -66,7 +66,9 @@ def short(value: Any) -> str:
 def nearest(word: str, words: Sequence[str]) -> str:
     """A remedy that names the nearest right word, or all of them."""
     close = difflib.get_close_matches(word, words, n=1, cutoff=_CLOSE)
-    return f"did you mean '{close[0]}'?" if close else "use one of: " + ", ".join(sorted(words))
+    # a name may hold what no terminal should be sent
+    shown = "".join(c if c.isprintable() else "?" for c in close[0]) if close else ""
+    return f"did you mean '{shown}'?" if close else "use one of: " + ", ".join(sorted(words))
 
 
 def _complaint(detail: Any, loc: tuple[str | int, ...], model: type[BaseModel]) -> Complaint:

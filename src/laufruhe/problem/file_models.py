@@ -343,8 +343,18 @@ class ConstraintTable(QuantityTable):
 class FidelityTable(Table):
     """Speed against accuracy."""
 
-    kinematics: Literal["exact", "two-order"] = "exact"
-    samples: int = Field(default=1440, ge=48, le=100_000, description="Steps over the working cycle.")
+    kinematics: Literal["exact", "two-order", "auto"] = Field(
+        default="exact", description="auto: the cheapest choice that keeps the objective within the tolerance."
+    )
+    tolerance: f.Positive | None = Field(default=None, description="Relative error of the objective, for auto.")
+    samples: int | None = Field(default=None, ge=48, le=100_000, description="Steps over the working cycle.")
+    orders: int | None = Field(default=None, ge=1, description="Last order kept of pistons, rods and gas.")
+    rod: Literal["rigid", "mass-only"] | None = None
+    gas: bool | None = Field(default=None, description="false leaves the working gas out.")
+    gas_samples: int | None = Field(default=None, ge=48, le=100_000, description="Steps for the gas torque.")
+    crank_inertia: f.PositiveInertia | None = Field(
+        default=None, description="Of all that turns with the crank: its speed varies within the cycle."
+    )
 
 
 class SearchTable(Table):

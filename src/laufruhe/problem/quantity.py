@@ -158,7 +158,7 @@ def load_rows(
     chosen = [k for k, p in enumerate(points) if quantity.points is None or p.name in quantity.points]
     whole = sum(points[k].weight for k in chosen)
     for k in chosen:
-        signal = _selected(quantity, signals[k], mount_names)
+        signal = selected(quantity, signals[k], mount_names)
         values = signal.sample(samples)
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
         blocks.append(rows)
@@ -166,7 +166,7 @@ def load_rows(
     return Rows(quantity.norm, np.concatenate(blocks), np.concatenate(weights))
 
 
-def _selected(quantity: Quantity, signal: Spectrum, mount_names: Sequence[str]) -> Spectrum:
+def selected(quantity: Quantity, signal: Spectrum, mount_names: Sequence[str]) -> Spectrum:
     """The components, mounts and orders that count, shape (n, mounts or 1, d)."""
     c = signal.coefficients
     if quantity.subject in ON_MOUNTS:

@@ -12,7 +12,6 @@ from laufruhe import units
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
 from laufruhe.machine.layouts import throw_rotors
-from laufruhe.physics.shaking_loads import Fidelity
 from laufruhe.problem.assemble_engine import cycle_of, moving_parts, operating_points
 from laufruhe.problem.assemble_mounts import mounts_of
 from laufruhe.problem.assemble_rotors import RotorList, balancer_shafts, counterweights
@@ -22,6 +21,7 @@ from laufruhe.problem.model import Limit, Problem, Term
 from laufruhe.problem.mount_asked import asked_of_mounts
 from laufruhe.problem.mount_design import MOUNT_NAMES
 from laufruhe.problem.quantity import MEASURES, ON_MOUNTS, Quantity, Subject, counted_rotors
+from laufruhe.problem.read_fidelity import at_fidelity
 from laufruhe.problem.read_phasing import is_open, opened
 
 
@@ -90,7 +90,7 @@ def _assembled(file: ProblemFile, path: Path) -> Problem:
     asked = asked_of_mounts(file, found, scene.points)
     if (collected.decisions or asked.decisions) and not (objective or asked.terms):
         raise Refused("objective", None, "is missing while numbers are open", "say what is to be minimised")
-    return Problem(
+    problem = Problem(
         name=path.stem,
         title=file.title,
         engine=engine,
@@ -100,10 +100,10 @@ def _assembled(file: ProblemFile, path: Path) -> Problem:
         limits=tuple(_limit(t, k, scene) for k, t in enumerate(file.constraints) if t.limit not in MOUNT_NAMES),
         source=file.source,
         assumptions=tuple(file.assumptions),
-        fidelity=Fidelity(file.fidelity.kinematics, file.fidelity.samples),
         tolerance=file.tolerance,
         mount_design=asked,
     )
+    return at_fidelity(problem, file.fidelity)
 
 
 class _Scene:

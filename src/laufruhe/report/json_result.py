@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures
 from laufruhe.physics.shaking_loads import WRENCH
 from laufruhe.report.measures import (
@@ -56,14 +58,18 @@ def as_dict(result: Result) -> dict[str, Any]:
         "firing_intervals": list(engine.firing_intervals),
         **phasing_record(result),
         "fidelity": {
-            "kinematics": problem.fidelity.kinematics,
-            "samples": problem.fidelity.samples,
+            **fidelity_dict(problem.fidelity),
             "measured_at": result.final.samples,
             "error_estimate": result.error_estimate,
         },
         "timing": dict(result.timing),
         "versions": versions(),
     }
+
+
+def fidelity_dict(fidelity: Fidelity) -> dict[str, Any]:
+    """Every choice; the crank inertia is null where the crank turns evenly."""
+    return asdict(fidelity)
 
 
 def _finite(value: Any) -> Any:

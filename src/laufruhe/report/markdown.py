@@ -79,11 +79,12 @@ def _row(cells: Iterable[str]) -> str:
 
 def _fidelity(result: Result) -> str:
     f = result.problem.fidelity
-    kinematics = "Exact kinematics" if f.kinematics == "exact" else "Kinematics of two orders"
-    text = f"{kinematics}, {result.final.samples} steps over the working cycle."
+    text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
     if result.objective is None:
         return text
     error = f"{100.0 * result.error_estimate:.1g} %"
+    if f.tolerance is not None:
+        return f"{text} Chosen for an error of {f.tolerance:g}; the objective is wrong by at most {error}."
     return f"{text} Estimated error of the objective: {error}, the change when every second step is left out."
 
 

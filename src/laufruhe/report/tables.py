@@ -43,9 +43,11 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
 
 def _fidelity(result: Result) -> str:
     fidelity = result.problem.fidelity
-    text = f"Fidelity: {fidelity.kinematics} kinematics, {result.final.samples} steps a cycle"
+    text = f"Fidelity: {fidelity.summary}, {result.final.samples} steps a cycle"
     if result.objective is None:
         return text
+    if fidelity.tolerance is not None:
+        return f"{text}; error of the objective at most {100.0 * result.error_estimate:.1g} %"
     return f"{text}; error of the objective from sampling about {100.0 * result.error_estimate:.1g} %"
 
 

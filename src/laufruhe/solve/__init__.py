@@ -7,8 +7,9 @@ import time
 from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
+from laufruhe.solve.accuracy import error_of, solve_within
 from laufruhe.solve.result import ObjectiveValue, Result, Status
-from laufruhe.solve.unbalances import objective_name, sampling_error, solve_unbalances
+from laufruhe.solve.unbalances import objective_name, solve_unbalances
 
 __all__ = ["Result", "Status", "solve", "state"]
 
@@ -32,10 +33,12 @@ def solve(problem: Problem) -> Result:
     if problem.phasing is not None:
         from laufruhe.solve.phasing import solve_phasing
 
-        return solve_phasing(problem)
+        return solve_within(problem, solve_phasing)
     if problem.decisions and not problem.objective:
         raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
-    return solve_unbalances(problem) if problem.decisions else state(problem)
+    if not problem.decisions:
+        return state(problem)
+    return solve_within(problem, solve_unbalances)
 
 
 def state(problem: Problem) -> Result:
@@ -56,6 +59,6 @@ def state(problem: Problem) -> Result:
         limits=(),
         initial=evaluation,
         final=evaluation,
-        error_estimate=sampling_error(problem, evaluation) if problem.objective else 0.0,
+        error_estimate=error_of(problem, evaluation),
         timing={"evaluate": time.perf_counter() - started},
     )

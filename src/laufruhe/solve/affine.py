@@ -13,8 +13,9 @@ from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mounting import Mounting, mounting_of, travel_of
-from laufruhe.physics.shaking_loads import rotor_loads
+from laufruhe.physics.shaking_loads import added_rotor_loads
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
@@ -92,9 +93,14 @@ class AffineModel:
     """Spectra of the design without its decisions, and of each decision alone.
 
     Rows at any number of samples follow from them without evaluating the engine again.
+
+    Parameters
+    ----------
+    whole_cycle
+        Rows over the whole working cycle, even where the loads repeat within it.
     """
 
-    def __init__(self, problem: Problem, keep_all: bool = False) -> None:
+    def __init__(self, problem: Problem, keep_all: bool = False, whole_cycle: bool = False) -> None:
         self.problem = problem
         # components that are zero are dropped, unless models are to be added up
         self._keep_all = keep_all
@@ -106,12 +112,12 @@ class AffineModel:
         orders = [Fraction(abs(r.shaft.ratio)).limit_denominator(1000) for rotors in changes for r in rotors]
         self._slopes = {
             subject: [
-                [_slope(rotors, point, problem.engine, mounting, subject) for rotors in changes]
+                [_slope(rotors, point, problem.engine, mounting, subject, problem.fidelity) for rotors in changes]
                 for point in problem.points
             ]
             for subject in self._subjects(mounting)
         }
-        self.base = self._shortest_base(bare, orders)
+        self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
 
     def _subjects(self, mounting: Mounting | None) -> tuple[Subject, ...]:
         travels = self.problem.engine.block is not None
@@ -182,9 +188,14 @@ def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
 
 
 def _slope(
-    rotors: Sequence[Rotor], point: OperatingPoint, engine: Engine, mounting: Mounting | None, subject: Subject
+    rotors: Sequence[Rotor],
+    point: OperatingPoint,
+    engine: Engine,
+    mounting: Mounting | None,
+    subject: Subject,
+    fidelity: Fidelity,
 ) -> Spectrum:
-    wrench = rotor_loads(rotors, point.speed, engine.cycle)
+    wrench = added_rotor_loads(rotors, engine, point, fidelity)
     if subject is Subject.MOUNT_FORCE and mounting is not None:
         return mounting.forces(wrench, point.speed)
     travel = travel_of(mounting, wrench, point.speed) if subject is Subject.MOUNT_TRAVEL else None

@@ -15,6 +15,7 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
 from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.solve.accuracy import sampling_error
 from laufruhe.solve.certificate import Certificate, Proof
 from laufruhe.solve.domain import Domain, domains_of
 from laufruhe.solve.mount_convex import CONVEX, is_convex, solve_convex_mounts
@@ -28,7 +29,7 @@ from laufruhe.solve.mount_result import (
 )
 from laufruhe.solve.nonlinear import LocalOptimum, distinct, solve_nonlinear, spread_starts
 from laufruhe.solve.result import DecisionValue, LimitValue, Result, Status
-from laufruhe.solve.unbalances import decision_values, sampling_error, solve_unbalances
+from laufruhe.solve.unbalances import decision_values, solve_unbalances
 
 Array = NDArray[np.float64]
 

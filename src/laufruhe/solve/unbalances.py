@@ -13,6 +13,7 @@ from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES
+from laufruhe.solve.accuracy import error_of
 from laufruhe.solve.affine import AffineModel, AffineProblem
 from laufruhe.solve.certificate import Bound, Certificate, Proof, best_bound, kkt_residual
 from laufruhe.solve.domain import Domain
@@ -219,7 +220,7 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         initial=initial,
         final=final,
         message="" if feasible else "the design found breaks a limit between the angles it was solved at",
-        error_estimate=sampling_error(problem, final),
+        error_estimate=error_of(problem, final),
     )
 
 
@@ -228,19 +229,6 @@ def objective_name(problem: Problem) -> str:
     if len(problem.objective) == 1 and problem.objective[0].weight == 1.0:
         return problem.objective[0].quantity.name
     return " + ".join(f"{term.weight:g} x {term.quantity.name}" for term in problem.objective)
-
-
-def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
-    """Relative change of the objective when every second angle is left out."""
-    samples = evaluation.samples
-    whole = objective_value(problem, evaluation)
-    if samples % 2 or not whole:
-        return 0.0
-    half = sum(
-        term.weight * evaluation.rows(term.quantity, samples // 2).value
-        for term in problem.objective
-    )  # fmt: skip
-    return abs(half - whole) / whole
 
 
 def _limit_value(name: str, unit: str, value: float, maximum: float, price: float, objective: float) -> LimitValue:

@@ -1,0 +1,48 @@
+"""The [fidelity] table: choices by hand, or the cheapest that is good enough."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.problem.automatic import DEFAULT_TOLERANCE, automatic
+from laufruhe.problem.complaints import Refused
+from laufruhe.problem.file_models import FidelityTable
+from laufruhe.problem.model import Problem
+
+_BY_HAND = ("samples", "orders", "rod", "gas", "gas_samples")
+
+
+def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
+    """The problem at the fidelity that a table describes.
+
+    Raises
+    ------
+    Refused
+        If a key contradicts another.
+    """
+    inertia = math.inf if table.crank_inertia is None else table.crank_inertia
+    if table.kinematics != "auto":
+        if table.tolerance is not None:
+            raise Refused("fidelity.tolerance", table.tolerance, "goes with auto only", 'add kinematics = "auto"')
+        if table.crank_inertia is not None and table.kinematics != "exact":
+            raise Refused("fidelity.crank_inertia", inertia, "goes with exact kinematics only", "leave kinematics out")
+        return replace(problem, fidelity=_by_hand(table, table.kinematics == "exact", inertia))
+    for key in _BY_HAND:
+        if getattr(table, key) is not None:
+            raise Refused(f"fidelity.{key}", getattr(table, key), "is what auto decides", "leave it out")
+    uneven = replace(problem, fidelity=replace(EXACT, crank_inertia=inertia))
+    return automatic(uneven, table.tolerance or DEFAULT_TOLERANCE)
+
+
+def _by_hand(table: FidelityTable, exact: bool, inertia: float) -> Fidelity:
+    return Fidelity(
+        "exact" if exact else "two-order",
+        table.samples or EXACT.samples,
+        orders=table.orders,
+        rod=table.rod or EXACT.rod,
+        gas=table.gas is not False,
+        gas_samples=table.gas_samples,
+        crank_inertia=inertia,
+    )

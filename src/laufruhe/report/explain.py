@@ -1,0 +1,58 @@
+"""What a scene needs of the physics, as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+from laufruhe.problem.automatic import Choice
+from laufruhe.problem.model import Problem
+
+
+def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
+    """What is kept, what not and why, and what that saves.
+
+    Parameters
+    ----------
+    milliseconds
+        Of one evaluation of a further design: as chosen, and exact over the whole cycle.
+    """
+    pruned, whole = choice.numbers
+    asked = f"asked {tolerance:g}"
+    met = "" if choice.error_estimate <= tolerance else "; the reference itself is no better, give a smoother gas trace"
+    lines = [
+        f"{problem.title}",
+        f"error of the objective at most {choice.error_estimate:.1e} ({asked}{met})",
+        "",
+        "kept:",
+        *(f"  {text}" for text in choice.kept),
+        "left out:",
+        *(_line(part.what, part.why, part.share) for part in choice.left_out),
+        "saved:",
+        f"  {pruned} force components sampled in place of {whole}, 1/{whole / max(pruned, 1):.0f}",
+        f"  {milliseconds[0]:.3f} ms for another design in place of {milliseconds[1]:.3f} ms",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
+    """The same for scripts."""
+    fidelity = asdict(choice.fidelity)
+    fidelity["crank_inertia"] = choice.fidelity.crank_inertia if choice.fidelity.is_uneven else None
+    content: dict[str, Any] = {
+        "problem": problem.name,
+        "tolerance": tolerance,
+        "error_estimate": choice.error_estimate,
+        "fidelity": fidelity,
+        "kept": list(choice.kept),
+        "left_out": [{"what": part.what, "why": part.why, "share": part.share} for part in choice.left_out],
+        "numbers": {"kept": choice.numbers[0], "exact": choice.numbers[1]},
+        "milliseconds": {"kept": milliseconds[0], "exact": milliseconds[1]},
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _line(what: str, why: str, share: float) -> str:
+    size = f"changes the objective by at most {share:.1e}" if share > 0.0 else "changes nothing"
+    return f"  {what}: {why}; {size}"

@@ -1,0 +1,137 @@
+"""Speed against accuracy as a page, and which fidelity to take."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from laufruhe.report.markdown import escaped
+from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade
+
+DASH = "-"
+ALIKE = 1.3
+HEAD = (
+    "| fidelity | error | said to be at most | another design | gradient | solve | from nothing | memory | regret |\n"
+    "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+)
+
+
+def as_page(found: Trade, picture: str, command: str) -> str:
+    """Table, picture and the choice for one problem."""
+    problem = found.problem
+    inertia, change = found.flywheel
+    optimum = "" if math.isnan(found.optimum) else f", of its optimum {found.optimum:.6g}"
+    sections = [
+        f"# Speed against accuracy: {escaped(problem.title)}",
+        f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
+        f"(SI). Its order coefficients agree with 50-digit arithmetic to {max(found.rigid_part_error, 1e-17):.0e}.",
+        f"**Take** {advice(found)}",
+        f"![Time against error of every fidelity; colour is regret]({picture})",
+        "\n".join([HEAD, *(_line(row) for row in found.rows)]),
+        "*Another design*: objective with the scene prepared. *Gradient*: with its derivatives by all decisions. "
+        "*Solve*: optimum from nothing, at this fidelity's own angles. *From nothing*: engine to objective. "
+        "*Regret*: by how much the reference objective of the optimum found is above that of the best.",
+        f"Constant crank speed: with a flywheel of {inertia:.3g} kg m2 for all that turns, at which the speed "
+        f"varies by some 2 %, the objective changes by {100.0 * change:+.2f} %. "
+        "No fidelity at constant speed sees that.",
+        f"```sh\n{command}\n```",
+    ]
+    return "\n\n".join(sections) + "\n"
+
+
+def advice(found: Trade) -> str:
+    """The cheapest fidelity whose number, and whose decision, are good to a thousandth."""
+    good = [row for row in found.rows if row.error <= 1e-3]
+    number = _quick(good, lambda row: row.evaluation) if good else found.rows[-1]
+    text = f"`{number.name}` where a number good to 0.1 % is wanted ({_time(number.evaluation)} a design)"
+    decided = [row for row in found.rows if not math.isnan(row.regret) and row.regret <= 1e-3]
+    if decided:
+        best = _quick(decided, lambda row: row.solve)
+        text += f"; `{best.name}` to decide, its optimum is within 0.1 % of the best ({_time(best.solve)})"
+    return text + "."
+
+
+def _quick(rows: Sequence[Row], time: Callable[[Row], float]) -> Row:
+    """The safest of those that are not clearly slower than the fastest: times scatter from run to run."""
+    fastest = min(map(time, rows))
+    return min((row for row in rows if time(row) <= ALIKE * fastest), key=lambda row: row.estimate)
+
+
+def as_json(found: Trade) -> str:
+    """The table for scripts."""
+    content = {
+        "problem": found.problem.name,
+        "reference": {"objective": found.value, "optimum": _finite(found.optimum)},
+        "rigid_part_error": found.rigid_part_error,
+        "uneven_speed": {"crank_inertia": found.flywheel[0], "change": found.flywheel[1]},
+        "rows": [_entry(row) for row in found.rows],
+    }
+    return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def index(trades: Sequence[Trade]) -> str:
+    """One line for every problem."""
+    lines = [
+        "# Speed against accuracy",
+        "",
+        "Which fidelity to take, measured on every ready problem. In short:",
+        "",
+        "- `auto` is the safe choice: it says how wrong it can be, and is not more wrong than that.",
+        "- The two-order formulas of textbooks cost up to 2 % of the number, and up to 2 % of the design. "
+        "Engines whose second order cancels are left with what these formulas leave out.",
+        "- Leaving gas out is what costs most: it decides how the roll moment is balanced.",
+        "- More than 720 steps a cycle serve peaks and proofs, not means.",
+        "- Regret may be far below the error, for an optimum is flat, and far above it: what a shaft is wrongly made "
+        "to balance stays. Read both columns.",
+        "",
+        "| problem | take | error of two-order | of no gas | of auto 0.001 | regret of two-order | of auto 0.001 "
+        "| uneven speed |",
+        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |",
+    ]
+    for found in trades:
+        named = {row.name: row for row in found.rows}
+        two, auto = named.get("two-order, 720 steps"), named.get("auto 0.001")
+        gas = named.get("exact without gas, 720 steps")
+        name = found.problem.name
+        lines.append(
+            f"| [{name}]({name}.md) | {advice(found)} | {_error(two)} | {_error(gas)} | {_error(auto)} "
+            f"| {_regret(two)} | {_regret(auto)} | {100.0 * found.flywheel[1]:+.2f} % |"
+        )
+    lines += ["", "A dash under regret: only the crank star is open, no unbalance."]
+    lines += ["", "*Uneven speed*: what a flywheel that leaves 2 % of unevenness changes of the objective."]
+    return "\n".join(lines) + "\n"
+
+
+def _line(row: Row) -> str:
+    return (
+        f"| {row.name} | {row.error:.1e} | {row.estimate:.1e} | {_time(row.evaluation)} | {_time(row.gradient)} "
+        f"| {_time(row.solve)} | {_time(row.fresh)} | {row.memory / 1e6:.2f} MB | {_regret(row)} |"
+    )
+
+
+def _time(seconds: float) -> str:
+    if math.isnan(seconds):
+        return DASH
+    return f"{1e6 * seconds:.0f} us" if seconds < 1e-3 else f"{1e3 * seconds:.3g} ms"
+
+
+def _error(row: Row | None) -> str:
+    return DASH if row is None else f"{row.error:.1e}"
+
+
+def _regret(row: Row | None) -> str:
+    if row is None or math.isnan(row.regret):
+        return DASH
+    # the cone solver's own digits
+    return "0" if abs(row.regret) < 1e-8 else f"{row.regret:.1e}"
+
+
+def _entry(row: Row) -> dict[str, Any]:
+    keys = ("name", "error", "estimate", "evaluation", "gradient", "solve", "fresh", "memory", "regret")
+    return {key: _finite(getattr(row, key)) for key in keys}
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,64 @@
+"""Random engines for tests of accuracy."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+
+from laufruhe.machine import Cycle, Engine, GasModel, Mount, OperatingPoint, Rotor, Seiliger, Shaft, Wiebe
+from laufruhe.machine.layouts import Mechanism, build, inline, vee
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.problem.model import Problem, Term
+from laufruhe.problem.quantity import Quantity, Subject
+
+SUBJECTS = (Subject.MOUNT_FORCE, Subject.SHAKING_FORCE, Subject.ROLL_MOMENT, Subject.ROCKING_COUPLE)
+
+
+def random_problem(rng: random.Random, gas: bool | None = None) -> Problem:
+    """An engine of one to eight cylinders, its mounts and one or two operating points, on one measure."""
+    count, cycle = rng.randint(1, 8), rng.choice(list(Cycle))
+    radius = rng.uniform(0.02, 0.1)
+    ratio = rng.uniform(0.05, 0.5)
+    mechanism = Mechanism(
+        radius, radius / ratio, rng.uniform(0.1, 5.0), rotating_mass=rng.choice([0.0, rng.uniform(0.1, 3.0)]),
+        rod_inertia_deficit=rng.choice([0.0, rng.uniform(-0.01, 0.01)]),
+        offset=rng.choice([0.0, rng.uniform(-0.1, 0.1) * radius]), bore=rng.uniform(0.05, 0.15),
+    )  # fmt: skip
+    throws = [rng.choice([math.tau * k / count, rng.uniform(0.0, math.tau)]) for k in range(count)]
+    if count % 2 == 0 and rng.random() < 0.3:
+        layout = vee(count, 0.1, rng.uniform(0.3, 2.5), bank_stagger=0.02)
+        throws = throws[: count // 2]
+    else:
+        layout = inline(count, 0.1)
+    parts, _ = build(cycle, layout, mechanism, throws)
+    shaft = Shaft("balancer", rng.choice([-2.0, -1.0, 1.0, 2.0]), 0.1, -0.1)
+    rotors = (Rotor("balancer", 0.1, rng.uniform(0.0, 0.05) + 0j, shaft),) if rng.random() < 0.5 else ()
+    mounts = tuple(
+        Mount(f"m{k}", (x, y, rng.uniform(-0.1, 0.1)), (rng.uniform(0.3, 1.0), 1.0, rng.uniform(0.5, 2.0)))
+        for k, (x, y) in enumerate([(0.5, 0.25), (0.5, -0.25), (-0.8, 0.25), (-0.8, -0.25)])
+    )
+    points = tuple(
+        OperatingPoint(f"p{k}", rng.uniform(50.0, 600.0), _gas(rng, gas), rng.uniform(0.5, 2.0))
+        for k in range(rng.choice([1, 1, 2]))
+    )
+    subject = rng.choice(SUBJECTS if count > 1 else SUBJECTS[:3])
+    norm = rng.choice([Norm.SUM, Norm.SUM, Norm.RMS, Norm.MAXIMUM])
+    return Problem(
+        "random", "random", Engine("random", cycle, parts, rotors, mounts), points,
+        objective=(Term(Quantity(subject, norm)),),
+    )  # fmt: skip
+
+
+def _gas(rng: random.Random, wanted: bool | None) -> GasModel | None:
+    if wanted is False or (wanted is None and rng.random() < 0.7):
+        return None
+    if rng.random() < 0.5:
+        return Seiliger(peak_pressure=rng.uniform(60e5, 75e5), imep=rng.uniform(6e5, 9e5))
+    return Wiebe(imep=rng.uniform(4e5, 12e5), start=-0.2, duration=rng.uniform(0.6, 1.2), compression_ratio=10.0)
+
+
+def finer(problem: Problem, samples: int) -> Problem:
+    """The same at a fidelity above any that the project offers of itself."""
+    return replace(problem, fidelity=replace(problem.fidelity, kinematics="exact", samples=samples, orders=None,
+                                             rod="rigid", gas=True, gas_samples=None, tolerance=None))  # fmt: skip

@@ -1,0 +1,155 @@
+"""Fidelities in their common limits, and the automatic choice in files and solves."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tractor
+from cli import scenes
+from fidelity.scenes import random_problem
+from laufruhe.errors import InputError, ModelError
+from laufruhe.machine import OperatingPoint
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.problem.automatic import choose
+from laufruhe.problem.error_bounds import reference
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.reader import load
+from laufruhe.solve import solve
+
+POINT = OperatingPoint("rated", tractor.SPEED, tractor.GAS)
+
+
+def _coefficients(fidelity: Fidelity, rod_ratio: float = 0.26) -> np.ndarray:
+    engine = tractor.engine((0, 120, 240))
+    parts = tuple(replace(part, rod_length=part.crank_radius / rod_ratio) for part in engine.slider_cranks)
+    return shaking_loads(replace(engine, slider_cranks=parts), replace(POINT, gas=None), fidelity).coefficients
+
+
+def test_many_orders_are_every_order() -> None:
+    assert np.array_equal(_coefficients(Fidelity(orders=500)), _coefficients(Fidelity()))
+
+
+@pytest.mark.parametrize("last", [1, 2, 3, 8])
+def test_orders_are_cut_and_nothing_else(last: int) -> None:
+    cut, whole = _coefficients(Fidelity(orders=last)), _coefficients(Fidelity())
+    assert np.allclose(cut[: 2 * last + 1], whole[: 2 * last + 1], rtol=1e-14, atol=1e-12)
+    assert len(cut) <= 2 * last + 1
+
+
+def test_two_orders_are_exact_for_a_long_rod() -> None:
+    """The textbook's formulas err by the cube of the rod ratio in the couples of force."""
+    errors = []
+    for ratio in (0.02, 0.01):
+        two, exact = (_coefficients(f, ratio)[:5, 4:] for f in (Fidelity("two-order"), Fidelity(orders=2)))
+        errors.append(np.abs(two - exact).max() / np.abs(exact).max())
+    assert errors[0] < 1e-5
+    assert errors[0] / errors[1] == pytest.approx(8.0, rel=0.2)
+
+
+def test_rod_of_two_masses_differs_by_its_deficit_only() -> None:
+    engine = tractor.engine((0, 180, 180, 0))
+    parts = tuple(replace(part, rod_inertia_deficit=-0.004) for part in engine.slider_cranks)
+    heavy = replace(engine, slider_cranks=parts)
+    without = shaking_loads(heavy, POINT, Fidelity(samples=720, rod="mass-only"))
+    assert np.array_equal(without.coefficients, shaking_loads(engine, POINT, Fidelity(samples=720)).coefficients)
+    rigid = shaking_loads(heavy, POINT, Fidelity(samples=720))
+    assert not np.array_equal(without.coefficients[:, 3], rigid.coefficients[:, 3])
+
+
+def test_no_gas_is_a_motored_engine() -> None:
+    engine = tractor.engine((0, 180, 180, 0))
+    motored = shaking_loads(engine, replace(POINT, gas=None))
+    assert np.array_equal(shaking_loads(engine, POINT, Fidelity(gas=False)).coefficients, motored.coefficients)
+
+
+def test_order_of_parts_does_not_matter() -> None:
+    problem = random_problem(random.Random(11), gas=True)
+    parts = list(problem.engine.slider_cranks)
+    value = objective_value(problem, evaluate(problem))
+    for seed in range(5):
+        random.Random(seed).shuffle(parts)
+        shuffled = replace(problem.engine, slider_cranks=tuple(parts))
+        assert objective_value(problem, evaluate(problem, shuffled)) == pytest.approx(value, rel=1e-13)
+
+
+def test_automatic_finds_what_is_not_there() -> None:
+    text = "\n".join(part.what for part in choose(load(Path("problems/tractor-six.toml")), 1e-2).left_out)
+    assert "Fx, Fy" in text
+    assert "2, 2.5" in text
+    assert "1 of 2 parts of the cycle" in text
+
+
+def test_gas_that_the_objective_cannot_see_is_dropped() -> None:
+    engine = replace(tractor.engine((0, 180, 180, 0)), mounts=())
+    from laufruhe.numerics.mixed_norms import Norm
+    from laufruhe.problem.model import Term
+    from laufruhe.problem.quantity import Quantity, Subject
+
+    force = Term(Quantity(Subject.SHAKING_FORCE, Norm.SUM))
+    choice = choose(tractor.problem(engine, [], tractor.GAS, objective=(force,)), 1e-3)
+    assert not choice.fidelity.gas
+    assert choice.error_estimate <= 1e-3
+    # of a force no gas loads, everything is told from the rod alone
+    assert choice.fidelity.orders is not None
+    assert choice.fidelity.orders <= 8
+
+
+def test_balanced_objective_of_zero() -> None:
+    engine = replace(tractor.engine((0, 120, 240, 240, 120, 0)), mounts=())
+    from laufruhe.numerics.mixed_norms import Norm
+    from laufruhe.problem.model import Term
+    from laufruhe.problem.quantity import Quantity, Subject
+
+    force = Term(Quantity(Subject.SHAKING_FORCE, Norm.SUM, orders=(1.0, 2.0)))
+    choice = choose(tractor.problem(engine, [], objective=(force,)), 1e-3)
+    assert choice.error_estimate < 1e-9
+
+
+def _with(text: str, table: str) -> str:
+    return text + "\n[fidelity]\n" + table
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_solve_within_a_tolerance(tolerance: float, tmp_path: Path) -> None:
+    text = _with(scenes.TIGHT, f'kinematics = "auto"\ntolerance = {tolerance}')
+    problem = load(scenes.written(tmp_path, text))
+    result = solve(problem)
+    truth = objective_value(problem, reference(problem, result.final.engine))
+    assert result.objective is not None
+    assert result.error_estimate <= 1.05 * tolerance
+    assert abs(result.objective.value - truth) <= result.error_estimate * truth * 1.01
+
+
+@pytest.mark.parametrize(
+    ("table", "key"),
+    [
+        ('kinematics = "auto"\nsamples = 720', "fidelity.samples"),
+        ('kinematics = "auto"\norders = 4', "fidelity.orders"),
+        ("tolerance = 1e-3", "fidelity.tolerance"),
+        ('kinematics = "two-order"\ncrank_inertia = "1 kg m^2"', "fidelity.crank_inertia"),
+        ('crank_inertia = "0 kg m^2"', "fidelity.crank_inertia"),
+        ("orders = 0", "fidelity.orders"),
+    ],
+)
+def test_contradictions_are_refused(table: str, key: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=key):
+        load(scenes.written(tmp_path, _with(scenes.GIVEN, table)))
+
+
+def test_uneven_speed_from_a_file(tmp_path: Path) -> None:
+    problem = load(scenes.written(tmp_path, _with(scenes.TIGHT, 'samples = 360\ncrank_inertia = "0.5 kg m^2"')))
+    assert problem.fidelity.is_uneven
+    result = solve(problem)
+    assert result.certificate is not None
+    assert result.certificate.gap <= 1e-3
+
+
+def test_no_orders_is_refused() -> None:
+    with pytest.raises(ModelError, match="orders"):
+        Fidelity(orders=0)

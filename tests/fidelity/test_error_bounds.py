@@ -1,0 +1,95 @@
+"""The error estimate is an upper bound: of choices by hand, and of the automatic one."""
+
+from __future__ import annotations
+
+import random
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+
+import pytest
+
+from fidelity.scenes import finer, random_problem
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.problem.automatic import choose
+from laufruhe.problem.error_bounds import error_bound, reference
+from laufruhe.problem.evaluation import evaluate, objective_value
+
+QUICK, MANY, AUTOMATIC = 150, 10_000, 25
+
+
+def _fidelity(rng: random.Random) -> Fidelity:
+    return Fidelity(
+        rng.choice(["exact", "exact", "two-order"]), rng.choice([48, 60, 96, 130, 360, 720]),
+        orders=rng.choice([None, 1, 2, 4, 7, 16]), rod=rng.choice(["rigid", "mass-only"]), gas=rng.random() < 0.8,
+        gas_samples=rng.choice([None, 720]),
+    )  # fmt: skip
+
+
+def _errors(seed: int, gas: bool | None = None, truth_samples: int = 5760) -> tuple[float, float, Fidelity]:
+    """True error, stated error."""
+    rng = random.Random(seed)
+    problem = random_problem(rng, gas)
+    own = replace(problem, fidelity=_fidelity(rng))
+    found = evaluate(own)
+    value = objective_value(own, found)
+    truth = objective_value(problem, evaluate(finer(problem, truth_samples)))
+    return abs(value - truth) / value if value else 0.0, error_bound(own, found, reference(own)), own.fidelity
+
+
+@pytest.mark.parametrize("seed", range(QUICK))
+def test_estimate_is_not_below_the_error(seed: int) -> None:
+    # steps that are no multiple of the reference's, so that both can be wrong in their own way
+    true, stated, fidelity = _errors(seed, truth_samples=7001)
+    assert true <= stated, fidelity
+
+
+def test_estimate_is_not_idle() -> None:
+    """A bound far above the truth would pass every test and help nobody."""
+    ratios = [stated / true for true, stated, _ in map(_errors, range(QUICK)) if true > 1e-6]
+    assert sorted(ratios)[len(ratios) // 2] < 12.0
+
+
+@pytest.mark.validation
+def test_estimate_on_ten_thousand_engines() -> None:
+    """Nothing is below without gas; with it one in a thousand: where its bends fall between steps is chance."""
+    with ProcessPoolExecutor(2) as pool:
+        shares = list(pool.map(_excess, range(MANY), chunksize=250))
+    assert [seed for seed, (excess, has_gas) in enumerate(shares) if excess > 0.0 and not has_gas] == []
+    assert sum(excess > 0.0 for excess, _ in shares) <= MANY // 1000
+
+
+def _excess(seed: int) -> tuple[float, bool]:
+    """By how much the error is above the estimate, of a reference of fewer steps: ten thousand take a minute."""
+    rng = random.Random(100_000 + seed)
+    problem = random_problem(rng)
+    own = replace(problem, fidelity=_fidelity(rng))
+    found, best = evaluate(own), reference(own, samples=720)
+    value = objective_value(own, found)
+    truth = objective_value(problem, evaluate(finer(problem, 1009)))
+    has_gas = any(point.gas is not None for point in problem.points)
+    return (abs(value - truth) / value if value else 0.0) - error_bound(own, found, best), has_gas
+
+
+@pytest.mark.parametrize("seed", range(AUTOMATIC))
+def test_automatic_choice_keeps_its_word(seed: int) -> None:
+    problem = random_problem(random.Random(5000 + seed))
+    choice = choose(problem, 1e-2)
+    own = replace(problem, fidelity=choice.fidelity)
+    value = objective_value(own, evaluate(own))
+    truth = objective_value(problem, evaluate(finer(problem, 7001)))
+    assert abs(value - truth) <= choice.error_estimate * max(value, 1e-300)
+    assert choice.error_estimate <= 1.05e-2 or choice.fidelity.samples >= 5760
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_parts_put_back_change_less_than_said(seed: int) -> None:
+    problem = random_problem(random.Random(9000 + seed), gas=True)
+    choice = choose(problem, 1e-2)
+    value = objective_value(problem, evaluate(replace(problem, fidelity=choice.fidelity)))
+    restored = [part for part in choice.left_out if part.restored is not None]
+    assert restored
+    for part in restored:
+        assert part.restored is not None
+        changed = objective_value(problem, evaluate(replace(problem, fidelity=part.restored)))
+        # a share is of the reference, the two values are sampled alike
+        assert abs(changed - value) <= part.share * max(value, changed) * 1.02 + 1e-12 * value, part.what
