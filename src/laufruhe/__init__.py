@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem.model import Problem
-    from laufruhe.solve.result import Result
+    from laufruhe.solvers.result import Result
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "evaluate", "load", "solve"]
@@ -35,7 +35,7 @@ def load(path: str | Path) -> Problem:
 
 def solve(problem: Problem) -> Result:
     """Decide what a problem leaves open; the result says what of it is proven."""
-    from laufruhe.solve import solve as decide
+    from laufruhe.solvers import solve as decide
 
     return decide(problem)
 
@@ -53,7 +53,7 @@ def evaluate(design: Problem | Engine, points: Sequence[OperatingPoint] = ()) ->
     from laufruhe.numerics.mixed_norms import Norm
     from laufruhe.problem.model import Problem, Term
     from laufruhe.problem.quantity import Quantity, Subject
-    from laufruhe.solve import state
+    from laufruhe.solvers import state
 
     if isinstance(design, Problem):
         return state(design)

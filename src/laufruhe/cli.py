@@ -22,7 +22,7 @@ from laufruhe.errors import Complaint, InputError, ModelError, SolverError
 
 if TYPE_CHECKING:
     from laufruhe.problem.model import Problem
-    from laufruhe.solve.result import Result
+    from laufruhe.solvers.result import Result
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -95,7 +95,7 @@ def evaluate(
     """
 
     def stated(given: Problem) -> Result:
-        from laufruhe.solve import state
+        from laufruhe.solvers import state
 
         return state(given)
 
@@ -113,7 +113,7 @@ def check(problem: ProblemArgument, json: JsonOption = None) -> None:
         from laufruhe.report import files
         from laufruhe.report.json_result import as_json
         from laufruhe.report.wording import one_line
-        from laufruhe.solve import state
+        from laufruhe.solvers import state
 
         json_file = _json_file(_Request("check", problem, json, None, False), places)
         given = load(problem)
@@ -295,8 +295,8 @@ class _Clock:
 
 def _solved(problem: Problem) -> Result:
     """The solver's result, or a result that says why there is none."""
-    from laufruhe.solve import solve, state
-    from laufruhe.solve.result import Status
+    from laufruhe.solvers import solve, state
+    from laufruhe.solvers.result import Status
 
     try:
         return solve(problem)

@@ -18,7 +18,7 @@ def explained(path: Path, tolerance: float) -> tuple[str, str]:
     from laufruhe.physics.fidelity import Fidelity
     from laufruhe.problem.automatic import choose
     from laufruhe.report import explain
-    from laufruhe.solve.batch import prepare
+    from laufruhe.solvers.batch import prepare
     from laufruhe.studies.trade import seconds
 
     problem = _with_objective(path)

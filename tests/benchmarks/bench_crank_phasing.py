@@ -30,12 +30,12 @@ from laufruhe.problem.model import Problem
 from laufruhe.problem.reader import load
 from laufruhe.report.grids import Grid
 from laufruhe.report.ranking import phasing_grids
-from laufruhe.solve import solve
-from laufruhe.solve.mixed_conic import solve_program
-from laufruhe.solve.star_cuts import owners_of, search_designs, solve_design
-from laufruhe.solve.star_families import families_of
-from laufruhe.solve.star_model import StarModel
-from laufruhe.solve.star_search import AmplitudeObjective, AmplitudeTerm, enumerate_stars, search_stars
+from laufruhe.solvers import solve
+from laufruhe.solvers.mixed_conic import solve_program
+from laufruhe.solvers.star_cuts import owners_of, search_designs, solve_design
+from laufruhe.solvers.star_families import families_of
+from laufruhe.solvers.star_model import StarModel
+from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm, enumerate_stars, search_stars
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "results" / "crank-phasing"

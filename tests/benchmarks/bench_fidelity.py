@@ -31,7 +31,7 @@ from laufruhe.problem.automatic import automatic, choose  # noqa: E402
 from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
 from laufruhe.problem.model import Problem, Term  # noqa: E402
 from laufruhe.problem.quantity import Quantity, Subject  # noqa: E402
-from laufruhe.solve.batch import prepare, random_decisions  # noqa: E402
+from laufruhe.solvers.batch import prepare, random_decisions  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "results" / "benchmarks" / "fidelity.md"

@@ -23,7 +23,7 @@ from laufruhe.problem.model import Problem  # noqa: E402
 from laufruhe.problem.mount_design import mounting_in  # noqa: E402
 from laufruhe.problem.mount_values import whole_objective  # noqa: E402
 from laufruhe.problem.reader import load  # noqa: E402
-from laufruhe.solve.mount_nonlinear import solve_joint  # noqa: E402
+from laufruhe.solvers.mount_nonlinear import solve_joint  # noqa: E402
 from mounts.test_moving_block import simulated_forces  # noqa: E402
 
 PROBLEM = ROOT / "problems" / "tractor-four-elastic.toml"

@@ -25,7 +25,7 @@ from laufruhe.physics.mount_forces import rigid_mount_maps
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.model import Drive, Problem, Term, UnbalanceDecision
 from laufruhe.problem.quantity import Quantity, Subject
-from laufruhe.solve.affine import AffineModel
+from laufruhe.solvers.affine import AffineModel
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "results" / "benchmarks" / "multibody.md"

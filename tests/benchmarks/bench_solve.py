@@ -18,8 +18,8 @@ import numpy as np
 
 from laufruhe import load
 from laufruhe.problem.model import Problem
-from laufruhe.solve.affine import AffineModel, AffineProblem
-from laufruhe.solve.conic import ConicProgram
+from laufruhe.solvers.affine import AffineModel, AffineProblem
+from laufruhe.solvers.conic import ConicProgram
 
 ROOT = Path(__file__).resolve().parents[2]
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester.toml"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from laufruhe.problem.model import Problem
 from laufruhe.problem.reader import load
-from laufruhe.solve import Result, solve, state
+from laufruhe.solvers import Result, solve, state
 
 READY = Path(__file__).parents[2] / "problems" / "tractor-four-lanchester.toml"
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-import laufruhe.solve
+import laufruhe.solvers
 from cli import scenes
 from laufruhe.cli import app
 from laufruhe.errors import SolverError
@@ -110,7 +110,7 @@ def test_a_solver_that_gives_up_is_a_failed_result(here: Path, monkeypatch: pyte
     def give_up(problem: object) -> None:
         raise SolverError("the cone solver gave up")
 
-    monkeypatch.setattr(laufruhe.solve, "solve", give_up)
+    monkeypatch.setattr(laufruhe.solvers, "solve", give_up)
     result = run("solve", scenes.written(here, scenes.TIGHT), "--no-plots")
     assert result.exit_code == 1
     assert "gave up" in result.stderr
@@ -121,7 +121,7 @@ def test_an_interrupt_leaves_nothing(here: Path, monkeypatch: pytest.MonkeyPatch
     def interrupt(problem: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(laufruhe.solve, "solve", interrupt)
+    monkeypatch.setattr(laufruhe.solvers, "solve", interrupt)
     path = scenes.written(here, scenes.TIGHT)
     result = run("solve", path, "--json", "answer.json")
     assert result.exit_code == 130
@@ -198,7 +198,7 @@ class TestUnwritable:
         def solve(problem: object) -> None:
             raise AssertionError("solved before the output was checked")
 
-        monkeypatch.setattr(laufruhe.solve, "solve", solve)
+        monkeypatch.setattr(laufruhe.solvers, "solve", solve)
 
     def test_a_file_stands_where_the_folder_goes(self, here: Path) -> None:
         path = scenes.written(here, scenes.TIGHT)
@@ -300,3 +300,14 @@ def test_check_answers_in_json_and_makes_no_folder(here: Path) -> None:
     assert answer.exit_code == 0
     assert json.loads(answer.stdout)["status"] == "feasible"
     assert tree(here) == set()
+
+
+def test_python_interface_answers_more_than_once() -> None:
+    """The functions of the package are not shadowed by its rooms."""
+    import laufruhe
+
+    problem = laufruhe.load(scenes.READY)
+    first, second = laufruhe.solve(problem), laufruhe.solve(problem)
+    assert first.objective == second.objective
+    assert laufruhe.evaluate(problem).objective == laufruhe.evaluate(problem).objective
+    assert laufruhe.evaluate(problem.engine, problem.points).objective is not None

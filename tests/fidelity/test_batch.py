@@ -14,8 +14,8 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.automatic import automatic
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.reader import load
-from laufruhe.solve.batch import prepare, random_decisions
-from laufruhe.solve.batch_engines import EngineArrays, EngineFamily
+from laufruhe.solvers.batch import prepare, random_decisions
+from laufruhe.solvers.batch_engines import EngineArrays, EngineFamily
 
 READY = sorted(Path("problems").glob("*.toml"))
 COUNT = 12

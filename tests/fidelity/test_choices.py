@@ -20,7 +20,7 @@ from laufruhe.problem.automatic import choose
 from laufruhe.problem.error_bounds import reference
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.reader import load
-from laufruhe.solve import solve
+from laufruhe.solvers import solve
 
 POINT = OperatingPoint("rated", tractor.SPEED, tractor.GAS)
 

@@ -12,10 +12,10 @@ from scipy.optimize import lsq_linear, minimize
 from laufruhe.physics.modes import sag_for_critical_speed
 from laufruhe.problem.mount_design import MountMeasure, mounting_in
 from laufruhe.problem.reader import load
-from laufruhe.solve.certificate import Proof
-from laufruhe.solve.mount_convex import ConvexDuals, convex_program, dual_bound, is_convex, solve_convex_mounts
-from laufruhe.solve.mounts import solve_mounts
-from laufruhe.solve.result import Status
+from laufruhe.solvers.certificate import Proof
+from laufruhe.solvers.mount_convex import ConvexDuals, convex_program, dual_bound, is_convex, solve_convex_mounts
+from laufruhe.solvers.mounts import solve_mounts
+from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -140,7 +140,7 @@ def test_what_is_not_convex_is_not_called_so(tmp_path):
 
 def test_a_solver_that_lies_is_found_out(tmp_path, monkeypatch):
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
-    from laufruhe.solve import mount_cones
+    from laufruhe.solvers import mount_cones
 
     honest = mount_cones.solve_cones
     monkeypatch.setattr(mount_cones, "solve_cones", lambda program: (0.9 * honest(program)[0], honest(program)[1]))

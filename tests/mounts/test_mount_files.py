@@ -8,7 +8,7 @@ import pytest
 from laufruhe.errors import InputError, ModelError
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_design import mounting_in
-from laufruhe.solve import solve
+from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN, SAG, changed, problem_of
 
 RIGID = '[mounts]\npositions = [["1 m", "0.2 m", "0 m"], ["-1 m", "-0.2 m", "0 m"]]\n'

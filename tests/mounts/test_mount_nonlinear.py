@@ -15,13 +15,13 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_design import NOTHING_ASKED, mounting_in
 from laufruhe.problem.mount_values import excess, mount_value, whole_objective
 from laufruhe.problem.reader import load
-from laufruhe.solve import solve
-from laufruhe.solve.certificate import Proof
-from laufruhe.solve.mount_nonlinear import solve_joint
-from laufruhe.solve.mount_program import JointProgram
-from laufruhe.solve.mounts import solve_mounts
-from laufruhe.solve.result import Status
-from laufruhe.solve.unbalances import solve_unbalances
+from laufruhe.solvers import solve
+from laufruhe.solvers.certificate import Proof
+from laufruhe.solvers.mount_nonlinear import solve_joint
+from laufruhe.solvers.mount_program import JointProgram
+from laufruhe.solvers.mounts import solve_mounts
+from laufruhe.solvers.result import Status
+from laufruhe.solvers.unbalances import solve_unbalances
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, problem_of
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

@@ -4,8 +4,8 @@ import pytest
 
 from laufruhe.errors import InputError
 from laufruhe.problem.reader import load
-from laufruhe.solve import solve
-from laufruhe.solve.result import Status
+from laufruhe.solvers import solve
+from laufruhe.solvers.result import Status
 from phasing import engines
 
 OPEN = 'throws = "open"\nfiring_order = "open"'

@@ -5,13 +5,13 @@ import pytest
 
 from laufruhe.errors import SolverError
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.solve import solve
-from laufruhe.solve.certificate import Multipliers, Proof
-from laufruhe.solve.mixed_conic import solve_program
-from laufruhe.solve.result import Status
-from laufruhe.solve.star_cuts import bound_of, cut_of, owners_of, search_designs, solve_design
-from laufruhe.solve.star_families import families_of
-from laufruhe.solve.star_model import StarModel
+from laufruhe.solvers import solve
+from laufruhe.solvers.certificate import Multipliers, Proof
+from laufruhe.solvers.mixed_conic import solve_program
+from laufruhe.solvers.result import Status
+from laufruhe.solvers.star_cuts import bound_of, cut_of, owners_of, search_designs, solve_design
+from laufruhe.solvers.star_families import families_of
+from laufruhe.solvers.star_model import StarModel
 from phasing import engines
 
 TWO_SHAFTS = engines.shaft("against", -1) + engines.shaft("second", 2)

@@ -15,10 +15,10 @@ from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.reader import load
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.wording import explained
-from laufruhe.solve import solve
-from laufruhe.solve.certificate import Proof
-from laufruhe.solve.result import Status
-from laufruhe.solve.star_search import AmplitudeObjective, AmplitudeTerm, search_stars
+from laufruhe.solvers import solve
+from laufruhe.solvers.certificate import Proof
+from laufruhe.solvers.result import Status
+from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm, search_stars
 from phasing import engines
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

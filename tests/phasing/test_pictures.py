@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.plots import star
-from laufruhe.solve import solve
+from laufruhe.solvers import solve
 from phasing import engines
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

@@ -11,15 +11,15 @@ import pytest
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.reader import load
-from laufruhe.solve import solve
-from laufruhe.solve.certificate import Proof
-from laufruhe.solve.star_families import families_of
-from laufruhe.solve.star_objective import amplitude_objective
-from laufruhe.solve.star_search import search_stars
-from laufruhe.solve.uneven import Start, local_optimum
-from laufruhe.solve.uneven_bound import star_bounds, throw_costs, uneven_bound
-from laufruhe.solve.uneven_model import Symbols, UnevenModel
-from laufruhe.solve.uneven_program import rides_of
+from laufruhe.solvers import solve
+from laufruhe.solvers.certificate import Proof
+from laufruhe.solvers.star_families import families_of
+from laufruhe.solvers.star_objective import amplitude_objective
+from laufruhe.solvers.star_search import search_stars
+from laufruhe.solvers.uneven import Start, local_optimum
+from laufruhe.solvers.uneven_bound import star_bounds, throw_costs, uneven_bound
+from laufruhe.solvers.uneven_model import Symbols, UnevenModel
+from laufruhe.solvers.uneven_program import rides_of
 from phasing import engines
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

@@ -17,7 +17,7 @@ from cli import scenes
 from laufruhe.plots import bars, draw, polar, spectrum
 from laufruhe.plots.style import DPI, fitted
 from laufruhe.report.measures import measured, mount_orders, mount_samples
-from laufruhe.solve import Result
+from laufruhe.solvers import Result
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -200,7 +200,8 @@ def test_pictures_need_no_pyplot_and_change_no_settings(tmp_path: Path) -> None:
     path = scenes.written(tmp_path, scenes.GIVEN)
     code = (
         "import sys; from pathlib import Path; import matplotlib as mpl; before = dict(mpl.rcParams)\n"
-        "from laufruhe.problem.reader import load; from laufruhe.solve import state; from laufruhe.plots import draw\n"
+        "from laufruhe.problem.reader import load; from laufruhe.solvers import state\n"
+        "from laufruhe.plots import draw\n"
         "draw(state(load(sys.argv[1])), Path(sys.argv[2]))\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
         "assert dict(mpl.rcParams) == before\n"

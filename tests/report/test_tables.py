@@ -14,7 +14,7 @@ from laufruhe.report.grids import grids_of
 from laufruhe.report.markdown import as_markdown, escaped
 from laufruhe.report.tables import show
 from laufruhe.report.wording import aligned, explained, headline, number, trimmed, with_unit
-from laufruhe.solve import Result
+from laufruhe.solvers import Result
 
 
 def screen(result: Result) -> str:

@@ -21,7 +21,7 @@ from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import gas_torque, reciprocating_loads, shaking_loads
 from laufruhe.problem.model import Term
 from laufruhe.problem.quantity import Quantity, Subject
-from laufruhe.solve import solve
+from laufruhe.solvers import solve
 from laufruhe.studies.digits import acceleration_orders
 
 EPS = float(np.finfo(float).eps)

@@ -7,7 +7,7 @@ from pathlib import Path
 from laufruhe.plots import bars, mounting, polar, spectrum, star
 from laufruhe.plots.style import save
 from laufruhe.report.mounting import is_elastic
-from laufruhe.solve.result import Result
+from laufruhe.solvers.result import Result
 
 
 def draw(result: Result, folder: Path) -> tuple[str, ...]:

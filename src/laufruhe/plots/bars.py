@@ -13,7 +13,7 @@ from laufruhe.plots.style import FAINT, colours_of, fitted, heading, names_of, p
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.report.measures import changed, hardest_point, measured
 from laufruhe.report.wording import number
-from laufruhe.solve.result import Result
+from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
 

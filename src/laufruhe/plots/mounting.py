@@ -26,7 +26,7 @@ from laufruhe.problem.mount_design import MountMeasure, mounting_in
 from laufruhe.report.measures import changed, hardest_point
 from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of
 from laufruhe.report.wording import number
-from laufruhe.solve.result import Result
+from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ from laufruhe.plots.style import (
 )
 from laufruhe.report.measures import changed, hardest_point, mount_samples
 from laufruhe.report.wording import trimmed
-from laufruhe.solve.result import Result
+from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from laufruhe.physics.metrics import order_amplitude
 from laufruhe.plots.style import FAINT, colours_of, heading, names_of, page, point_name, source_line
 from laufruhe.problem.evaluation import Evaluation, PointLoads
 from laufruhe.report.measures import changed, hardest_point, mount_orders, padded
-from laufruhe.solve.result import Result
+from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
 Panel = tuple[str, Callable[[PointLoads], Array]]

@@ -13,8 +13,8 @@ from matplotlib.patches import Circle, Patch
 
 from laufruhe.plots.style import AFTER, BEFORE, FAINT, INK, heading, page, source_line
 from laufruhe.report.wording import number
-from laufruhe.solve.ranking import PhasingResult, RankedStar
-from laufruhe.solve.result import Result
+from laufruhe.solvers.ranking import PhasingResult, RankedStar
+from laufruhe.solvers.result import Result
 
 SHOWN = 3
 FIRINGS_SHOWN = 6

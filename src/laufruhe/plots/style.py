@@ -19,7 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from laufruhe.report.measures import changed
-from laufruhe.solve.result import Result
+from laufruhe.solvers.result import Result
 
 # Okabe and Ito's blue beside a grey of clearly other lightness: told apart by every eye and in print.
 BEFORE, AFTER = "#8a8a8a", "#0072B2"

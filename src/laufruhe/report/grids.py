@@ -20,7 +20,7 @@ from laufruhe.report.measures import (
 )
 from laufruhe.report.mode_grids import mode_grids
 from laufruhe.report.wording import DASH, aligned, is_nothing, number, percent, readable, trimmed, with_unit
-from laufruhe.solve.result import DecisionValue, LimitValue, Result
+from laufruhe.solvers.result import DecisionValue, LimitValue, Result
 
 Array = NDArray[np.float64]
 

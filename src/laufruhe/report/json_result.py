@@ -25,7 +25,7 @@ from laufruhe.report.measures import (
 from laufruhe.report.mounting import is_elastic, modes_as_dict
 from laufruhe.report.ranking import phasing_record
 from laufruhe.report.versions import versions
-from laufruhe.solve.result import Result
+from laufruhe.solvers.result import Result
 
 
 def as_json(result: Result) -> str:

@@ -9,7 +9,7 @@ from laufruhe.report.grid import Grid
 from laufruhe.report.grids import grids_of
 from laufruhe.report.versions import versions
 from laufruhe.report.wording import explained, headline
-from laufruhe.solve.result import Result
+from laufruhe.solvers.result import Result
 
 _CAPTIONS = {
     "polar.png": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",

@@ -11,8 +11,8 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures, order_amplitude
 from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, PointLoads, over
 from laufruhe.problem.model import Limit
-from laufruhe.solve.mount_result import mount_limits
-from laufruhe.solve.result import LimitValue, Result
+from laufruhe.solvers.mount_result import mount_limits
+from laufruhe.solvers.result import LimitValue, Result
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from laufruhe.report.grid import Grid
 from laufruhe.report.measures import changed
 from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.report.wording import DASH, number, trimmed
-from laufruhe.solve.result import Result
+from laufruhe.solvers.result import Result
 
 
 def mode_grids(result: Result) -> list[Grid]:

@@ -7,8 +7,8 @@ from typing import Any
 
 from laufruhe.report.grid import Grid
 from laufruhe.report.wording import DASH, number, trimmed
-from laufruhe.solve.ranking import PhasingResult, RankedOrder, RankedStar
-from laufruhe.solve.result import Result
+from laufruhe.solvers.ranking import PhasingResult, RankedOrder, RankedStar
+from laufruhe.solvers.result import Result
 
 ORDERS_SHOWN = 6
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from laufruhe.report.grid import Grid
 from laufruhe.report.grids import grids_of
 from laufruhe.report.wording import explained, headline
-from laufruhe.solve.result import Result, Status
+from laufruhe.solvers.result import Result, Status
 
 PIPE_WIDTH = 110
 _COLOURS = {Status.OPTIMAL: "green", Status.FEASIBLE: "green", Status.INFEASIBLE: "red", Status.FAILED: "red"}

@@ -7,8 +7,8 @@ import math
 from laufruhe.machine import Cycle
 from laufruhe.problem.model import Problem
 from laufruhe.report.measures import changed
-from laufruhe.solve.certificate import Certificate, Proof
-from laufruhe.solve.result import DecisionValue, Result, Status
+from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.result import DecisionValue, Result, Status
 
 DASH = "-"
 NOTHING = 1e-9

@@ -18,7 +18,7 @@ from laufruhe.problem.automatic import choose
 from laufruhe.problem.error_bounds import REFERENCE_SAMPLES, error_bound, reference
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.model import Problem
-from laufruhe.solve.affine import AffineModel, AffineNorm
+from laufruhe.solvers.affine import AffineModel, AffineNorm
 from laufruhe.studies.digits import rigid_part_error
 
 Array = NDArray[np.float64]
@@ -178,7 +178,7 @@ def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -
 
 def _optimum(model: AffineModel, samples: int) -> list[complex]:
     """Decisions that are best at this model's samples, no refinement."""
-    from laufruhe.solve.conic import ConicProgram
+    from laufruhe.solvers.conic import ConicProgram
 
     solution = ConicProgram(model.at(samples)).solve()
     if solution.x is None:

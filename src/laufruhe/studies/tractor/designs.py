@@ -16,7 +16,7 @@ from laufruhe.physics.metrics import cycle_measures
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.model import Drive, Problem, Term, UnbalanceDecision
 from laufruhe.problem.quantity import Quantity, Subject
-from laufruhe.solve import solve
+from laufruhe.solvers import solve
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.shafts import SHAFT_PLACE
 

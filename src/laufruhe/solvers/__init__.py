@@ -1,0 +1,64 @@
+"""One solver per file; what they return is evaluated again by the exact model."""
+
+from __future__ import annotations
+
+import time
+
+from laufruhe.errors import ModelError
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.model import Problem
+from laufruhe.solvers.accuracy import error_of, solve_within
+from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.unbalances import objective_name, solve_unbalances
+
+__all__ = ["Result", "Status", "solve", "state"]
+
+
+def solve(problem: Problem) -> Result:
+    """Decide what a problem leaves open.
+
+    Raises
+    ------
+    SolverError
+        If a solver stops without an answer.
+    ModelError
+        If the engine as given cannot be evaluated.
+    """
+    if problem.phasing is not None and problem.mount_design.asked:
+        raise ModelError("throws or firing order are open together with mounts; fix one of the two and solve again")
+    if problem.mount_design.asked:
+        from laufruhe.solvers.mounts import solve_mounts
+
+        return solve_mounts(problem)
+    if problem.phasing is not None:
+        from laufruhe.solvers.phasing import solve_phasing
+
+        return solve_within(problem, solve_phasing)
+    if problem.decisions and not problem.objective:
+        raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
+    if not problem.decisions:
+        return state(problem)
+    return solve_within(problem, solve_unbalances)
+
+
+def state(problem: Problem) -> Result:
+    """The design as given, evaluated and not changed."""
+    started = time.perf_counter()
+    evaluation = evaluate(problem)
+    objective = None
+    if problem.objective:
+        value = objective_value(problem, evaluation)
+        unit = problem.objective[0].quantity.unit
+        objective = ObjectiveValue(objective_name(problem), value, unit, value)
+    return Result(
+        problem=problem,
+        status=Status.FEASIBLE,
+        objective=objective,
+        certificate=None,
+        decisions=(),
+        limits=(),
+        initial=evaluation,
+        final=evaluation,
+        error_estimate=error_of(problem, evaluation),
+        timing={"evaluate": time.perf_counter() - started},
+    )

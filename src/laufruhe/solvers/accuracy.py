@@ -1,0 +1,60 @@
+"""How accurate a result is, and designs whose accuracy was asked for (F10, F11)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from laufruhe.problem.automatic import choose
+from laufruhe.problem.error_bounds import error_bound, reference
+from laufruhe.problem.evaluation import Evaluation, objective_value
+from laufruhe.problem.model import Problem
+from laufruhe.solvers.result import Result
+
+_ROUNDS = 4
+
+
+def error_of(problem: Problem, evaluation: Evaluation) -> float:
+    """Relative error of the objective: from sampling, or against the reference where that was asked.
+
+    A fidelity chosen by hand is taken as wanted, so that only its samples are judged.
+    """
+    if not problem.objective:
+        return 0.0
+    if problem.fidelity.tolerance is None:
+        return sampling_error(problem, evaluation)
+    return error_bound(problem, evaluation, reference(problem, evaluation.engine))
+
+
+def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
+    """Relative change of the objective when every second angle is left out."""
+    samples = evaluation.samples
+    whole = objective_value(problem, evaluation)
+    if samples % 2 or not whole:
+        return 0.0
+    half = sum(
+        term.weight * evaluation.rows(term.quantity, samples // 2).value
+        for term in problem.objective
+    )  # fmt: skip
+    return abs(half - whole) / whole
+
+
+def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
+    """Solve at the fidelity chosen for the design as given, and choose again until the optimum is accurate too (F11).
+
+    What is left out is the same force for every design, so a share of it that is small
+    before balancing may be large after.
+    """
+    asked = problem.fidelity.tolerance
+    result = solve(problem)
+    if asked is None or result.certificate is None:
+        return result
+    for _ in range(_ROUNDS):
+        result = replace(result, error_estimate=error_of(result.problem, result.final))
+        if result.error_estimate <= asked:
+            break
+        better = choose(problem, asked, result.final.engine).fidelity
+        if better == result.problem.fidelity:
+            break
+        result = solve(replace(problem, fidelity=better))
+    return replace(result, error_estimate=error_of(result.problem, result.final))

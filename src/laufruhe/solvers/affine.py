@@ -1,0 +1,211 @@
+"""A problem as norms of rows that are affine in its decisions, with numbers from the exact model (P1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Engine, OperatingPoint, Rotor
+from laufruhe.numerics import mixed_norms
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.mounting import Mounting, mounting_of, travel_of
+from laufruhe.physics.shaking_loads import added_rotor_loads
+from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.model import Problem
+from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
+from laufruhe.solvers.domain import Domain, domains_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class AffineNorm:
+    """N(V0 + B x) with weights of its rows.
+
+    Attributes
+    ----------
+    constant
+        V0, shape (k, d).
+    slope
+        B, shape (k, d, n).
+    weights
+        Shape (k,).
+    """
+
+    norm: Norm
+    constant: Array
+    slope: Array
+    weights: Array
+
+    def rows(self, x: Array) -> Array:
+        """V0 + B x, shape (k, d)."""
+        moved = self.slope.reshape(self.constant.size, len(x)) @ x
+        return self.constant + moved.reshape(self.constant.shape)
+
+    def value(self, x: Array) -> float:
+        """The norm at x."""
+        return mixed_norms.value(self.norm, self.weights, self.rows(x))
+
+
+@dataclass(frozen=True, eq=False)
+class AffineProblem:
+    """Least sum of weighted norms, some norms limited, each decision in its own set.
+
+    Attributes
+    ----------
+    terms
+        (weight, norm) pairs.
+    limits
+        (maximum, norm) pairs.
+    domains
+        Of the decisions.
+    samples
+        Steps over the period of the load rows.
+    """
+
+    terms: tuple[tuple[float, AffineNorm], ...]
+    limits: tuple[tuple[float, AffineNorm], ...]
+    domains: tuple[Domain, ...]
+    samples: int
+
+    @property
+    def size(self) -> int:
+        """Length of the decision vector."""
+        return sum(domain.width for domain in self.domains)
+
+    @property
+    def scales(self) -> Array:
+        """Largest size of every column."""
+        return np.concatenate([np.full(d.width, d.scale) for d in self.domains]) if self.domains else np.zeros(0)
+
+    def objective(self, x: Array) -> float:
+        """Weighted sum of the terms."""
+        return sum(weight * norm.value(x) for weight, norm in self.terms)
+
+
+class AffineModel:
+    """Spectra of the design without its decisions, and of each decision alone.
+
+    Rows at any number of samples follow from them without evaluating the engine again.
+
+    Parameters
+    ----------
+    whole_cycle
+        Rows over the whole working cycle, even where the loads repeat within it.
+    """
+
+    def __init__(self, problem: Problem, keep_all: bool = False, whole_cycle: bool = False) -> None:
+        self.problem = problem
+        # components that are zero are dropped, unless models are to be added up
+        self._keep_all = keep_all
+        self.domains = domains_of(problem.decisions)
+        bare = evaluate(problem, problem.design([0.0] * len(problem.decisions)))
+        mounting = mounting_of(problem.engine)
+        changes = [_change(problem, k, direction) for k, d in enumerate(self.domains) for direction in d.directions]
+        self._bare, self._changes = bare, changes
+        orders = [Fraction(abs(r.shaft.ratio)).limit_denominator(1000) for rotors in changes for r in rotors]
+        self._slopes = {
+            subject: [
+                [_slope(rotors, point, problem.engine, mounting, subject, problem.fidelity) for rotors in changes]
+                for point in problem.points
+            ]
+            for subject in self._subjects(mounting)
+        }
+        self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
+
+    def _subjects(self, mounting: Mounting | None) -> tuple[Subject, ...]:
+        travels = self.problem.engine.block is not None
+        return (Subject.SHAKING_FORCE, *((Subject.MOUNT_FORCE,) if mounting else ()),
+                *((Subject.MOUNT_TRAVEL,) if mounting and travels else ()))  # fmt: skip
+
+    def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
+        used = [loads.wrench.reduced(tuple(orders)).base for loads in bare.loads]
+        return common_base(used)
+
+    @property
+    def full_samples(self) -> int:
+        """Steps of the problem's fidelity that fall into one period of the loads."""
+        cycle = self.problem.engine.cycle
+        return max(int(self.problem.fidelity.samples * float(cycle.base_order / self.base)), 24)
+
+    def at(self, samples: int) -> AffineProblem:
+        """The problem with its load rows at `samples` steps over their common period."""
+        problem = self.problem
+        terms = tuple((term.weight, self._norm(term.quantity, samples)) for term in problem.objective)
+        limits = tuple((limit.maximum, self._norm(limit.quantity, samples)) for limit in problem.limits)
+        return AffineProblem(terms, limits, self.domains, samples)
+
+    def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
+        """Per operating point the wrench of the bare design, and of one unit of every column."""
+        slopes = self._slopes[Subject.SHAKING_FORCE]
+        return [(loads.wrench, tuple(by)) for loads, by in zip(self._bare.loads, slopes, strict=True)]
+
+    def norm(self, quantity: Quantity, samples: int) -> AffineNorm:
+        """A quantity at `samples` steps over the common period."""
+        return self._norm(quantity, samples)
+
+    def _norm(self, quantity: Quantity, samples: int) -> AffineNorm:
+        if quantity.subject in MASSES:
+            bare = mass_rows(quantity, self._bare.engine.rotors)
+            slopes = [mass_rows(quantity, _only(self._bare.engine, rotors)).vectors for rotors in self._changes]
+            return _stacked(bare, slopes, self._keep_all)
+        subject = quantity.subject if quantity.subject in ON_MOUNTS else Subject.SHAKING_FORCE
+        bare = self._rows(quantity, [loads.signal(quantity.subject) for loads in self._bare.loads], samples)
+        by_point = self._slopes[subject]
+        slopes = [
+            self._rows(quantity, [by_point[p][k] for p in range(len(by_point))], samples).vectors
+            for k in range(len(self._changes))
+        ]
+        return _stacked(bare, slopes, self._keep_all)
+
+    def _rows(self, quantity: Quantity, signals: Sequence[Spectrum], samples: int) -> Rows:
+        finest = common_base([self.base, *(signal.base for signal in signals)])
+        step = int(self.base / finest)
+        period = [Spectrum(self.base, s.rebased(finest).coefficients[::step]) for s in signals]
+        names = [mount.name for mount in self.problem.engine.mounts]
+        return load_rows(quantity, self.problem.points, period, names, samples)
+
+
+def _change(problem: Problem, k: int, direction: complex) -> tuple[Rotor, ...]:
+    """The rotors that one unit of one column makes, others left out."""
+    by_name = {rotor.name: rotor for rotor in problem.engine.rotors}
+    return tuple(
+        replace(by_name[drive.rotor], unbalance=drive.gain * (direction.conjugate() if drive.mirrored else direction))
+        for drive in problem.decisions[k].drives
+    )
+
+
+def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
+    """All rotors of an engine, those not named at zero."""
+    changed = {rotor.name: rotor.unbalance for rotor in rotors}
+    return tuple(replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors)
+
+
+def _slope(
+    rotors: Sequence[Rotor],
+    point: OperatingPoint,
+    engine: Engine,
+    mounting: Mounting | None,
+    subject: Subject,
+    fidelity: Fidelity,
+) -> Spectrum:
+    wrench = added_rotor_loads(rotors, engine, point, fidelity)
+    if subject is Subject.MOUNT_FORCE and mounting is not None:
+        return mounting.forces(wrench, point.speed)
+    travel = travel_of(mounting, wrench, point.speed) if subject is Subject.MOUNT_TRAVEL else None
+    return wrench if travel is None else travel
+
+
+def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
+    slope = np.stack(slopes, axis=-1) if slopes else np.zeros((*bare.vectors.shape, 0))
+    used = np.any(bare.vectors != 0.0, axis=0) | np.any(slope != 0.0, axis=(0, 2))
+    if keep_all or not used.any():
+        used[:] = keep_all
+        used[:1] = True
+    return AffineNorm(bare.norm, bare.vectors[:, used], np.ascontiguousarray(slope[:, used]), bare.weights)

@@ -1,0 +1,222 @@
+"""Least weighted sum of norms under limits, as a second-order cone program (P1).
+
+The only room that knows cvxpy. The program is built once for a set of slopes; constants
+and limits are parameters, so a sweep solves again without building again.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import SolverError
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.solvers.affine import AffineNorm, AffineProblem
+from laufruhe.solvers.certificate import Multipliers
+from laufruhe.solvers.domain import Domain
+
+Array = NDArray[np.float64]
+
+# flat optima need a small gap before their decisions are digits one can build
+_TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
+
+
+@dataclass(frozen=True, eq=False)
+class ConicSolution:
+    """What the cone solver returned; nothing in it is believed before it is evaluated.
+
+    Attributes
+    ----------
+    x
+        Decision vector; None where the limits cannot be met together.
+    multipliers
+        Dual rows of terms and limits.
+    solver_seconds
+        Spent inside the cone solver.
+    iterations
+        Of the interior-point method.
+    """
+
+    x: Array | None
+    multipliers: Multipliers
+    solver_seconds: float
+    iterations: int
+
+
+@dataclass
+class _Cone:
+    """One norm in the program, its rows in units of `unit`."""
+
+    constant: Any
+    heads: Any
+    cone: Any
+    unit: float
+    shape: tuple[int, int]
+    row_factors: Array
+
+    def dual_rows(self, objective_unit: float) -> Array:
+        """mu Z of the rows [SI] (P2), in the objective's own unit."""
+        z = -np.asarray(self.cone.dual_value[1], dtype=float).reshape(self.shape)
+        return z * self.row_factors[:, None] * (objective_unit / self.unit)
+
+
+class ConicProgram:
+    """An affine problem as a cvxpy program, solved by Clarabel as often as wanted.
+
+    Parameters
+    ----------
+    problem
+        Its slopes, weights and domains are built in.
+    reusable
+        Whether constants and maxima may change between solves. What is gained in a
+        sweep is paid once, when the program is compiled.
+    """
+
+    def __init__(self, problem: AffineProblem, reusable: bool = False) -> None:
+        self._problem = problem
+        self._reusable = reusable
+        # decisions in units of their bounds, rows in units of what they can reach
+        self._y = cp.Variable(problem.size)
+        self._unit = _reach(problem, [norm for _, norm in problem.terms])
+        self._terms = [self._cone(norm, self._unit) for _, norm in problem.terms]
+        self._limits = [self._cone(norm, _reach(problem, [norm])) for _, norm in problem.limits]
+        self._maxima = [
+            self._number(np.array(maximum / cone.unit))
+            for (maximum, _), cone in zip(problem.limits, self._limits, strict=True)
+        ]
+        least = [weight * _value(norm, cone) for (weight, norm), cone in zip(problem.terms, self._terms, strict=True)]
+        constraints = [cone.cone for cone in (*self._terms, *self._limits)]
+        constraints += [
+            _value(norm, cone) <= most
+            for (_, norm), cone, most in zip(problem.limits, self._limits, self._maxima, strict=True)
+        ]
+        constraints += [c for domain in problem.domains for c in _membership(domain, self._y[domain.columns])]
+        self._program = cp.Problem(cp.Minimize(sum(least)), constraints)
+
+    def _cone(self, norm: AffineNorm, unit: float) -> _Cone:
+        """V0 + B x in a second-order cone a row, or in one cone for a root mean square."""
+        k, d = norm.constant.shape
+        constant = self._number(norm.constant / unit)
+        slope = (norm.slope * (self._problem.scales / unit)).reshape(k * d, -1)
+        rows = cp.reshape(slope @ self._y, (k, d), order="C") + constant
+        if norm.norm is Norm.RMS:
+            factors = np.sqrt(norm.weights)
+            head = cp.Variable()
+            cone = cp.SOC(head, cp.vec(cp.multiply(factors[:, None], rows), order="C"))
+            return _Cone(constant, head, cone, unit, (k, d), factors)
+        heads = cp.Variable(k) if norm.norm is Norm.SUM else cp.Variable()
+        tops = heads if norm.norm is Norm.SUM else heads * np.ones(k)
+        return _Cone(constant, heads, cp.SOC(tops, rows, axis=1), unit, (k, d), np.ones(k))
+
+    def _number(self, value: Array) -> Any:
+        return cp.Parameter(value.shape, value=value) if self._reusable else cp.Constant(value)
+
+    def solve(self, problem: AffineProblem | None = None) -> ConicSolution:
+        """Solve with the constants and maxima of `problem`, whose slopes must be those built in.
+
+        Raises
+        ------
+        SolverError
+            If the solver stops without telling optimal from infeasible.
+        """
+        if problem is not None:
+            self._take(problem)
+        problem = self._problem if problem is None else problem
+        with warnings.catch_warnings():
+            # an inaccurate answer is judged by its certificate, not by a warning
+            warnings.simplefilter("ignore")
+            try:
+                self._program.solve(solver=cp.CLARABEL, **_TIGHT)
+            except cp.error.SolverError as error:
+                raise SolverError(f"the cone solver gave up ({error})") from None
+        return self._answer(problem)
+
+    def _take(self, problem: AffineProblem) -> None:
+        if not self._reusable:
+            raise ValueError("a program that is not reusable cannot take other constants")
+        for cone, (_, norm) in zip((*self._terms, *self._limits), (*problem.terms, *problem.limits), strict=True):
+            cone.constant.value = norm.constant / cone.unit
+        for most, cone, (maximum, _) in zip(self._maxima, self._limits, problem.limits, strict=True):
+            most.value = maximum / cone.unit
+
+    def _answer(self, problem: AffineProblem) -> ConicSolution:
+        status, stats = self._program.status, self._program.solver_stats
+        seconds, iterations = float(stats.solve_time or 0.0), int(stats.num_iters or 0)
+        if status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
+            return ConicSolution(None, Multipliers((), ()), seconds, iterations)
+        if self._y.value is None:
+            raise SolverError(f"the cone solver stopped with status '{status}'")
+        x = np.asarray(self._y.value) * problem.scales
+        for domain in problem.domains:
+            x[domain.columns] = domain.project(x)
+        terms = tuple(
+            cone.dual_rows(self._unit) / weight for cone, (weight, _) in zip(self._terms, problem.terms, strict=True)
+        )
+        limits = tuple(cone.dual_rows(self._unit) for cone in self._limits)
+        return ConicSolution(x, Multipliers(terms, limits), seconds, iterations)
+
+
+def _value(norm: AffineNorm, cone: _Cone) -> Any:
+    return norm.weights @ cone.heads if norm.norm is Norm.SUM else cone.heads
+
+
+def _reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
+    """A size of these norms that is not zero: at no decisions, or at their largest."""
+    sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
+    sizes += [float(np.abs(norm.slope * problem.scales).max(initial=0.0)) for norm in norms]
+    return max(sizes, default=0.0) or 1.0
+
+
+def _membership(domain: Domain, y: Any) -> list[Any]:
+    """The decision's own set, in units of its largest size (P4)."""
+    if domain.width == 1:
+        return [y >= domain.decision.lower / domain.scale, y <= domain.decision.upper / domain.scale]
+    inside: list[Any] = [cp.SOC(cp.Constant(domain.decision.upper / domain.scale), y)]
+    if len(domain.edges):
+        (ax, ay), (bx, by) = domain.edges
+        inside += [ax * y[1] - ay * y[0] >= 0.0, bx * y[1] - by * y[0] <= 0.0]
+    return inside
+
+
+def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[float]) -> Array:
+    """Among x + still z, the decisions of least weighted size that stay in their sets and under mass limits.
+
+    Parameters
+    ----------
+    problem
+        Domains and limits.
+    x
+        An optimal decision vector.
+    still
+        Shape (n, m): directions that no load can tell apart.
+    weights
+        Of every decision's size.
+    """
+    z = cp.Variable(still.shape[1])
+    scales = problem.scales
+    y = x / scales + (still / scales[:, None]) @ z
+    sizes = [w * d.scale * cp.norm(y[d.columns]) for w, d in zip(weights, problem.domains, strict=True)]
+    held = [c for d in problem.domains for c in _membership(d, y[d.columns])]
+    for maximum, norm in problem.limits:
+        moves = np.einsum("kdn,nm->kdm", norm.slope, still)
+        if np.any(moves != 0.0) and norm.norm is Norm.SUM:
+            k, d = norm.constant.shape
+            rows = norm.rows(x) + cp.reshape(moves.reshape(k * d, -1) @ z, (k, d), order="C")
+            held.append(norm.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
+    program = cp.Problem(cp.Minimize(cp.sum(cp.hstack(sizes))), held)
+    try:
+        program.solve(solver=cp.CLARABEL)
+    except cp.error.SolverError:
+        return x
+    if z.value is None:
+        return x
+    lighter = x + still @ np.asarray(z.value)
+    for domain in problem.domains:
+        lighter[domain.columns] = domain.project(lighter)
+    return np.asarray(lighter)

@@ -1,0 +1,205 @@
+"""Stars, shafts and unbalances in one mixed-integer second-order cone program (S16).
+
+A throw k on step p is a binary Y[k, p]; rows are affine in Y and the unbalances, an
+optional shaft's unbalance is at most its largest times a binary. SCIP solves it; its
+dual bound is read even when it stops early, and its design is evaluated anew by whoever
+asked for it.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import SolverError
+from laufruhe.numerics import mixed_norms
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.physics.star_space import StarSpace
+from laufruhe.solvers.domain import Domain
+from laufruhe.solvers.star_model import StarNorm, StarProblem
+
+Array = NDArray[np.float64]
+
+# what SCIP's own feasibility tolerance may hide of the objective
+TRUST = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramFound:
+    """What SCIP returned; the design in it has to be evaluated anew.
+
+    Attributes
+    ----------
+    star
+        Steps of the throws; None without a feasible point.
+    built
+        Sets of optional shafts that are built.
+    bound
+        Dual bound of the program's own rows, less what tolerances may hide.
+    status
+        SCIP's own word: "optimal", "timelimit", "infeasible" ...
+    seconds
+        Inside SCIP.
+    """
+
+    star: tuple[int, ...] | None
+    built: tuple[int, ...]
+    bound: float
+    status: str
+    seconds: float
+
+
+def solve_program(
+    problem: StarProblem,
+    space: StarSpace,
+    owners: Sequence[int] = (),
+    shaft_counts: Sequence[int] = (),
+    shaft_masses: Sequence[float] = (),
+    most: float = float("inf"),
+    most_mass: float = float("inf"),
+    time_limit: float = 600.0,
+) -> ProgramFound:
+    """Solve the program of every star and set of shafts at once.
+
+    Parameters
+    ----------
+    problem
+        Rows at few samples; where all norms are root mean squares they are exact.
+    space
+        Stars allowed.
+    owners
+        The set of shafts that each decision belongs to, -1 for none.
+    shaft_counts, shaft_masses, most, most_mass
+        Of the sets, and the limits on their sums [kg].
+    time_limit
+        [s].
+
+    Raises
+    ------
+    SolverError
+        If SCIP stops without a feasible point for another reason than that there is none.
+    """
+    if any(norm.turns is not None for _, norm in (*problem.terms, *problem.limits)):
+        raise SolverError("unbalances that are counted from a throw make the program bilinear")
+    steps = cp.Variable((space.throws, space.phases), boolean=True)
+    size = sum(domain.width for domain in problem.domains)
+    scales = np.concatenate([np.full(d.width, d.scale) for d in problem.domains]) if size else np.zeros(0)
+    y = cp.Variable(max(size, 1))
+    built = cp.Variable(max(len(shaft_counts), 1), boolean=True)
+    held = [*_stars(steps, space), *_shafts(built, shaft_counts, shaft_masses, most, most_mass)]
+    held += [
+        c for d, own in zip(problem.domains, owners, strict=True) for c in _membership(d, y[d.columns], built, own)
+    ]
+    if not size:
+        held.append(y == 0.0)
+    unit = max((_reach(norm) for _, norm in problem.terms), default=0.0) or 1.0
+    rows = _Rows(steps, y, scales, size)
+    least = []
+    for weight, norm in problem.terms:
+        value, cones = rows.value(norm, unit)
+        least.append(weight * value)
+        held += cones
+    for maximum, norm in problem.limits:
+        own = _reach(norm) or 1.0
+        value, cones = rows.value(norm, own)
+        held += [*cones, value <= maximum / own]
+    program = cp.Problem(cp.Minimize(sum(least)), held)
+    return _answer(program, steps, built, unit, bool(shaft_counts), time_limit)
+
+
+def _answer(program: Any, steps: Any, built: Any, unit: float, choosing: bool, time_limit: float) -> ProgramFound:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            program.solve(solver=cp.SCIP, scip_params={"limits/time": time_limit, "limits/gap": 1e-7})
+        except cp.error.SolverError as error:
+            raise SolverError(f"SCIP found no feasible point in {time_limit:g} s ({error})") from None
+    stats = program.solver_stats
+    model = stats.extra_stats["model"]
+    status = str(stats.extra_stats["scip_status"])
+    seconds = float(stats.solve_time or 0.0)
+    if status == "infeasible":
+        return ProgramFound(None, (), float("inf"), status, seconds)
+    if steps.value is None:
+        raise SolverError(f"SCIP stopped with status '{status}' and no feasible point")
+    star = tuple(int(p) for p in np.argmax(np.asarray(steps.value), axis=1))
+    chosen = tuple(k for k, on in enumerate(built.value) if on > 0.5) if choosing else ()
+    bound = max(0.0, (float(model.getDualbound()) - TRUST) * unit)
+    return ProgramFound(star, chosen, bound, status, seconds)
+
+
+class _Rows:
+    """Norms of rows that are affine in steps and unbalances."""
+
+    def __init__(self, steps: Any, y: Any, scales: Array, size: int) -> None:
+        self._steps, self._y, self._scales, self._size = cp.vec(steps, order="C"), y, scales, size
+
+    def value(self, norm: StarNorm, unit: float) -> tuple[Any, list[Any]]:
+        """The norm in units of `unit`, and the cones that hold it."""
+        k, d = norm.constant.shape
+        moves = norm.moves.reshape(-1, k * d).T / unit
+        flat = norm.constant.reshape(-1) / unit + moves @ self._steps
+        if self._size:
+            flat = flat + (norm.slope * (self._scales / unit)).reshape(k * d, -1) @ self._y
+        if norm.norm is Norm.RMS:
+            head = cp.Variable()
+            factors = np.repeat(np.sqrt(norm.weights), d)
+            return head, [cp.SOC(head, cp.multiply(factors, flat))]
+        heads = cp.Variable(k) if norm.norm is Norm.SUM else cp.Variable()
+        tops = heads if norm.norm is Norm.SUM else heads * np.ones(k)
+        cones = [cp.SOC(tops, cp.reshape(flat, (k, d), order="C"), axis=1)]
+        return (norm.weights @ heads if norm.norm is Norm.SUM else heads), cones
+
+
+def _stars(steps: Any, space: StarSpace) -> list[Any]:
+    """Every throw on one step, the steps filled as one of the patterns says; images left out (S2)."""
+    patterns = np.array(space.patterns, dtype=float)
+    held = [cp.sum(steps, axis=1) == 1, steps[0, 0] == 1]
+    if len(patterns) == 1:
+        held.append(cp.sum(steps, axis=0) == patterns[0])
+    else:
+        chosen = cp.Variable(len(patterns), boolean=True)
+        held += [cp.sum(chosen) == 1, cp.sum(steps, axis=0) == patterns.T @ chosen]
+    if space.reflect and space.throws > 1:
+        # the star that turns the other way has its last throw on the other side
+        held += [steps[space.throws - 1, p] == 0 for p in range(space.phases // 2 + 1, space.phases)]
+    return held
+
+
+def _shafts(built: Any, counts: Sequence[int], masses: Sequence[float], most: float, most_mass: float) -> list[Any]:
+    if not counts:
+        return [built == 0]
+    held = []
+    if np.isfinite(most):
+        held.append(np.array(counts, dtype=float) @ built <= most)
+    if np.isfinite(most_mass):
+        held.append(np.array(masses) @ built <= most_mass)
+    return held
+
+
+def _membership(domain: Domain, y: Any, built: Any, own: int) -> list[Any]:
+    """The decision's own set, shrunk to nothing where its shaft is not built (S10)."""
+    low, high = domain.decision.lower / domain.scale, domain.decision.upper / domain.scale
+    on = 1.0 if own < 0 else built[own]
+    if domain.width == 1:
+        return [y >= low * on, y <= high * on]
+    inside: list[Any] = [cp.SOC(high * on if own >= 0 else cp.Constant(high), y)]
+    if len(domain.edges):
+        (ax, ay), (bx, by) = domain.edges
+        inside += [ax * y[1] - ay * y[0] >= 0.0, bx * y[1] - by * y[0] <= 0.0]
+    return inside
+
+
+def _reach(norm: StarNorm) -> float:
+    """A size of the norm that is not zero: what one throw, or one unbalance, can make of it."""
+    weights = norm.weights
+    sizes = [mixed_norms.value(norm.norm, weights, norm.constant)]
+    sizes += [mixed_norms.value(norm.norm, weights, rows) for rows in norm.moves.reshape(-1, *norm.constant.shape)]
+    sizes += [mixed_norms.value(norm.norm, weights, norm.slope[..., j]) for j in range(norm.slope.shape[-1])]
+    return max(sizes)

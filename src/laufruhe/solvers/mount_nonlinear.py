@@ -1,0 +1,366 @@
+"""Mounts, and unbalances with them, from many starts; the best judged by the exact model."""
+
+from __future__ import annotations
+
+import cmath
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
+from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.solvers.accuracy import sampling_error
+from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.domain import Domain, domains_of
+from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
+from laufruhe.solvers.mount_program import JointProgram
+from laufruhe.solvers.mount_result import (
+    FEASIBLE,
+    infeasible_mounts,
+    mount_decisions,
+    mount_limits,
+    objective_of,
+)
+from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear, spread_starts
+from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
+from laufruhe.solvers.unbalances import decision_values, solve_unbalances
+
+Array = NDArray[np.float64]
+
+SLACK = 1e-5
+MOST_MARGINS = 3
+# candidates for each start: their modes cost a thousandth of a search
+POOL = 40
+ITERATIONS = 150
+MOST_AROUND = 3
+SPREAD = 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class _Design:
+    """Decisions and what the exact model says of them."""
+
+    mounts: list[float]
+    unbalances: list[complex]
+    evaluation: Evaluation
+    value: float
+    excess: float
+
+
+def solve_joint(problem: Problem, workers: int | None = None) -> Result:
+    """The best local optimum that many starts find (E20-E24).
+
+    Parameters
+    ----------
+    problem
+        On elastic mounts; `mount_design.starts` points are started from.
+    workers
+        Processes; as many as processors when left out.
+
+    Raises
+    ------
+    SolverError
+        If a process of the solver dies.
+    """
+    started = time.perf_counter()
+    initial = evaluate(problem)
+    balanced = _balanced(problem)
+    joint = JointProgram(problem)
+    points = _starts(problem, joint.model.domains, balanced)
+    modelled = time.perf_counter()
+    optima = _searched(problem, joint, points, workers)
+    best, design = _first_allowed(problem, joint, optima)
+    if design is not None and design.excess > FEASIBLE:
+        best, design = _tightened(problem, best, design)
+    timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
+    if best is None or design is None:
+        return _none(problem, joint, initial, optima, timing)
+    proven = _rebalanced(problem, design)
+    design = design if proven is None or proven[0].value >= design.value else proven[0]
+    return _result(problem, joint, initial, design, best, optima, proven, timing)
+
+
+def _searched(
+    problem: Problem, joint: JointProgram, points: Sequence[tuple[list[float], Array]], workers: int | None
+) -> tuple[LocalOptimum, ...]:
+    """Local optima from the points, and from others drawn around the best of them."""
+    starts = [joint.start(mounts, columns) for mounts, columns in points]
+    optima = solve_nonlinear(joint.program, starts, workers, ITERATIONS)
+    around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
+    if not around or len(points) < 2:
+        return optima
+    generator = np.random.default_rng(problem.mount_design.seed)
+    decisions = problem.mount_design.decisions
+    low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+    again = []
+    for k in range(max(len(points) // 2, 1)):
+        x = around[k % len(around)].x
+        mounts = x[: len(low)] + SPREAD * generator.normal(size=len(low)) * np.minimum(
+            high - low, np.abs(x[: len(low)])
+        )
+        columns = x[len(low) : len(low) + joint.columns]
+        again.append(joint.start(np.clip(mounts, low, high).tolist(), columns))
+    more = solve_nonlinear(joint.program, again, workers, ITERATIONS)
+    moved = [replace(optimum, start=optimum.start + len(points)) for optimum in more]
+    return tuple(sorted((*optima, *moved), key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
+
+
+def _balanced(problem: Problem) -> list[complex] | None:
+    """Unbalances that are best on the mounts as given, where that is convex."""
+    if not problem.decisions or not problem.objective:
+        return None
+    result = solve_unbalances(replace(problem, mount_design=NOTHING_ASKED))
+    return _unbalances_of(problem, result) if result.decisions else None
+
+
+def _starts(
+    problem: Problem, domains: Sequence[Domain], balanced: list[complex] | None
+) -> list[tuple[list[float], Array]]:
+    """The design as given, then points spread over all bounds: stiffness by ratio, unbalances in their sets."""
+    design = problem.mount_design
+    decisions = design.decisions
+    ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
+    low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+    given = np.array([d.start for d in decisions])
+    low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
+    wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
+    spread = spread_starts(
+        np.concatenate([low_log, -wide]), np.concatenate([high_log, wide]), POOL * design.starts, design.seed
+    )
+    best = _columns(domains, problem.start if balanced is None else balanced)
+    found = [(given.tolist(), best)]
+    spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
+    spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
+    for k, row in enumerate(_promising(problem, spread, len(low), design.starts - 1)):
+        mounts = row[: len(low)]
+        own = row[len(low) :].copy()
+        for domain in domains:
+            own[domain.columns] = domain.project(own)
+        found.append((mounts.tolist(), own if k % 2 else best))
+    return found
+
+
+def _promising(problem: Problem, pool: Array, count: int, wanted: int) -> Array:
+    """Points of the pool that break the limits on modes and sag least; half of them taken as they come."""
+    limits = [m for m in problem.mount_design.limits if m.quantity.measure is not MountMeasure.TRANSMISSIBILITY]
+    if not limits:
+        return pool[:wanted]
+    bare = replace(evaluate(replace(problem, points=())), loads=())
+    misses = []
+    for row in pool:
+        engine = problem.mount_design.applied(problem.engine, row[:count].tolist())
+        design = replace(bare, engine=engine)
+        misses.append(sum(max(excess(limit, design), 0.0) for limit in limits))
+    best = np.argsort(misses, kind="stable")
+    chosen = list(best[: wanted - wanted // 3])
+    chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
+    return pool[chosen]
+
+
+def _columns(domains: Sequence[Domain], values: Sequence[complex]) -> Array:
+    out = np.zeros(sum(domain.width for domain in domains))
+    for domain, value in zip(domains, values, strict=True):
+        out[domain.columns] = domain.columns_of(value)
+        out[domain.columns] = domain.project(out)
+    return out
+
+
+def _judged(problem: Problem, mounts: list[float], unbalances: list[complex]) -> _Design | None:
+    try:
+        evaluation = evaluate(problem, problem.design(unbalances, mounts))
+    except ModelError:
+        # a resonance without damping is no design
+        return None
+    worst = max((excess(limit, evaluation) for limit in problem.mount_design.limits), default=0.0)
+    loads = [(evaluation.value(limit.quantity), limit.maximum) for limit in problem.limits]
+    worst = max([worst, *((value - most) / (most or 1.0) for value, most in loads)])
+    return _Design(mounts, unbalances, evaluation, whole_objective(problem, evaluation), worst)
+
+
+def _first_allowed(
+    problem: Problem, joint: JointProgram, optima: Sequence[LocalOptimum]
+) -> tuple[LocalOptimum | None, _Design | None]:
+    """The best optimum by the exact model: within limits first, then by value."""
+    found = []
+    for optimum in optima:
+        if optimum.usable:
+            design = _judged(problem, *joint.split(optimum.x))
+            if design is not None:
+                found.append((optimum, design))
+    if not found:
+        return None, None
+    return min(found, key=lambda pair: (max(pair[1].excess, SLACK), pair[1].value))
+
+
+def _tightened(
+    problem: Problem, best: LocalOptimum | None, design: _Design
+) -> tuple[LocalOptimum | None, _Design | None]:
+    """Again with limits a little tighter: a peak between the samples breaks its limit by a little."""
+    margin = 0.0
+    for _ in range(MOST_MARGINS):
+        if best is None or design.excess <= FEASIBLE or design.excess > 0.05:
+            break
+        margin += 1.05 * design.excess
+        joint = JointProgram(problem, margin)
+        again = solve_nonlinear(joint.program, [best.x], workers=1)
+        better, allowed = _first_allowed(problem, joint, again)
+        if better is None or allowed is None:
+            break
+        best, design = better, allowed
+    return best, design
+
+
+def _rebalanced(problem: Problem, design: _Design) -> tuple[_Design, float] | None:
+    """Unbalances decided anew on the mounts found, with proof; None where that is not convex."""
+    if not problem.decisions or not problem.objective or problem.mount_design.terms:
+        return None
+    if any(limit.quantity.unit == "" for limit in problem.mount_design.limits):
+        # transmissibility depends on what excites
+        return None
+    held = problem.mount_design.applied(problem.engine, design.mounts)
+    result = solve_unbalances(replace(problem, engine=held, mount_design=NOTHING_ASKED))
+    if result.certificate is None or result.status is not Status.OPTIMAL:
+        return None
+    values = _unbalances_of(problem, result)
+    judged = _judged(problem, design.mounts, values)
+    return None if judged is None or judged.excess > 10.0 * FEASIBLE else (judged, result.certificate.gap)
+
+
+def _unbalances_of(problem: Problem, result: Result) -> list[complex]:
+    """Complex decisions from the sizes and angles of a result."""
+    found = {decision.name: decision.value for decision in result.decisions}
+    values = []
+    for decision in problem.decisions:
+        angle = found.get(decision.name.rsplit(".", 1)[0] + ".angle", decision.angle[0])
+        values.append(cmath.rect(found[decision.name], angle))
+    return values
+
+
+def _convex_part(problem: Problem) -> Problem | None:
+    """The problem without all that is not convex in the stiffnesses; None where more than these is open."""
+    design = problem.mount_design
+    if not design.decisions or not all(decision.is_stiffness for decision in design.decisions):
+        return None
+    alone = replace(problem, objective=(), decisions=(), limits=())
+    terms = tuple(term for term in design.terms if term[0].measure in CONVEX) or (
+        (MountQuantity(MountMeasure.TOTAL_STIFFNESS), 1.0),
+    )
+    limits = tuple(
+        limit
+        for limit in design.limits
+        if is_convex(replace(alone, mount_design=replace(design, terms=terms, limits=(limit,))))
+    )
+    return replace(alone, mount_design=replace(design, terms=terms, limits=limits))
+
+
+def _proven_conflict(problem: Problem) -> tuple[str, ...]:
+    """Limits that no stiffness within the bounds meets together, where the convex part proves it."""
+    convex = _convex_part(problem)
+    return () if convex is None else solve_convex_mounts(convex).conflict
+
+
+def _bound(problem: Problem) -> float:
+    """What the convex part alone proves of the objective; zero where it says nothing."""
+    convex = _convex_part(problem)
+    if convex is None or problem.objective or convex.mount_design.terms != problem.mount_design.terms:
+        return 0.0
+    certificate = solve_convex_mounts(convex).certificate
+    return certificate.lower_bound if certificate is not None else 0.0
+
+
+def _unbalance_values(problem: Problem, values: Sequence[complex]) -> tuple[DecisionValue, ...]:
+    domains = domains_of(problem.decisions)
+    x = _columns(domains, values)
+    return tuple(entry for domain in domains for entry in decision_values(domain, x, np.zeros_like(x)))
+
+
+def _result(
+    problem: Problem,
+    joint: JointProgram,
+    initial: Evaluation,
+    design: _Design,
+    best: LocalOptimum,
+    optima: Sequence[LocalOptimum],
+    proven: tuple[_Design, float] | None,
+    timing: dict[str, float],
+) -> Result:
+    objective = objective_of(problem, initial, design.evaluation)
+    scale = max(abs(design.value), 1e-3 * abs(objective.initial)) if objective else 1.0
+    bound = _bound(problem)
+    gap = max(design.value - bound, 0.0) / (scale or 1.0)
+    certificate = Certificate(
+        Proof.GLOBAL if gap <= problem.tolerance else Proof.LOCAL, bound, gap, best.kkt_residual,
+        _method(optima, scale, proven),
+    )  # fmt: skip
+    met = design.excess <= 10.0 * FEASIBLE
+    prices = [joint.price(limit.name, best.multipliers) for limit in problem.mount_design.limits]
+    status = Status.FAILED if not met else Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
+    return Result(
+        problem=problem,
+        status=status,
+        objective=objective,
+        certificate=certificate,
+        decisions=(*mount_decisions(problem, design.mounts), *_unbalance_values(problem, design.unbalances)),
+        limits=(*_load_limits(problem, design, joint, best), *mount_limits(problem, design.evaluation, prices)),
+        initial=initial,
+        final=design.evaluation,
+        message="" if met else "the best design found breaks a limit",
+        error_estimate=sampling_error(problem, design.evaluation) if problem.objective else 0.0,
+        timing=timing,
+    )
+
+
+def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design, float] | None) -> str:
+    usable = [o for o in optima if o.usable]
+    apart = distinct(optima, scale)
+    text = f"IPOPT from {len(optima)} starts, {len(usable)} of which ended at "
+    text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
+    if len(apart) > 1 and apart[0].value > 0.0:
+        text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
+    if proven is not None:
+        text += f"; balance on these mounts proven within {proven[1]:.0e}"
+    return text
+
+
+def _load_limits(problem: Problem, design: _Design, joint: JointProgram, best: LocalOptimum) -> tuple[LimitValue, ...]:
+    """How the design stands to limits on loads and masses."""
+    out = []
+    for limit in problem.limits:
+        value = design.evaluation.value(limit.quantity)
+        active = value >= limit.maximum * (1.0 - 1e-4)
+        price = joint.price(limit.name, best.multipliers) if active else 0.0
+        out.append(LimitValue(limit.name, value, limit.maximum, limit.quantity.unit, active, price))
+    return tuple(out)
+
+
+def _none(
+    problem: Problem, joint: JointProgram, initial: Evaluation, optima: Sequence[LocalOptimum], timing: dict[str, float]
+) -> Result:
+    """No start ended at a design within the limits: not a proof, unless the convex limits alone contradict."""
+    conflict = _proven_conflict(problem)
+    result = infeasible_mounts(problem, initial, conflict, timing)
+    if conflict:
+        return result
+    nearest = min(optima, key=lambda o: o.violation)
+    names = _broken(joint, nearest)
+    message = (
+        f"no design found: from {len(optima)} starts none meets {names or 'the limits'} "
+        f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
+    )
+    return replace(result, status=Status.FAILED, message=message)
+
+
+def _broken(joint: JointProgram, optimum: LocalOptimum) -> str:
+    program = joint.program
+    g = optimum.constraints
+    if len(g) != len(program.constraint_names):
+        return ""
+    miss = np.maximum(program.constraint_lower - g, g - program.constraint_upper)
+    names = [program.constraint_names[k] for k in np.flatnonzero(miss > 1e-6)]
+    return " and ".join(f"'{name}'" for name in dict.fromkeys(names) if name != "modes")

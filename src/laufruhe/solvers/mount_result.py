@@ -1,0 +1,116 @@
+"""From decided mounts to a result, judged by the exact model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_values import excess, limit_value, whole_objective
+from laufruhe.solvers.certificate import Certificate
+from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status
+
+Array = NDArray[np.float64]
+
+FEASIBLE = 1e-6
+ACTIVE = 1e-5
+
+
+def mount_objective_name(problem: Problem) -> str:
+    """The objective in words."""
+    parts = [(term.weight, term.quantity.name) for term in problem.objective]
+    parts += [(weight, quantity.name) for quantity, weight in problem.mount_design.terms]
+    if len(parts) == 1 and parts[0][0] == 1.0:
+        return parts[0][1]
+    return " + ".join(f"{weight:g} x {name}" for weight, name in parts)
+
+
+def objective_of(problem: Problem, initial: Evaluation, final: Evaluation) -> ObjectiveValue | None:
+    """The objective of the design and of the one given; None where nothing is minimised."""
+    if problem.objective:
+        unit = problem.objective[0].quantity.unit
+    elif problem.mount_design.terms:
+        unit = problem.mount_design.terms[0][0].unit
+    else:
+        return None
+    value, given = whole_objective(problem, final), whole_objective(problem, initial)
+    return ObjectiveValue(mount_objective_name(problem), value, unit, given)
+
+
+def mount_decisions(
+    problem: Problem, values: Sequence[float], gradient: Array | None = None
+) -> tuple[DecisionValue, ...]:
+    """Decisions about the mounts; the gradient, where known, prices their bounds."""
+    out = []
+    for k, (decision, value) in enumerate(zip(problem.mount_design.decisions, values, strict=True)):
+        reach = ACTIVE * (decision.upper - decision.lower)
+        at_bound = value <= decision.lower + reach or value >= decision.upper - reach
+        price = abs(float(gradient[k])) if gradient is not None and at_bound else 0.0
+        out.append(
+            DecisionValue(decision.name, value, decision.unit, decision.lower, decision.upper, decision.start,
+                          at_bound, price)
+        )  # fmt: skip
+    return tuple(out)
+
+
+def mount_limits(
+    problem: Problem, evaluation: Evaluation, prices: Sequence[float] | None = None
+) -> tuple[LimitValue, ...]:
+    """How a design stands to the limits on mounts and modes (E15)."""
+    out = []
+    prices = [0.0] * len(problem.mount_design.limits) if prices is None else prices
+    for limit, price in zip(problem.mount_design.limits, prices, strict=True):
+        value, edge, side = limit_value(limit, evaluation)
+        active = bool(excess(limit, evaluation) >= -ACTIVE)
+        out.append(LimitValue(limit.name, value, edge, limit.quantity.unit, active, price if active else 0.0, side))
+    return tuple(out)
+
+
+def mount_result(
+    problem: Problem,
+    initial: Evaluation,
+    final: Evaluation,
+    certificate: Certificate,
+    values: Sequence[float],
+    gradient: Array | None,
+    prices: Sequence[float],
+    optimal: bool,
+) -> Result:
+    """A result whose decisions are about mounts alone."""
+    met = all(excess(limit, final) <= FEASIBLE for limit in problem.mount_design.limits)
+    status = Status.FAILED if not met else Status.OPTIMAL if optimal else Status.FEASIBLE
+    return Result(
+        problem=problem,
+        status=status,
+        objective=objective_of(problem, initial, final),
+        certificate=certificate,
+        decisions=mount_decisions(problem, values, gradient),
+        limits=mount_limits(problem, final, prices),
+        initial=initial,
+        final=final,
+        message="" if met else "the design found breaks a limit by more than the solver's tolerance",
+    )
+
+
+def infeasible_mounts(
+    problem: Problem, initial: Evaluation, conflict: tuple[str, ...], timing: dict[str, float]
+) -> Result:
+    """No design exists: which limits cannot be met together."""
+    names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
+    verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
+    return Result(
+        problem=problem,
+        status=Status.INFEASIBLE,
+        objective=None,
+        certificate=None,
+        decisions=(),
+        limits=mount_limits(problem, initial),
+        initial=initial,
+        final=initial,
+        message=f"no design exists: {names} {verb}",
+        conflict=conflict,
+        timing=timing,
+    )

@@ -1,0 +1,134 @@
+"""What a solved or evaluated problem returns."""
+
+from __future__ import annotations
+
+import html
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.model import Problem
+from laufruhe.solvers.certificate import Certificate
+from laufruhe.solvers.ranking import PhasingResult
+
+
+class Status(StrEnum):
+    """How a solve ended."""
+
+    OPTIMAL = "optimal"
+    FEASIBLE = "feasible"
+    INFEASIBLE = "infeasible"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class DecisionValue:
+    """One open number and what was decided of it [SI].
+
+    Attributes
+    ----------
+    shadow_price
+        Fall of the objective per unit by which the bound it stands at is moved.
+    """
+
+    name: str
+    value: float
+    unit: str
+    lower: float
+    upper: float
+    initial: float
+    at_bound: bool
+    shadow_price: float = 0.0
+
+
+@dataclass(frozen=True)
+class LimitValue:
+    """One limit and how the design stands to it [SI].
+
+    Attributes
+    ----------
+    shadow_price
+        Fall of the objective per unit by which the limit is relaxed.
+    side
+        "at most" or "at least".
+    """
+
+    name: str
+    value: float
+    limit: float
+    unit: str
+    active: bool
+    shadow_price: float
+    side: str = "at most"
+
+
+@dataclass(frozen=True)
+class ObjectiveValue:
+    """The objective of the design and of the one given."""
+
+    name: str
+    value: float
+    unit: str
+    initial: float
+
+    @property
+    def reduction(self) -> float:
+        """Share by which the initial value fell."""
+        return 1.0 - self.value / self.initial if self.initial else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A design, what was proven of it, and everything a report shows.
+
+    Attributes
+    ----------
+    problem
+        As it was given.
+    status
+        How the solve ended.
+    objective, certificate, decisions, limits
+        Of the design; None or empty where there is none.
+    initial, final
+        The exact model's evaluation of the design as given and as decided.
+    message
+        Why there is no design, or what the reader should know.
+    conflict
+        Names of limits that no design meets together.
+    error_estimate
+        Relative error of the objective from sampling the cycle.
+    timing
+        Seconds by what they were spent on.
+    phasing
+        Ranking of stars and firing orders, where these were open.
+    """
+
+    problem: Problem
+    status: Status
+    objective: ObjectiveValue | None
+    certificate: Certificate | None
+    decisions: tuple[DecisionValue, ...]
+    limits: tuple[LimitValue, ...]
+    initial: Evaluation
+    final: Evaluation
+    message: str = ""
+    conflict: tuple[str, ...] = ()
+    error_estimate: float = 0.0
+    timing: dict[str, float] = field(default_factory=dict)
+    phasing: PhasingResult | None = None
+
+    def __repr__(self) -> str:
+        lines = [f"<Result {self.problem.name}: {self.status}"]
+        if self.objective is not None:
+            o = self.objective
+            lines.append(f"  {o.name} {o.value:.6g} {o.unit} (as given {o.initial:.6g} {o.unit})")
+        if self.certificate is not None:
+            lines.append(f"  proof {self.certificate.kind}, gap {self.certificate.gap:.1e}")
+        lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in self.decisions]
+        if self.message:
+            lines.append(f"  {self.message}")
+        return "\n".join(lines) + ">"
+
+    def _repr_html_(self) -> str:
+        lines = [html.escape(line.strip()) for line in repr(self).strip("<>").splitlines()]
+        return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"

@@ -1,0 +1,166 @@
+"""Which solver decides the discrete part, and what it proved (S18)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from laufruhe.errors import SolverError
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.model import Problem
+from laufruhe.problem.phasing import Method, Phasing
+from laufruhe.solvers.star_cuts import CutsFound, owners_of, search_designs, solve_design
+from laufruhe.solvers.star_families import Family
+from laufruhe.solvers.star_model import StarModel
+from laufruhe.solvers.star_objective import amplitude_objective
+from laufruhe.solvers.star_search import StarsFound, enumerate_stars, search_stars
+
+MOST_LISTED = 1_000_000
+# looking at every star is as quick as a search up to here
+FEW_STARS = 60_000
+PROGRAM_SAMPLES = 24
+FLOOR = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Decided:
+    """A design that a search returned, before it is evaluated anew."""
+
+    family: Family
+    steps: tuple[int, ...]
+    built: tuple[int, ...]
+    value: float
+    bound: float
+    proven: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Designs, best first, and what no design goes under."""
+
+    designs: tuple[Decided, ...]
+    bound: float
+    complete: bool
+    looked_at: int
+    method: str
+    infeasible: int = 0
+
+
+def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """The best designs of all even stars, by whatever suits objective and size (S18)."""
+    simple = amplitude_objective(problem)
+    if simple is None or any(family.fixed for family in families):
+        return _by_designs(problem, phasing, families)
+    if phasing.method is Method.PROGRAM:
+        return _by_program(problem, phasing, families)
+    answers = []
+    for family in families:
+        own = amplitude_objective(phasing.realise(family.candidate(phasing, family.first))) or simple
+        space = replace(family.space, mirror=True, reflect=True)
+        few = phasing.method is Method.AUTO and space.size <= FEW_STARS
+        if few or phasing.method is Method.ENUMERATION:
+            found = enumerate_stars(space, own, phasing.best)
+            answers.append(_stars_answer(family, found, "every star looked at"))
+        else:
+            found = search_stars(space, own, phasing.best, phasing.time_limit)
+            answers.append(_stars_answer(family, found, "branch and bound over partial stars"))
+    return _joined(answers, phasing.best)
+
+
+def _stars_answer(family: Family, found: StarsFound, method: str) -> Answer:
+    designs = tuple(
+        Decided(family, tuple(int(p) for p in star), (), float(value), float(value), found.complete)
+        for star, value in zip(found.stars, found.values, strict=True)
+    )
+    return Answer(designs, found.lower_bound, found.complete, found.nodes, method)
+
+
+def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """Everything else is decided by cone programs: cuts where the stars can be listed, else the program."""
+    if phasing.method is Method.PROGRAM or sum(family.size for family in families) > MOST_LISTED:
+        return _by_program(problem, phasing, families)
+    floor = FLOOR * objective_value(problem, evaluate(problem))
+    count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
+    answers = []
+    for family in families:
+        model = StarModel(phasing, family.space, family.geometry, family.fixed)
+        found = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, floor)
+        designs = tuple(
+            Decided(family, s.star, s.built, s.value, s.bound, s.value <= found.beyond * (1.0 + problem.tolerance))
+            for s in found.solved
+        )
+        method = f"cone programs of {len(found.solved)} of {found.designs} designs, dual cuts for the others"
+        # what is proven of the best does not need the whole ranking
+        closed = found.complete or _is_closed(found, problem.tolerance, floor)
+        answers.append(Answer(designs, found.lower_bound, closed, len(found.solved), method, found.infeasible))
+    return _joined(answers, phasing.best)
+
+
+def _is_closed(found: CutsFound, tolerance: float, floor: float) -> bool:
+    return bool(found.solved) and found.solved[0].value - found.lower_bound <= tolerance * max(
+        found.solved[0].value, floor
+    )
+
+
+def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """The mixed-integer program by SCIP, its design solved again and bounded by the exact model."""
+    from laufruhe.solvers.mixed_conic import solve_program
+
+    floor = FLOOR * objective_value(problem, evaluate(problem))
+    simple = amplitude_objective(problem) is not None
+    answers = []
+    for family in families:
+        space = replace(family.space, mirror=simple, reflect=simple)
+        model = StarModel(phasing, space, family.geometry, family.fixed)
+        exact = all(term.quantity.norm is Norm.RMS for term in problem.objective) and not problem.limits
+        samples = model.samples if exact else PROGRAM_SAMPLES
+        owners, shafts = owners_of(model), phasing.shafts
+        program = solve_program(
+            model.at(samples), space, owners, [len(names) for names in shafts.optional], shafts.masses,
+            shafts.most, shafts.most_mass, phasing.time_limit,
+        )  # fmt: skip
+        if program.star is None:
+            answers.append(Answer((), math.inf, program.status == "infeasible", 0, "SCIP"))
+            continue
+        again = solve_design(model, program.star, program.built, owners, problem.tolerance, floor)
+        if again is None:
+            raise SolverError("the design that SCIP returned breaks a limit between the angles it was solved at")
+        found, cut = again
+        bound = max(program.bound if exact else 0.0, cut.least(space))
+        done = program.status == "optimal" and found.value - bound <= 2.0 * problem.tolerance * max(found.value, floor)
+        method = f"mixed-integer cone program (SCIP: {program.status}) at {samples} angles, design solved again"
+        design = Decided(family, found.star, found.built, found.value, found.bound, done)
+        answers.append(Answer((design,), bound, done, 1, method))
+    return _joined(answers, phasing.best)
+
+
+def _joined(answers: Sequence[Answer], count: int) -> Answer:
+    """Of several geometries the best designs, equals counted once."""
+    designs = sorted((d for answer in answers for d in answer.designs), key=lambda d: d.value)
+    kept: list[Decided] = []
+    for design in designs:
+        if not any(_equal(design, other) for other in kept):
+            kept.append(design)
+        if len(kept) == count:
+            break
+    return Answer(
+        tuple(kept),
+        min(answer.bound for answer in answers),
+        all(answer.complete for answer in answers),
+        sum(answer.looked_at for answer in answers),
+        answers[0].method,
+        sum(answer.infeasible for answer in answers),
+    )
+
+
+def _equal(a: Decided, b: Decided) -> bool:
+    """Whether one star is an image of the other and is worth the same (S2)."""
+    if a.family is not b.family or a.built != b.built or abs(a.value - b.value) > 1e-6 * max(a.value, b.value):
+        return False
+    space = replace(a.family.space, mirror=True, reflect=True)
+    both = space.canonical(np.array([a.steps, b.steps], dtype=np.uint8))
+    return bool(np.all(both[0] == both[1]))

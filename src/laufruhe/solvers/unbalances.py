@@ -1,0 +1,295 @@
+"""Sizing counterweights and balancer shafts to a proven optimum (P1-P6)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, evaluate, objective_value
+from laufruhe.problem.model import Problem
+from laufruhe.problem.quantity import MASSES
+from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.affine import AffineModel, AffineProblem
+from laufruhe.solvers.certificate import Bound, Certificate, Proof, best_bound, kkt_residual
+from laufruhe.solvers.domain import Domain
+from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status
+
+Array = NDArray[np.float64]
+
+MOST_DOUBLINGS = 4
+MOST_MARGINS = 3
+MOST_ROWS = 60_000
+NEGLIGIBLE = 1e-6
+FEASIBLE = 1e-6
+ACTIVE = 1e-5
+FLOOR = 1e-3
+SAME_LOAD = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class _Optimum:
+    """A design, the bound that meets it, and how far it is from being allowed.
+
+    Attributes
+    ----------
+    problem
+        Rows on the grid that the bound holds on.
+    excess
+        Largest relative excess over a limit, sought between the angles too.
+    """
+
+    x: Array
+    bound: Bound
+    problem: AffineProblem
+    gap: float
+    excess: float
+    samples: int
+
+
+def solve_unbalances(problem: Problem) -> Result:
+    """Global optimum of a problem whose decisions are unbalances.
+
+    Returns
+    -------
+    Result with a certificate computed from the exact model, or with the limits that
+    cannot be met together.
+
+    Raises
+    ------
+    SolverError
+        If the cone solver stops without an answer.
+    """
+    started = time.perf_counter()
+    model = AffineModel(problem)
+    initial = evaluate(problem)
+    modelled = time.perf_counter()
+    optimum = _refine(problem, model, objective_value(problem, initial))
+    solved = time.perf_counter()
+    timing = {"model": modelled - started, "solve": solved - modelled}
+    if optimum is None:
+        return _infeasible(problem, model, initial, timing)
+    values = [domain.complex_value(optimum.x) for domain in model.domains]
+    cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
+    final = evaluate(problem, problem.design(values), cycle_samples)
+    initial = replace(initial, samples=cycle_samples)
+    result = _result(problem, optimum, initial, final)
+    return replace(result, timing={**timing, "evaluate": time.perf_counter() - solved})
+
+
+def _refine(problem: Problem, model: AffineModel, initial: float) -> _Optimum | None:
+    """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6)."""
+    samples, best = model.full_samples, None
+    for _ in range(MOST_DOUBLINGS + 1):
+        found = _allowed(problem, model, samples, initial)
+        if found is None:
+            # fewer angles ask for less: what they cannot meet, all cannot
+            return best
+        best = found
+        rows = len(best.problem.terms[0][1].weights)
+        if (best.gap <= problem.tolerance and best.excess <= FEASIBLE) or rows > MOST_ROWS:
+            break
+        samples *= 2
+    return best
+
+
+def _allowed(problem: Problem, model: AffineModel, samples: int, initial: float) -> _Optimum | None:
+    """An optimum at `samples` angles that keeps its limits between them too.
+
+    A peak between the angles breaks its limit by a little; the next attempt asks for
+    that little less at the angles.
+    """
+    found = _attempt(problem, model, samples, initial, 0.0)
+    margin = 0.0
+    for _ in range(MOST_MARGINS):
+        if found is None or found.excess <= FEASIBLE:
+            break
+        margin += 1.05 * found.excess
+        found = _attempt(problem, model, samples, initial, margin) or found
+    return found
+
+
+def _attempt(problem: Problem, model: AffineModel, samples: int, initial: float, margin: float) -> _Optimum | None:
+    from laufruhe.solvers.conic import ConicProgram
+
+    coarse, fine = model.at(samples), model.at(2 * samples)
+    solution = ConicProgram(_tightened(coarse, margin)).solve()
+    if solution.x is None:
+        return None
+    x = _settled(problem, fine, solution.x)
+    bound = best_bound(fine, coarse, x, solution.multipliers)
+    judge = model.at(PEAK_REFINEMENT * samples) if _has_peaks(problem) else fine
+    value = judge.objective(x)
+    gap = (value - bound.value) / _measure(value, initial)
+    return _Optimum(x, bound, fine, max(gap, 0.0), _excess(judge, x), samples)
+
+
+def _has_peaks(problem: Problem) -> bool:
+    quantities = [term.quantity for term in problem.objective] + [limit.quantity for limit in problem.limits]
+    return any(quantity.norm is Norm.MAXIMUM for quantity in quantities)
+
+
+def _tightened(affine: AffineProblem, margin: float) -> AffineProblem:
+    limits = tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits)
+    return replace(affine, limits=limits) if margin else affine
+
+
+def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
+    """Of designs that no load can tell apart the lightest, what is negligible in it left out."""
+    from laufruhe.solvers.conic import lightest
+
+    still = _indistinguishable(problem, affine)
+    if still.shape[1]:
+        sizes = [sum(abs(drive.gain) for drive in domain.decision.drives) for domain in affine.domains]
+        x = lightest(affine, x, still, sizes)
+    x = x.copy()
+    for domain in affine.domains:
+        part = x[domain.columns]
+        if domain.decision.lower <= 0.0 and float(np.hypot.reduce(part)) <= NEGLIGIBLE * domain.scale:
+            x[domain.columns] = 0.0
+    return x
+
+
+def _excess(affine: AffineProblem, x: Array) -> float:
+    """Largest relative excess over a limit."""
+    return max(((norm.value(x) - maximum) / (maximum or 1.0) for maximum, norm in affine.limits), default=0.0)
+
+
+def _measure(value: float, initial: float) -> float:
+    """What a gap is counted in: a perfectly balanced engine has no objective of its own."""
+    return max(value, FLOOR * initial) or 1.0
+
+
+def _indistinguishable(problem: Problem, affine: AffineProblem) -> Array:
+    """Directions in which no load of the problem changes, shape (n, m); none if a mass is minimised."""
+    if not affine.size or any(term.quantity.subject in MASSES for term in problem.objective):
+        return np.zeros((affine.size, 0))
+    loads = [norm for _, norm in affine.terms]
+    loads += [
+        norm for limit, (_, norm) in zip(problem.limits, affine.limits, strict=True)
+        if limit.quantity.subject not in MASSES
+    ]  # fmt: skip
+    slopes = [(norm.slope * affine.scales).reshape(-1, affine.size) for norm in loads]
+    stacked = np.concatenate([_triangle(flat) for flat in slopes])
+    _, values, rows = np.linalg.svd(stacked, full_matrices=True)
+    small = np.ones(affine.size, dtype=bool)
+    small[: len(values)] = values <= SAME_LOAD * values[0]
+    return np.asarray(rows[small].T * affine.scales[:, None])
+
+
+def _triangle(slope: Array) -> Array:
+    """R of a QR factorisation, scaled: the same directions in as few rows as there are columns."""
+    triangle: Array = np.asarray(np.linalg.qr(slope, mode="r"))
+    return triangle / (float(np.abs(triangle).max()) or 1.0)
+
+
+def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Evaluation) -> Result:
+    value, given = objective_value(problem, final), objective_value(problem, initial)
+    bound = optimum.bound
+    residual = kkt_residual(optimum.problem, optimum.x, bound)
+    certificate = Certificate(
+        kind=Proof.GLOBAL if optimum.gap <= problem.tolerance else Proof.WITHIN_GAP,
+        lower_bound=bound.value,
+        gap=optimum.gap,
+        kkt_residual=residual,
+        method=f"second-order cones at {optimum.samples} angles, dual bound at {optimum.problem.samples}",
+    )
+    prices = bound.multipliers.shadow_prices(optimum.problem)
+    limits = tuple(
+        _limit_value(limit.name, limit.quantity.unit, final.value(limit.quantity), limit.maximum, price, value)
+        for limit, price in zip(problem.limits, prices, strict=True)
+    )
+    feasible = all(limit.value <= limit.limit * (1.0 + 10.0 * FEASIBLE) + 1e-12 for limit in limits)
+    return Result(
+        problem=problem,
+        status=Status.OPTIMAL
+        if feasible and certificate.kind is Proof.GLOBAL
+        else Status.FEASIBLE
+        if feasible
+        else Status.FAILED,
+        objective=ObjectiveValue(objective_name(problem), value, problem.objective[0].quantity.unit, given),
+        certificate=certificate,
+        decisions=tuple(
+            entry for domain in optimum.problem.domains for entry in decision_values(domain, optimum.x, bound.gradient)
+        ),
+        limits=limits,
+        initial=initial,
+        final=final,
+        message="" if feasible else "the design found breaks a limit between the angles it was solved at",
+        error_estimate=error_of(problem, final),
+    )
+
+
+def objective_name(problem: Problem) -> str:
+    """The objective in words."""
+    if len(problem.objective) == 1 and problem.objective[0].weight == 1.0:
+        return problem.objective[0].quantity.name
+    return " + ".join(f"{term.weight:g} x {term.quantity.name}" for term in problem.objective)
+
+
+def _limit_value(name: str, unit: str, value: float, maximum: float, price: float, objective: float) -> LimitValue:
+    active = value >= maximum * (1.0 - ACTIVE)
+    # a price that would not move the objective by its rounding is none
+    felt = active and price * maximum > 1e-7 * objective
+    return LimitValue(name, value, maximum, unit, active, price if felt else 0.0)
+
+
+def decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[DecisionValue, ...]:
+    """Size and, where open, angle of one decision; the gradient prices its bound."""
+    decision = domain.decision
+    size, angle = decision.split(domain.complex_value(x))
+    given_size, given_angle = decision.split(decision.start)
+    reach = domain.scale * ACTIVE
+    high, low = size >= decision.upper - reach, size <= decision.lower + reach
+    slope = gradient[domain.columns]
+    price = float(np.hypot(*slope)) if domain.width == 2 else float(-slope[0] if high else slope[0])
+    at_bound = high or (domain.width == 1 and low)
+    entry = DecisionValue(
+        decision.name, size, decision.unit, decision.lower, decision.upper, given_size, at_bound,
+        max(price, 0.0) if at_bound else 0.0,
+    )  # fmt: skip
+    if decision.fixed_angle:
+        return (entry,)
+    low_angle, high_angle = decision.angle
+    edge = not decision.free_angle and size > reach and min(angle - low_angle, high_angle - angle) < 1e-6
+    name = decision.name.rsplit(".", 1)[0] + ".angle"
+    return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
+
+
+def _infeasible(problem: Problem, model: AffineModel, initial: Evaluation, timing: dict[str, float]) -> Result:
+    conflict = _conflict(model.at(model.full_samples), [limit.name for limit in problem.limits])
+    names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
+    verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
+    return Result(
+        problem=problem,
+        status=Status.INFEASIBLE,
+        objective=None,
+        certificate=None,
+        decisions=(),
+        limits=tuple(
+            LimitValue(limit.name, initial.value(limit.quantity), limit.maximum, limit.quantity.unit, False, 0.0)
+            for limit in problem.limits
+        ),
+        initial=initial,
+        final=initial,
+        message=f"no design exists: {names} {verb}",
+        conflict=conflict,
+        timing=timing,
+    )
+
+
+def _conflict(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:
+    """A smallest set of limits that no design meets together: each is needed for the contradiction."""
+    from laufruhe.solvers.conic import ConicProgram
+
+    kept = list(range(len(affine.limits)))
+    for k in range(len(affine.limits)):
+        without = [j for j in kept if j != k]
+        fewer = replace(affine, terms=(), limits=tuple(affine.limits[j] for j in without))
+        if ConicProgram(fewer).solve().x is None:
+            kept = without
+    return tuple(names[k] for k in kept)

@@ -1,0 +1,273 @@
+"""Throws that leave the even steps within bounded firing intervals (S19-S21).
+
+From every good even star a smooth program seeks a local optimum with its firing order
+kept: intervals are then linear in the angles. The design returned is never worse than
+the even star it started from, because the exact model compares the two.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError, SolverError
+from laufruhe.machine.firing import firing_turns, intervals_of
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.model import Problem
+from laufruhe.problem.phasing import Candidate, Intervals, OrderCriterion, Phasing
+from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.nonlinear import solve_nonlinear
+from laufruhe.solvers.phasing_result import no_result, phase_decisions, solve_fixed
+from laufruhe.solvers.ranking import PhasingResult, RankedStar, TradePoint, ranked_orders, ranked_star
+from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.star_families import families_of
+from laufruhe.solvers.star_objective import amplitude_objective
+from laufruhe.solvers.unbalances import objective_name
+from laufruhe.solvers.uneven_bound import uneven_bound
+from laufruhe.solvers.uneven_model import UnevenModel
+from laufruhe.solvers.uneven_program import UnevenProgram, rides_of
+
+Array = NDArray[np.float64]
+
+STARTS = 6
+FLOOR = 1e-3
+FEASIBLE = 1e-6
+TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
+
+
+@dataclass(frozen=True)
+class Start:
+    """A star and its firing order to start from."""
+
+    candidate: Candidate
+
+
+@dataclass(frozen=True, eq=False)
+class Uneven:
+    """A local optimum, its unbalances solved once more as a convex problem.
+
+    Attributes
+    ----------
+    candidate
+        Throws, order, bank and split pin.
+    result
+        Of the problem with these throws fixed.
+    kkt_residual
+        Of the nonlinear program; zero for a star that was not moved.
+    moved
+        Whether it is better than the star it started from.
+    """
+
+    candidate: Candidate
+    result: Result
+    kkt_residual: float
+    moved: bool
+
+    @property
+    def value(self) -> float:
+        """Objective by the exact model [SI]."""
+        return self.result.objective.value if self.result.objective is not None else math.inf
+
+
+def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
+    """The best of the local optima that the even stars lead to.
+
+    Parameters
+    ----------
+    problem, phasing
+        What is open.
+    even
+        Result of the even stars, ranked; None where none exists or throws have bounds of
+        their own.
+
+    Raises
+    ------
+    SolverError
+        If no start leads anywhere.
+    """
+    starts = _starts(phasing, even)
+    if not starts:
+        return no_result(problem, "no star and firing order to start from keeps the firing intervals allowed")
+    found = [answer for start in starts[:STARTS] if (answer := local_optimum(phasing, start, phasing.intervals))]
+    if not found:
+        raise SolverError("no start of the nonlinear program ended at a design that keeps the limits")
+    found.sort(key=lambda answer: answer.value)
+    trade = _trade(problem, phasing, starts, found) if even is not None else ()
+    return _result(problem, phasing, even, found, trade)
+
+
+def local_optimum(phasing: Phasing, start: Start, intervals: Intervals) -> Uneven | None:
+    """The local optimum that one star leads to; the star itself where nothing is better (S20)."""
+    best = _evaluated(phasing, start.candidate, 0.0, moved=False)
+    if best is not None and not intervals.holds(_intervals(phasing, start.candidate), 1e-7):
+        best = None
+    if intervals.forbid_unevenness and phasing.throw_bounds is None:
+        return best
+    problem = replace(phasing.realise(start.candidate), phasing=None)
+    layout = phasing.layout(start.candidate.bank_angle, start.candidate.split_pin)
+    model = UnevenModel(problem, layout, rides_of(phasing, start.candidate))
+    program = UnevenProgram(phasing, model, start.candidate, intervals, best.result if best is not None else None)
+    if program.is_fixed:
+        return best
+    for optimum in solve_nonlinear(program.nonlinear, program.starts, workers=1, max_seconds=30.0):
+        if not optimum.usable:
+            continue
+        candidate = program.candidate(optimum.x)
+        answer = _evaluated(phasing, candidate, optimum.kkt_residual, moved=True)
+        if answer is None or not intervals.holds(_intervals(phasing, candidate), 1e-7):
+            continue
+        if best is None or answer.value < best.value * (1.0 - 1e-9):
+            best = answer
+    return best
+
+
+def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: bool) -> Uneven | None:
+    """A design by the exact model, its unbalances at their proven optimum; None if it breaks a limit."""
+    try:
+        result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
+    except ModelError:
+        return None
+    limits = result.problem.limits
+    if result.objective is None or result.status in (Status.INFEASIBLE, Status.FAILED):
+        return None
+    if any(result.final.value(limit.quantity) > limit.maximum * (1.0 + FEASIBLE) for limit in limits):
+        return None
+    return Uneven(candidate, result, residual, moved)
+
+
+def _intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...]:
+    layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
+    turns = firing_turns(layout, candidate.throws, candidate.firing_order or ())
+    return intervals_of(phasing.cycle, turns)
+
+
+def _starts(phasing: Phasing, even: Result | None) -> list[Start]:
+    """Designs to start from: the ranked even stars, or the middle of the throws' own bounds."""
+    if even is not None and even.phasing is not None:
+        return [
+            Start(
+                Candidate(s.throws, s.firing_orders[0].order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts))
+            )
+            for s in even.phasing.ranking
+            if s.firing_orders
+        ]
+    out = []
+    free = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
+    for bank in _ends(phasing.bank):
+        for split in _ends(phasing.split):
+            layout = phasing.layout(bank, split)
+            throws = tuple(0.5 * (low + high) for low, high in phasing.throw_bounds or ())
+            if not throws:
+                count = len(layout.throw_positions)
+                throws = tuple(layout.banks[0] - layout.pin_offsets[0] + math.tau * k / count for k in range(count))
+            orders, _ = ranked_orders(free, layout, throws, None)
+            # the order whose intervals are nearest to those allowed
+            orders = tuple(sorted(orders, key=lambda o: _outside(phasing.intervals, o.intervals)))
+            out += [Start(Candidate(throws, o.order, bank, split)) for o in orders[:2]]
+    return out
+
+
+def _outside(allowed: Intervals, intervals: Sequence[float]) -> float:
+    return round(sum(max(allowed.least - i, 0.0) + max(i - allowed.most, 0.0) for i in intervals), 9)
+
+
+def _ends(bounds: tuple[float, float] | None) -> list[float | None]:
+    if bounds is None:
+        return [None]
+    return [bounds[0]] if bounds[0] == bounds[1] else [bounds[0], 0.5 * (bounds[0] + bounds[1]), bounds[1]]
+
+
+def _left_out(phasing: Phasing, shafts: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for names in phasing.shafts.optional for name in names if name not in shafts)
+
+
+def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> float:
+    """What no design with these intervals goes under, zero where no more is known (S22)."""
+    objective = amplitude_objective(problem)
+    families, _ = families_of(phasing)
+    if objective is None or phasing.throw_bounds is not None or len(families) != 1 or families[0].fixed is not None:
+        return 0.0
+    return uneven_bound(phasing, families[0].space, objective, intervals)
+
+
+def _trade(
+    problem: Problem, phasing: Phasing, starts: Sequence[Start], found: Sequence[Uneven]
+) -> tuple[TradePoint, ...]:
+    """The least objective found for less and less unevenness; never worse for more of it."""
+    even = phasing.even_interval
+    allowed = max(even - phasing.intervals.least, phasing.intervals.most - even)
+    if not math.isfinite(allowed):
+        return ()
+    out: list[TradePoint] = []
+    for share in TRADE_STEPS:
+        low = even - share * (even - phasing.intervals.least)
+        high = even + share * (phasing.intervals.most - even)
+        answers = (
+            list(found)
+            if share == 1.0
+            else [answer for s in starts[:3] if (answer := local_optimum(phasing, s, Intervals(low, high))) is not None]
+        )
+        if not answers:
+            continue
+        best = min(answers, key=lambda answer: answer.value)
+        bound = _bound(problem, phasing, Intervals(low, high))
+        if out and out[-1].value < best.value:
+            out.append(replace(out[-1], allowed=share * allowed, lower_bound=bound))
+            continue
+        intervals = _intervals(phasing, best.candidate)
+        deviation = max(abs(i - even) for i in intervals)
+        deviation = deviation if deviation > 1e-9 else 0.0
+        out.append(TradePoint(share * allowed, deviation, best.value, best.candidate.throws, best.kkt_residual, bound))
+    return tuple(out)
+
+
+def _result(
+    problem: Problem, phasing: Phasing, even: Result | None, found: Sequence[Uneven], trade: tuple[TradePoint, ...]
+) -> Result:
+    best = found[0]
+    layout = phasing.layout(best.candidate.bank_angle, best.candidate.split_pin)
+    given = even.initial if even is not None else evaluate(problem)
+    initial = objective_value(problem, given)
+    measure = max(best.value, FLOOR * initial) or 1.0
+    bound = min(_bound(problem, phasing, phasing.intervals), best.value)
+    # no norm lies under zero: who reaches it is done
+    gap = (best.value - bound) / measure
+    proven = gap <= problem.tolerance
+    shafts = [n for names in phasing.shafts.optional for n in names if n not in best.candidate.left_out]
+    method = f"IPOPT from {len(found)} star(s), firing orders kept; bound from windows around the even steps"
+    certificate = Certificate(Proof.GLOBAL if proven else Proof.LOCAL, bound, gap, best.kkt_residual, method)
+    details = PhasingResult(
+        ranking=tuple(_entry(phasing, answer) for answer in found),
+        places=layout.throw_positions,
+        banks=layout.banks,
+        designs=even.phasing.designs if even is not None and even.phasing is not None else len(found),
+        looked_at=len(found),
+        method=method,
+        trade=trade,
+        even_value=even.objective.value if even is not None and even.objective is not None else None,
+    )
+    result = best.result
+    return replace(
+        result,
+        problem=replace(result.problem, phasing=phasing),
+        status=Status.OPTIMAL if proven else Status.FEASIBLE,
+        objective=ObjectiveValue(objective_name(problem), best.value, problem.objective[0].quantity.unit, initial),
+        certificate=certificate,
+        decisions=(*phase_decisions(problem, phasing, best.candidate, shafts), *result.decisions),
+        initial=replace(given, samples=result.final.samples),
+        phasing=details,
+    )
+
+
+def _entry(phasing: Phasing, answer: Uneven) -> RankedStar:
+    c = answer.candidate
+    layout = phasing.layout(c.bank_angle, c.split_pin)
+    only = replace(phasing, firing_order=c.firing_order)
+    shafts = tuple(n for names in phasing.shafts.optional for n in names if n not in c.left_out)
+    return ranked_star(
+        only, layout, c.throws, None, answer.value, 0.0, False, shafts, (c.bank_angle, c.split_pin)
+    )  # fmt: skip

@@ -1,0 +1,227 @@
+"""Loads of throws at any angles as smooth expressions, with coefficients from the exact model (S19).
+
+A slider-crank's wrench of order h is its own coefficient times e^{i h (theta + o - beta)}
+along its axis; a rotor that rides on a throw turns with it. Everything that turns
+the same way whatever the throws do is a number from the exact model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
+from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.physics.mounting import mount_maps, mounting_of
+from laufruhe.physics.shaking_loads import inertia_coefficients, rotor_wrench
+from laufruhe.problem.model import Problem
+from laufruhe.problem.quantity import MASSES, Quantity, Subject, counted_rotors, radius_of
+from laufruhe.solvers.domain import Domain, domains_of
+from laufruhe.solvers.nonlinear import softened_lengths
+
+Array = NDArray[np.float64]
+
+SAMPLES = 72
+NEGLIGIBLE = 1e-9
+_PARTS = {Subject.SHAKING_FORCE: slice(0, 3), Subject.ROLL_MOMENT: slice(3, 4), Subject.ROCKING_COUPLE: slice(4, 6)}
+
+
+@dataclass(frozen=True, eq=False)
+class Symbols:
+    """Variables of the program.
+
+    Attributes
+    ----------
+    throws
+        Angle of every throw [rad], the first given by cylinder 1's dead centre.
+    bank, split
+        Bank angle and split pin [rad], symbols or numbers.
+    unbalances
+        Columns of the unbalance decisions.
+    """
+
+    throws: Sequence[Any]
+    bank: Any
+    split: Any
+    unbalances: Any
+
+
+class UnevenModel:
+    """Smooth norms of a problem over throws, bank, split pin and unbalances.
+
+    Parameters
+    ----------
+    problem
+        Of the star that the program starts from, without gas.
+    layout
+        Of that star.
+    rides
+        Throw that every rotor turns with; rotors left out stand still beside the throws.
+    """
+
+    def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
+        self.problem, self.layout, self.rides = problem, layout, rides
+        self.domains: tuple[Domain, ...] = domains_of(problem.decisions)
+        self._mounting = mounting_of(problem.engine)
+        self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
+
+    def squares(self, quantity: Quantity, at: Symbols) -> Any:
+        """Squares that must all stay under that of a limit: smooth even where the quantity is zero."""
+        if quantity.subject in MASSES or quantity.norm is Norm.SUM:
+            return None
+        if quantity.norm is Norm.RMS:
+            return self._mean_square(quantity, at)
+        signals = [self._signal(quantity, point.speed, at) for point in self._points(quantity)]
+        rows = [_rows([(h, mounts[m]) for h, mounts in s]) for s in signals for m in range(len(s[0][1]))]
+        return ca.vertcat(*(ca.sum2(row * row) for row in rows))
+
+    def _points(self, quantity: Quantity) -> list[OperatingPoint]:
+        return [p for p in self.problem.points if quantity.points is None or p.name in quantity.points]
+
+    def _mean_square(self, quantity: Quantity, at: Symbols) -> Any:
+        """By Parseval: no angles are needed."""
+        chosen = self._points(quantity)
+        whole = sum(point.weight for point in chosen)
+        total = 0.0
+        for point in chosen:
+            for h, mounts in self._signal(quantity, point.speed, at):
+                half = 1.0 if h == 0.0 else 0.5
+                total = total + point.weight / whole * half * sum(ca.sumsqr(c) for c in mounts) / len(mounts)
+        return total
+
+    def norm(self, quantity: Quantity, at: Symbols, softness: Any) -> Any:
+        """A quantity as one smooth expression; `softness` in its own unit (N3)."""
+        if quantity.subject in MASSES:
+            rows = [self._unbalance(r, at) / radius_of(r) for r in counted_rotors(quantity, self.problem.engine.rotors)]
+            return ca.sum1(softened_lengths(ca.vertcat(*(row.T for row in rows)), softness))
+        if quantity.norm is Norm.RMS:
+            return ca.sqrt(self._mean_square(quantity, at) + softness**2) - softness
+        chosen = self._points(quantity)
+        whole = sum(point.weight for point in chosen)
+        parts = [(point.weight / whole, self._signal(quantity, point.speed, at)) for point in chosen]
+        lengths = [
+            (share, softened_lengths(_rows([(h, mounts[m]) for h, mounts in signal]), softness))
+            for share, signal in parts
+            for m in range(len(signal[0][1]))
+        ]
+        if quantity.norm is Norm.SUM:
+            return sum(share * ca.sum1(v) / v.numel() for share, v in lengths) / len(parts[0][1][0][1])
+        # the largest of many, smooth from above by less than the softness times their logarithm
+        stacked = ca.vertcat(*(v for _, v in lengths))
+        top = ca.mmax(stacked)
+        return top + softness * ca.log(ca.sum1(ca.exp((stacked - top) / softness)))
+
+    def _signal(self, quantity: Quantity, speed: float, at: Symbols) -> list[tuple[float, list[Any]]]:
+        """Per order, the vectors (re, im), shape (d, 2), of each mount or of the block."""
+        out = []
+        for h, wrench in sorted(self._wrench(speed, at).items()):
+            if quantity.orders is not None and h not in quantity.orders:
+                continue
+            if quantity.subject is not Subject.MOUNT_FORCE:
+                out.append((h, [wrench[_PARTS[quantity.subject], :]]))
+                continue
+            if self._mounting is None:
+                raise ValueError("an engine without mounts has no mount forces")
+            weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
+            names = [mount.name for mount in self.problem.engine.mounts]
+            every = mount_maps(self._mounting, h, speed)
+            maps = [
+                weights @ every[k] for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts
+            ]
+            turned = ca.horzcat(-wrench[:, 1], wrench[:, 0])
+            out.append((h, [ca.DM(m.real) @ wrench + ca.DM(m.imag) @ turned for m in maps]))
+        return out or [(1.0, [ca.DM.zeros(1, 2)])]
+
+    def _wrench(self, speed: float, at: Symbols) -> dict[float, Any]:
+        """Wrench coefficients (re, im) by order, shape (6, 2)."""
+        total: dict[float, Any] = {}
+        for k, part in enumerate(self.problem.engine.slider_cranks):
+            for h, wrench in self._cylinder(k, part, speed, at):
+                total[h] = total.get(h, 0.0) + wrench
+        for rotor in self.problem.engine.rotors:
+            order = abs(rotor.shaft.ratio)
+            real, imaginary = (rotor_wrench(replace(rotor, unbalance=u), speed) for u in (1.0, 1.0j))
+            u = self._unbalance(rotor, at)
+            rows = _columns(real) @ u[0] + _columns(imaginary) @ u[1]
+            total[order] = total.get(order, 0.0) + rows
+        return total
+
+    def _cylinder(self, k: int, part: SliderCrank, speed: float, at: Symbols) -> list[tuple[float, Any]]:
+        pin = self.layout.pins[k]
+        side = 0.5 if 2 * k < len(self.layout.pins) else -0.5
+        bank = side * at.bank if at.bank is not None else part.bank
+        offset = -side * at.split if at.split is not None else self.layout.pin_offsets[k]
+        axial, roll = inertia_coefficients(part, speed, self.problem.fidelity)
+        star = at.throws[pin] + offset - bank
+        size = np.abs(axial).max() + np.abs(roll).max() / part.crank_radius
+        zero = ca.DM.zeros(1, 2)
+        out = []
+        for h in range(1, len(axial)):
+            if abs(axial[h]) <= NEGLIGIBLE * size and abs(roll[h]) <= NEGLIGIBLE * size * part.crank_radius:
+                continue
+            force, moment = _times(axial[h], h * star), _times(roll[h], h * star)
+            lateral, vertical = force * ca.sin(bank), force * ca.cos(bank)
+            out.append((float(h), ca.vertcat(zero, lateral, vertical, moment, -part.x * vertical, part.x * lateral)))
+        if part.rotating_mass > 0.0:
+            mass = part.rotating_mass * part.crank_radius
+            pair = (rotor_wrench(Rotor("pin", part.x, u * mass, part.shaft), speed) for u in (1.0, 1.0j))
+            real, imaginary = (_columns(wrench) for wrench in pair)
+            angle = at.throws[pin] + offset
+            out.append((abs(part.shaft.ratio), real * ca.cos(angle) + imaginary * ca.sin(angle)))
+        return out
+
+    def _unbalance(self, rotor: Rotor, at: Symbols) -> Any:
+        """U of a rotor as (re, im), turned with the throw that it rides on."""
+        real: Any = rotor.unbalance.real
+        imaginary: Any = rotor.unbalance.imag
+        for domain in self.domains:
+            for drive in domain.decision.drives:
+                if drive.rotor != rotor.name:
+                    continue
+                columns = at.unbalances[domain.columns]
+                for j, direction in enumerate(domain.directions):
+                    d = drive.gain * (direction.conjugate() if drive.mirrored else direction)
+                    real = real + d.real * columns[j]
+                    imaginary = imaginary + d.imag * columns[j]
+                # the rotor stands at the decision's start in the design as given
+                start = domain.decision.start
+                given = drive.gain * (start.conjugate() if drive.mirrored else start)
+                real, imaginary = real - given.real, imaginary - given.imag
+        if rotor.name not in self.rides:
+            return ca.vertcat(real, imaginary)
+        pin = self.rides[rotor.name]
+        turn = at.throws[pin] - self._start[pin]
+        cosine, sine = ca.cos(turn), ca.sin(turn)
+        return ca.vertcat(cosine * real - sine * imaginary, sine * real + cosine * imaginary)
+
+
+def _throw_of(parts: Sequence[SliderCrank], layout: Layout, pin: int) -> float:
+    k = layout.pins.index(pin)
+    return parts[k].throw - layout.pin_offsets[k]
+
+
+def _times(coefficient: complex, angle: Any) -> Any:
+    """c e^{i angle} as a row (re, im)."""
+    cosine, sine = ca.cos(angle), ca.sin(angle)
+    a, b = float(coefficient.real), float(coefficient.imag)
+    return ca.horzcat(a * cosine - b * sine, a * sine + b * cosine)
+
+
+def _columns(wrench: NDArray[np.complex128]) -> Any:
+    return ca.DM(np.stack([wrench.real, wrench.imag], axis=1))
+
+
+def _rows(signal: Sequence[tuple[float, Any]]) -> Any:
+    """Values at equal steps of two turns, shape (samples, d)."""
+    angles = 4.0 * np.pi * np.arange(2 * SAMPLES) / (2 * SAMPLES)
+    total = 0.0
+    for h, c in signal:
+        waves = np.stack([np.cos(h * angles), -np.sin(h * angles)], axis=1)
+        total = total + ca.DM(waves) @ c.T
+    return total

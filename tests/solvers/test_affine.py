@@ -1,0 +1,177 @@
+"""Rows affine in the decisions against rows of the exact model, at random decisions."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.mixed_norms import Norm, lengths
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.model import Drive, Limit, Problem, Term, UnbalanceDecision
+from laufruhe.problem.quantity import MASSES, Quantity, Subject
+from laufruhe.solvers.affine import AffineModel, AffineProblem
+from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
+
+# travel needs elastic mounts, and is tested with them
+LOADS = tuple(subject for subject in Subject if subject not in (*MASSES, Subject.MOUNT_TRAVEL))
+HALF_ORDERS = Quantity(Subject.ROLL_MOMENT, Norm.RMS, orders=(0.5, 1.5), points=("slow",))
+QUANTITIES = (
+    *(Quantity(subject, norm) for subject in LOADS for norm in Norm),
+    *(Quantity(subject, Norm.SUM) for subject in MASSES),
+    Quantity(Subject.ADDED_MASS, Norm.SUM, rotors=("rear", "left")),
+    Quantity(Subject.MOUNT_FORCE, Norm.SUM, mounts=("rear left", "front right")),
+    Quantity(Subject.MOUNT_FORCE, Norm.RMS, direction_weights=(1.0, 1.0, 0.5)),
+    Quantity(Subject.MOUNT_FORCE, Norm.SUM, orders=(1.0,)),
+    Quantity(Subject.SHAKING_FORCE, Norm.MAXIMUM, orders=(2.0, 4.0)),
+    HALF_ORDERS,
+    Quantity(Subject.MOUNT_FORCE, Norm.SUM, points=("motored",)),
+    Quantity(Subject.ROCKING_COUPLE, Norm.SUM, points=("rated", "motored")),
+)
+
+
+@lru_cache(maxsize=2)
+def scene(cylinders: int) -> Problem:
+    """Decisions of every kind, started off zero, on three operating points of different weight and load."""
+    rotors = [
+        shaft_rotor("left", 2, 0.25, 0.1, -0.1),
+        shaft_rotor("right", -2, 0.2, -0.1, -0.1),
+        shaft_rotor("slow shaft", -1, -0.1, 0.05, 0.02),
+        web("front", 0.2),
+        web("rear", -0.2),
+    ]
+    starts = {"left": cmath.rect(0.004, 0.5), "slow shaft": cmath.rect(-0.003, 0.7), "front": cmath.rect(0.01, 2.0)}
+    decisions = (
+        UnbalanceDecision(
+            "pair", "kg m", 0.0, 0.02, (0.0, math.tau), starts["left"],
+            (Drive("left", 1.0), Drive("right", -1.0, mirrored=True)),
+        ),
+        UnbalanceDecision(
+            "shaft", "kg m", -0.01, 0.01, (0.7, 0.7), starts["slow shaft"], (Drive("slow shaft", 1.0),),
+        ),
+        UnbalanceDecision(
+            "webs", "kg", 0.0, 0.5, (1.0, 2.5), starts["front"] / 0.08,
+            (Drive("front", 0.08j), Drive("rear", -0.08, mirrored=True)),
+        ),
+    )  # fmt: skip
+    given_so = {rotor.name: 0j for rotor in rotors}
+    for decision in decisions:
+        for drive in decision.drives:
+            given_so[drive.rotor] += drive.gain * (decision.start.conjugate() if drive.mirrored else decision.start)
+    # a part of one rotor is not decided on
+    given_so["rear"] += 0.002 - 0.001j
+    machine = engine(
+        [0.0, 180.0, 180.0, 0.0][:cylinders],
+        [replace(rotor, unbalance=given_so[rotor.name]) for rotor in rotors],
+        firing_order=[1, 3, 4, 2] if cylinders == 4 else [1, 2],
+    )
+    points = (
+        OperatingPoint("rated", SPEED, GAS),
+        OperatingPoint("slow", 0.4 * SPEED, replace(GAS, imep=5e5), weight=3.0),
+        OperatingPoint("motored", 0.8 * SPEED, None, weight=0.5),
+    )
+    return replace(
+        problem(machine, [], objective=[Term(q) for q in QUANTITIES]),
+        points=points,
+        decisions=decisions,
+        fidelity=replace(TWO_ORDER, kinematics="exact", samples=96),
+    )
+
+
+@lru_cache(maxsize=2)
+def model(cylinders: int) -> AffineModel:
+    return AffineModel(scene(cylinders))
+
+
+@lru_cache(maxsize=8)
+def at(cylinders: int, samples: int) -> AffineProblem:
+    return model(cylinders).at(samples)
+
+
+COLUMNS = st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5).map(np.array)
+
+
+@pytest.mark.parametrize(("cylinders", "samples"), [(4, 24), (4, 25), (4, 48), (2, 24), (2, 49)])
+@settings(max_examples=12)
+@given(x=COLUMNS)
+def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.ndarray) -> None:
+    """V0 + B x of every kind of quantity, row by row, is what evaluating the design gives, period by period."""
+    p, m, affine = scene(cylinders), model(cylinders), at(cylinders, samples)
+    periods = int(m.base / p.engine.cycle.base_order)
+    x = x * affine.scales
+    exact = evaluate(p, p.design([d.complex_value(x) for d in m.domains]), samples * periods)
+    for quantity, (_, norm) in zip(QUANTITIES, affine.terms, strict=True):
+        expected, found = exact.rows(quantity), norm.rows(x)
+        size = float(
+            np.abs(expected.vectors).max() + np.abs(norm.constant).max() + np.abs(norm.slope @ affine.scales).max()
+        )
+        again = 1 if quantity.subject in MASSES else periods
+        whole = expected.vectors.reshape(
+            -1, again, len(norm.weights) if again == 1 else samples, expected.vectors.shape[1]
+        )
+        for k in range(again):
+            one = whole[:, k].reshape(len(found), -1)
+            np.testing.assert_allclose(lengths(found), lengths(one), rtol=0.0, atol=1e-12 * size)
+            # components that are always zero are left out, the others keep their order
+            used = one.any(axis=0)
+            if used.sum() == found.shape[1]:
+                np.testing.assert_allclose(found, one[:, used], rtol=0.0, atol=1e-12 * size)
+        assert norm.weights.sum() == pytest.approx(expected.weights.sum(), rel=1e-12)
+        assert norm.value(x) == pytest.approx(expected.value, rel=1e-11, abs=1e-11 * size)
+
+
+def test_the_scenes_test_what_they_should() -> None:
+    """Four cylinders repeat every turn; two that fire unevenly have half orders and the whole cycle as period."""
+    assert (model(4).base, model(2).base) == (1, 0.5)
+    half = QUANTITIES.index(HALF_ORDERS)
+    assert at(2, 24).terms[half][1].value(np.zeros(5)) > 10.0
+    assert at(4, 24).terms[half][1].value(np.zeros(5)) == 0.0
+    # every decision moves every load that it can
+    for norm in (norm for _, norm in at(2, 24).terms[:3]):
+        assert norm.slope.any(axis=(0, 1)).all()
+
+
+def test_objective_and_limits_keep_their_weights() -> None:
+    p = scene(4)
+    weighted = replace(
+        p,
+        objective=(Term(QUANTITIES[0], 2.0), Term(QUANTITIES[3], 0.25)),
+        limits=(Limit("mass", Quantity(Subject.BALANCER_MASS, Norm.SUM), 1.5),),
+    )
+    affine = AffineModel(weighted).at(24)
+    x = 0.3 * affine.scales
+    parts = [norm.value(x) for _, norm in at(4, 24).terms]
+    assert affine.objective(x) == pytest.approx(2.0 * parts[0] + 0.25 * parts[3], rel=1e-12)
+    assert [maximum for maximum, _ in affine.limits] == [1.5]
+
+
+def test_rows_cover_one_period_and_no_more() -> None:
+    """Without half orders and without first orders half a turn is enough; gas of one cylinder needs two."""
+    flat = engine([0.0, 180.0, 180.0, 0.0], [shaft_rotor("left", 2, 0.0)], firing_order=[1, 3, 4, 2])
+    with_shaft = problem(flat, ["left"])
+    assert AffineModel(with_shaft).base == 2
+    assert AffineModel(with_shaft).full_samples == TWO_ORDER.samples // 4
+    single = engine([0.0], [shaft_rotor("left", 2, 0.0)])
+    assert AffineModel(problem(single, ["left"], GAS)).base == 0.5
+
+
+def test_a_decision_lengthens_the_period() -> None:
+    """A shaft of first order under an engine of second order: its order counts before it has an unbalance."""
+    flat = engine([0.0, 180.0, 180.0, 0.0], [shaft_rotor("left", -1, 0.0)], firing_order=[1, 3, 4, 2])
+    assert AffineModel(problem(flat, ["left"])).base == 1
+
+
+def test_nothing_to_decide() -> None:
+    flat = engine([0.0, 180.0, 180.0, 0.0], firing_order=[1, 3, 4, 2])
+    p = problem(flat, [])
+    affine = AffineModel(p).at(96)
+    assert affine.size == 0
+    exact = evaluate(p, samples=96 * 4).value(p.objective[0].quantity)
+    assert affine.objective(np.zeros(0)) == pytest.approx(exact, rel=1e-12)

@@ -1,0 +1,183 @@
+"""Lower bounds hold whatever multipliers a solver proposes; proofs of zero and of nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from laufruhe.numerics import mixed_norms
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.problem.model import UnbalanceDecision
+from laufruhe.solvers.affine import AffineNorm, AffineProblem
+from laufruhe.solvers.certificate import Multipliers, best_bound, kkt_residual, lower_bound
+from laufruhe.solvers.domain import Domain, domains_of
+
+Array = NDArray[np.float64]
+SEEDS = st.integers(0, 2**32 - 1)
+NORMS = tuple(Norm)
+
+
+def random_norm(rng: np.random.Generator, size: int) -> AffineNorm:
+    rows, width = int(rng.integers(1, 9)), int(rng.integers(1, 4))
+    norm = NORMS[int(rng.integers(3))]
+    weights = rng.random(rows) + 0.01
+    slope = rng.standard_normal((rows, width, size)) * (rng.random(size) < 0.8)
+    return AffineNorm(norm, rng.standard_normal((rows, width)), slope, weights / weights.sum())
+
+
+def random_domains(rng: np.random.Generator) -> tuple[Domain, ...]:
+    decisions = []
+    for k in range(int(rng.integers(1, 4))):
+        low, kind = float(rng.uniform(-4, 4)), int(rng.integers(3))
+        width = (0.0, math.tau, float(rng.uniform(0.1, math.pi)))[kind]
+        lower = float(rng.uniform(-2, 1)) if kind == 0 else 0.0
+        upper = max(lower, 0.0) + float(rng.uniform(0.1, 3))
+        decisions.append(UnbalanceDecision(f"d{k}", "kg m", lower, upper, (low, low + width), 0j, ()))
+    return domains_of(tuple(decisions))
+
+
+def random_point(rng: np.random.Generator, problem: AffineProblem) -> Array:
+    x = rng.standard_normal(problem.size) * 2.0 * problem.scales
+    for domain in problem.domains:
+        x[domain.columns] = domain.project(x)
+    return x
+
+
+def random_problem(rng: np.random.Generator) -> tuple[AffineProblem, Array]:
+    """A problem and a design that keeps its limits, some of them just so."""
+    domains = random_domains(rng)
+    size = sum(domain.width for domain in domains)
+    terms = tuple((float(rng.uniform(0.1, 3)), random_norm(rng, size)) for _ in range(int(rng.integers(1, 4))))
+    open_problem = AffineProblem(terms, (), domains, 1)
+    x = random_point(rng, open_problem)
+    limits = tuple(
+        (norm.value(x) * (1.0 + float(rng.choice([0.0, 0.3]))), norm)
+        for norm in (random_norm(rng, size) for _ in range(int(rng.integers(0, 3))))
+    )
+    return replace(open_problem, limits=limits), x
+
+
+def random_multipliers(rng: np.random.Generator, problem: AffineProblem, x: Array) -> Multipliers:
+    """Anything at all, or something near what a solver would say."""
+
+    def rows(norm: AffineNorm) -> Array:
+        own = mixed_norms.subgradient(norm.norm, norm.weights, norm.rows(x))
+        noise = rng.standard_normal(norm.constant.shape)
+        return np.asarray(rng.choice([0.0, 1.0]) * own + 10.0 ** rng.uniform(-8, 3) * rng.choice([0.0, 1.0]) * noise)
+
+    return Multipliers(
+        tuple(rows(norm) for _, norm in problem.terms),
+        tuple(10.0 ** rng.uniform(-4, 2) * rows(norm) for _, norm in problem.limits),
+    )
+
+
+class TestBound:
+    @given(SEEDS)
+    def test_holds_for_any_multipliers(self, seed: int) -> None:
+        """No allowed design lies below a bound, be the multipliers as wrong as they like (P4)."""
+        rng = np.random.default_rng(seed)
+        problem, allowed = random_problem(rng)
+        designs = [allowed]
+        for _ in range(30):
+            x = random_point(rng, problem)
+            if all(norm.value(x) <= maximum for maximum, norm in problem.limits):
+                designs.append(x)
+        for _ in range(5):
+            bound = lower_bound(problem, random_multipliers(rng, problem, designs[-1]))
+            for x in designs:
+                value = problem.objective(x)
+                assert bound.value <= value + 1e-9 * (1.0 + value + np.abs(bound.gradient).sum())
+
+    @given(SEEDS)
+    def test_is_affine_minorant_everywhere(self, seed: int) -> None:
+        """Its value is the least of a plane that lies under the objective, found here on random designs."""
+        rng = np.random.default_rng(seed)
+        problem, x = random_problem(rng)
+        unlimited = replace(problem, limits=())
+        bound = lower_bound(unlimited, random_multipliers(rng, unlimited, x))
+        constant = sum(
+            weight * float((z * norm.constant).sum())
+            for (weight, norm), z in zip(unlimited.terms, bound.multipliers.terms, strict=True)
+        )
+        for _ in range(20):
+            y = random_point(rng, unlimited)
+            plane = constant + float(bound.gradient @ y)
+            assert plane <= unlimited.objective(y) + 1e-10 * (1.0 + abs(plane))
+            assert bound.value <= max(plane, 0.0) + 1e-10 * (1.0 + abs(plane))
+
+    def test_is_tight_where_it_can_be(self) -> None:
+        """|x - 1| on [2, 3]: the bound is 1, the objective at 2, and nothing more is to be won."""
+        norm = AffineNorm(Norm.SUM, np.array([[-1.0]]), np.array([[[1.0]]]), np.array([1.0]))
+        domains = domains_of((UnbalanceDecision("d", "kg m", 2.0, 3.0, (0.0, 0.0), 0j, ()),))
+        problem = AffineProblem(((1.0, norm),), (), domains, 1)
+        bound = lower_bound(problem, Multipliers((np.array([[1.0]]),), ()))
+        assert bound.value == problem.objective(np.array([2.0])) == 1.0
+        assert kkt_residual(problem, np.array([2.0]), bound) == 0.0
+        assert kkt_residual(problem, np.array([2.5]), bound) > 0.1
+        opposite = lower_bound(problem, Multipliers((np.array([[-1.0]]),), ()))
+        assert opposite.value == 0.0
+
+    def test_limits_raise_it(self) -> None:
+        """|x - 3| with |x| <= 1 on a disc: the price of the limit is the slope, and the bound is 2."""
+        unit = np.eye(2)[None]
+        far = AffineNorm(Norm.SUM, np.array([[-3.0, 0.0]]), unit, np.array([1.0]))
+        near = AffineNorm(Norm.MAXIMUM, np.zeros((1, 2)), unit, np.array([1.0]))
+        domains = domains_of((UnbalanceDecision("d", "kg m", 0.0, 5.0, (0.0, math.tau), 0j, ()),))
+        problem = AffineProblem(((1.0, far),), ((1.0, near),), domains, 1)
+        multipliers = Multipliers((np.array([[-1.0, 0.0]]),), (np.array([[1.0, 0.0]]),))
+        bound = lower_bound(problem, multipliers)
+        x = np.array([1.0, 0.0])
+        assert bound.value == problem.objective(x) == 2.0
+        assert multipliers.shadow_prices(problem) == (1.0,)
+        assert kkt_residual(problem, x, bound) == 0.0
+        assert lower_bound(problem, Multipliers(multipliers.terms, (np.zeros((1, 2)),))).value == 0.0
+        outside = np.array([2.0, 0.0])
+        assert kkt_residual(problem, outside, bound) >= 1.0
+
+    @given(SEEDS)
+    def test_best_bound_is_a_bound(self, seed: int) -> None:
+        """On a grid twice as fine, dual rows of the coarse one make a bound below every design."""
+        rng = np.random.default_rng(seed)
+        domains = random_domains(rng)
+        size, samples, groups = sum(d.width for d in domains), 8, 2
+        norm = NORMS[int(rng.integers(3))]
+        waves = rng.standard_normal((groups, 3, 2, size + 1)) + 1j * rng.standard_normal((groups, 3, 2, size + 1))
+
+        def at(count: int) -> AffineProblem:
+            turns = np.exp(2j * np.pi * np.outer(np.arange(count), np.arange(3)) / count)
+            rows = np.einsum("sh,ghdn->gsdn", turns, waves).real.reshape(groups * count, 2, size + 1)
+            weights = np.full(groups * count, 1.0 / (groups * count))
+            return AffineProblem(((1.0, AffineNorm(norm, rows[..., 0], rows[..., 1:], weights)),), (), domains, count)
+
+        coarse, fine = at(samples), at(2 * samples)
+        x = random_point(rng, coarse)
+        bound = best_bound(fine, coarse, x, random_multipliers(rng, coarse, x))
+        for _ in range(20):
+            assert bound.value <= fine.objective(random_point(rng, fine)) * (1.0 + 1e-12)
+
+    def test_never_below_zero(self) -> None:
+        """A norm is not negative, and no bound needs to be."""
+        rng = np.random.default_rng(0)
+        for _ in range(50):
+            problem, x = random_problem(rng)
+            assert lower_bound(problem, random_multipliers(rng, problem, x)).value >= 0.0
+
+
+class TestPrices:
+    @pytest.mark.parametrize("norm", NORMS, ids=str)
+    def test_price_is_the_dual_norm(self, norm: Norm) -> None:
+        """mu Z with Z in the unit sphere of the dual norm has the price mu (P5)."""
+        rng = np.random.default_rng(3)
+        weights = np.array([0.2, 0.3, 0.5])
+        v = rng.standard_normal((3, 2))
+        z = mixed_norms.subgradient(norm, weights, v)
+        limit = AffineNorm(norm, v, np.zeros((3, 2, 1)), weights)
+        domains = domains_of((UnbalanceDecision("d", "kg m", 0.0, 1.0, (0.0, 0.0), 0j, ()),))
+        problem = AffineProblem((), ((1.0, limit),), domains, 1)
+        assert Multipliers((), (7.0 * z,)).shadow_prices(problem) == (pytest.approx(7.0),)

@@ -1,0 +1,122 @@
+"""The nonlinear runner: known optima, judged by optimality conditions that it did not compute itself."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from laufruhe.solvers.nonlinear import (
+    Ending,
+    NonlinearProgram,
+    distinct,
+    softened_lengths,
+    solve_nonlinear,
+    spread_starts,
+)
+
+
+def rosenbrock(radius: float = 1.0) -> NonlinearProgram:
+    z = ca.SX.sym("z", 2)
+    return NonlinearProgram(
+        z, (1 - z[0]) ** 2 + 100 * (z[1] - z[0] ** 2) ** 2, np.full(2, -3.0), np.full(2, 3.0),
+        names=("a", "b"), constraints=ca.sumsqr(z), constraint_lower=np.array([-np.inf]),
+        constraint_upper=np.array([radius]), constraint_names=("disc",),
+    )  # fmt: skip
+
+
+def test_optimum_on_a_constraint_agrees_with_another_solver():
+    best = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])])[0]
+    other = minimize(
+        lambda z: (1 - z[0]) ** 2 + 100 * (z[1] - z[0] ** 2) ** 2, [0.5, 0.5], method="SLSQP",
+        constraints={"type": "ineq", "fun": lambda z: 1 - z @ z}, options={"ftol": 1e-14},
+    )  # fmt: skip
+    assert best.usable
+    assert best.kkt_residual < 1e-7
+    assert best.x == pytest.approx(other.x, abs=1e-6)
+    # the price of the limit is the slope of the optimum over it
+    step = 1e-4
+    moved = solve_nonlinear(rosenbrock(1.0 + step), [best.x])[0]
+    assert best.multipliers[0] == pytest.approx((best.value - moved.value) / step, rel=1e-3)
+
+
+def test_the_residual_is_not_small_away_from_an_optimum():
+    stopped = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])], max_iterations=2)[0]
+    assert stopped.ending is Ending.UNFINISHED
+    assert stopped.kkt_residual > 1e-3
+    assert not stopped.usable
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_mean_of_lengths_reaches_zero_cleanly(workers):
+    x, softness = ca.SX.sym("x", 2), ca.SX.sym("e")
+    target = np.array([0.3, -0.2])
+    slopes = np.random.default_rng(0).normal(size=(50, 3, 2))
+    rows = ca.vertcat(*[(ca.DM(a) @ (x - ca.DM(target))).T for a in slopes])
+    program = NonlinearProgram(
+        x, ca.sum1(softened_lengths(rows, softness)) / 50, np.full(2, -1.0), np.full(2, 1.0),
+        parameters=softness, stages=((1e-2,), (1e-5,), (1e-9,)),
+    )  # fmt: skip
+    found = solve_nonlinear(program, spread_starts(program.lower, program.upper, 4), workers=workers)
+    assert len(found) == 4
+    for optimum in found:
+        assert optimum.usable
+        assert optimum.x == pytest.approx(target, abs=1e-12)
+        assert optimum.value == pytest.approx(0.0, abs=1e-12)
+
+
+def test_softened_length_stays_under_the_length_by_no_more_than_its_softness():
+    generator = np.random.default_rng(1)
+    rows, e = generator.normal(size=(30, 3)) * 10.0 ** generator.uniform(-6, 3, (30, 1)), 1e-3
+    soft = np.asarray(softened_lengths(ca.DM(rows), e)).ravel()
+    true = np.linalg.norm(rows, axis=1)
+    assert np.all(soft <= true * (1 + 1e-12))
+    assert np.all(soft >= true - e * (1 + 1e-9))
+
+
+def test_limits_that_contradict_are_called_so():
+    x = ca.SX.sym("x", 1)
+    program = NonlinearProgram(
+        x, x[0], np.array([-5.0]), np.array([5.0]), constraints=ca.vertcat(x[0] ** 2, x[0]),
+        constraint_lower=np.array([4.0, -1.0]), constraint_upper=np.array([np.inf, 1.0]),
+    )  # fmt: skip
+    found = solve_nonlinear(program, [np.array([0.5])])
+    assert found[0].ending is Ending.INFEASIBLE
+    assert not found[0].usable
+    assert found[0].violation > 0.1
+
+
+def test_a_function_without_a_value_is_called_so():
+    x = ca.SX.sym("x", 1)
+    program = NonlinearProgram(x, ca.log(-1.0 - x[0] ** 2), np.array([0.0]), np.array([1.0]))
+    assert solve_nonlinear(program, [np.array([0.5])])[0].ending is Ending.FAILED
+
+
+def test_many_starts_find_the_best_of_several_optima_in_every_order():
+    x = ca.SX.sym("x", 1)
+    program = NonlinearProgram(x, ca.sin(5 * x[0]) + 0.1 * x[0] ** 2, np.array([-4.0]), np.array([4.0]))
+    values = set()
+    for seed in range(3):
+        found = solve_nonlinear(program, spread_starts(program.lower, program.upper, 16, seed), workers=1)
+        apart = distinct(found, 1.0)
+        assert len(apart) >= 3
+        assert [o.value for o in apart] == sorted(o.value for o in apart)
+        values.add(round(found[0].value, 8))
+    assert len(values) == 1
+
+
+def test_starts_cover_every_variable_evenly_and_repeat_by_seed():
+    low, high = np.array([0.0, -10.0]), np.array([1.0, 30.0])
+    starts = spread_starts(low, high, 10, seed=3)
+    assert np.array_equal(starts, spread_starts(low, high, 10, seed=3))
+    cells = np.sort(np.floor((starts - low) / (high - low) * 10).astype(int), axis=0)
+    assert np.array_equal(cells, np.tile(np.arange(10)[:, None], 2))
+
+
+def test_wrong_shapes_are_refused():
+    x = ca.SX.sym("x", 2)
+    with pytest.raises(ValueError, match="2 variables"):
+        NonlinearProgram(x, x[0], np.zeros(1), np.ones(2))
+    with pytest.raises(ValueError, match="above"):
+        NonlinearProgram(x, x[0], np.ones(2), np.zeros(2))
