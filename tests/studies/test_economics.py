@@ -79,3 +79,15 @@ def test_fronts_label_builds_and_units() -> None:
     assert np.ptp(data["force"].sel(build="plain").values) == 0.0
     with pytest.raises(ModelError, match="no balancer shaft"):
         with_shafts(problem, ("third",))
+
+
+def test_front_without_shafts_still_sizes_the_counterweights() -> None:
+    problem = replace(load(PROBLEMS / "tractor-three.toml"), limits=())
+    plain = with_shafts(problem, ())
+    assert plain.decisions
+    free = solve(plain)
+    assert free.objective is not None
+    first, second = front(plain, (0.0, 1.0))
+    assert first.force == second.force == pytest.approx(free.objective.value, rel=1e-3)
+    assert first.mass == 0.0
+    assert first.gap < 1e-3

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.machine import Role
@@ -20,6 +21,8 @@ from laufruhe.problem.quantity import Quantity, Subject
 from laufruhe.solve.affine import AffineModel, AffineProblem
 from laufruhe.solve.certificate import best_bound
 from laufruhe.solve.conic import ConicProgram
+
+Array = NDArray[np.float64]
 
 SAMPLES = 360
 _MASS = Limit("mass on shafts", Quantity(Subject.BALANCER_MASS, Norm.SUM), np.inf)
@@ -78,6 +81,12 @@ def front(problem: Problem, mass_limits: Sequence[float], samples: int = SAMPLES
     if not problem.decisions:
         value = AffineModel(problem).at(2 * samples).objective(np.zeros(0))
         return tuple(FrontPoint(limit, 0.0, value, value) for limit in mass_limits)
+    if not shafts_of(problem):
+        # counterweights alone: no mass counts, so one solve is the whole front
+        model = AffineModel(problem)
+        coarse, fine = model.at(samples), model.at(2 * samples)
+        force, bound = _solved(ConicProgram(coarse, reusable=True), coarse, fine)[1:]
+        return tuple(FrontPoint(limit, 0.0, force, bound) for limit in mass_limits)
     limited = replace(problem, limits=(*problem.limits, replace(_MASS, maximum=max(mass_limits))))
     model = AffineModel(limited)
     coarse, fine = model.at(samples), model.at(2 * samples)
@@ -91,11 +100,16 @@ def _limited(affine: AffineProblem, most: float) -> AffineProblem:
 
 
 def _point(program: ConicProgram, coarse: AffineProblem, fine: AffineProblem, most: float) -> FrontPoint:
+    x, force, bound = _solved(program, coarse, fine)
+    return FrontPoint(most, fine.limits[-1][1].value(x), force, bound)
+
+
+def _solved(program: ConicProgram, coarse: AffineProblem, fine: AffineProblem) -> tuple[Array, float, float]:
+    """Decisions, objective and bound on the finer grid."""
     solution = program.solve(coarse)
     if solution.x is None:
-        raise SolverError(f"no design keeps the limits with {most:g} kg on the shafts")
-    bound = best_bound(fine, coarse, solution.x, solution.multipliers)
-    return FrontPoint(most, fine.limits[-1][1].value(solution.x), fine.objective(solution.x), bound.value)
+        raise SolverError("no design keeps the limits, that on the mass of the shafts among them")
+    return solution.x, fine.objective(solution.x), best_bound(fine, coarse, solution.x, solution.multipliers).value
 
 
 def fronts(builds: dict[str, Problem], mass_limits: Sequence[float], samples: int = SAMPLES) -> xr.Dataset:
