@@ -114,6 +114,7 @@ def study(
     with _exit_statuses(problem):
         import shutil
 
+        from laufruhe.plots.study import draw_study
         from laufruhe.problem.study_reader import load_study
         from laufruhe.report import files
         from laufruhe.report.study_report import file_names, write_study
@@ -130,6 +131,7 @@ def study(
                 _complain("laufruhe: interrupted; finished points are kept, the same command goes on")
                 raise typer.Exit(INTERRUPTED) from None
             with files.staged(folder, "--out" if out is not None else "results", file_names(given)) as stage:
+                draw_study(datasets, stage)
                 write_study(given, datasets, stage, shlex.join(["laufruhe", "study", str(problem)]))
         shutil.rmtree(kept)
         typer.echo(f"done: {folder / files.REPORT}")

@@ -14,7 +14,9 @@ Value = bool | int | float | str
 class SweepTable(Table):
     """One quantity of the scene and the values that it takes."""
 
-    quantity: str = Field(description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_fraction.")
+    quantity: str = Field(
+        description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_fraction."
+    )
     values: list[Value]
 
 

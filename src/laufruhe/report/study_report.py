@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def file_names(study: StudyFile) -> list[str]:
     """Everything that `write_study` makes."""
-    return ["report.md", *(f"{part.name}.{end}" for part in study.study.parts for end in ("nc", "csv"))]
+    return ["report.md", *(f"{part.name}.{end}" for part in study.study.parts for end in ("nc", "csv", "png"))]
 
 
 def write_study(study: StudyFile, datasets: dict[str, xr.Dataset], folder: Path, command: str) -> None:
@@ -27,7 +27,16 @@ def write_study(study: StudyFile, datasets: dict[str, xr.Dataset], folder: Path,
         data.to_netcdf(folder / f"{part.name}.nc")
         data.to_dataframe().to_csv(folder / f"{part.name}.csv")
         files.write(folder / f"{part.name}.csv", (folder / f"{part.name}.csv").read_text(encoding="utf-8"))
-        lines += [f"## {part.title}", "", f"{part.kind.capitalize()}. Source: {part.source}", "", *_table(data), ""]
+        lines += [
+            f"## {part.title}",
+            "",
+            f"{part.kind.capitalize()}. Source: {part.source}",
+            "",
+            *_table(data),
+            "",
+            f"![{part.title}]({part.name}.png)",
+            "",
+        ]
     files.write(folder / "report.md", "\n".join(lines))
 
 

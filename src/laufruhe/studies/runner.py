@@ -67,7 +67,9 @@ def _kept(file: Path) -> PointResult:
         return PointResult(**json.loads(file.read_text(encoding="utf-8")))
     except (ValueError, TypeError):
         rule = "is no finished point of a study"
-        raise InputError(str(file), (Complaint("file", "", rule, "remove it, and the point is solved again"),)) from None
+        raise InputError(
+            str(file), (Complaint("file", "", rule, "remove it, and the point is solved again"),)
+        ) from None
 
 
 def dataset(part: PartTable, results: list[PointResult]) -> xr.Dataset:
