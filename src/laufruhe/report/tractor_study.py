@@ -9,6 +9,7 @@ from pathlib import Path
 import xarray as xr
 
 from laufruhe.studies.tractor import COMPUTE, VERDICTS, Verdict
+from laufruhe.studies.tractor.verdict import UNSTATED
 
 __all__ = ["FIGURES", "Figure", "Verdict", "verdict_table"]
 
@@ -133,12 +134,18 @@ def verdict_table(verdicts: Mapping[str, tuple[Verdict, ...]]) -> str:
     for name in verdicts:
         for v in verdicts[name]:
             ours = "0" if abs(v.ours) < 1e-9 else f"{v.ours:.4g}"
-            cells = (v.statement, v.paper, f"{ours} {v.unit}".strip(), "yes" if v.agrees else "**no**", v.why)
+            cells = (v.statement, v.paper, f"{ours} {v.unit}".strip(), _confirmed(v), v.why)
             lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def main(folder: str) -> None:
+def _confirmed(verdict: Verdict) -> str:
+    if verdict.paper == UNSTATED:
+        return "–"
+    return "yes" if verdict.agrees else "**no**"
+
+
+def main(folder: str = "results/tractor-study") -> None:
     """Every dataset, picture and verdict into a folder."""
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
@@ -148,7 +155,8 @@ def main(folder: str) -> None:
         data.to_netcdf(target / f"{name}.nc")
         figure.draw(data, target / f"{name}.png")
         found[name] = figure.verdicts(data)
-        print(f"{name}: {sum(v.agrees for v in found[name])} of {len(found[name])} statements confirmed")
+        stated = [v for v in found[name] if v.paper != UNSTATED]
+        print(f"{name}: {sum(v.agrees for v in stated)} of {len(stated)} statements confirmed")
     (target / "verdicts.md").write_text(verdict_table(found), encoding="utf-8")
 
 

@@ -11,7 +11,7 @@ from laufruhe.physics.shaking_loads import reciprocating_loads, rotating_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
 from laufruhe.studies.tractor.designs import Design, bars, fall, free_shaft, free_webs, given, opened, optimum
-from laufruhe.studies.tractor.verdict import Verdict
+from laufruhe.studies.tractor.verdict import UNSTATED, Verdict
 
 WEBS, SHAFT = "webs for half the couple", "with the shaft of the study"
 BEST_WEBS, BEST = "webs at the optimum", "shaft and webs at the optimum"
@@ -60,7 +60,7 @@ def two_cylinder_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
         ),
         Verdict(
             "The same at the proven optimum of shaft and webs",
-            "not in the study",
+            UNSTATED,
             -100.0 * best,
             "% of the mean force",
             abs(best) < NEGLIGIBLE,
@@ -83,7 +83,7 @@ def three_cylinder_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
         ),
         Verdict(
             "The same at the proven optimum of shaft and webs",
-            "not in the study",
+            UNSTATED,
             -100.0 * best,
             "% of the mean force",
             NOTICEABLE < best < 0.5,

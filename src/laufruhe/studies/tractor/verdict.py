@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+UNSTATED = "not in the study"
+"""In place of the study's number, where ours goes beyond it."""
+
 
 @dataclass(frozen=True)
 class Verdict:
