@@ -103,6 +103,41 @@ def evaluate(
 
 
 @app.command()
+def study(
+    problem: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)],
+    out: OutOption = None,
+) -> None:
+    """Run the sweeps and comparisons of a study file.
+
+    Finished points are kept; a study that was interrupted goes on where it stopped.
+    """
+    with _exit_statuses(problem):
+        import shutil
+
+        from laufruhe.plots.study import draw_study
+        from laufruhe.problem.study_reader import load_study
+        from laufruhe.report import files
+        from laufruhe.report.study_report import file_names, write_study
+        from laufruhe.studies import run
+        from laufruhe.studies.runner import UNFINISHED
+
+        given = load_study(problem)
+        folder = out if out is not None else Path("results") / problem.stem
+        kept = folder / UNFINISHED
+        with _progress() as say:
+            try:
+                datasets = run(given, problem.parent, kept, lambda k, n: say(f"{k} of {n} points"))
+            except KeyboardInterrupt:
+                _complain("laufruhe: interrupted; finished points are kept, the same command goes on")
+                raise typer.Exit(INTERRUPTED) from None
+            with files.staged(folder, "--out" if out is not None else "results", file_names(given)) as stage:
+                draw_study(datasets, stage)
+                write_study(given, datasets, stage, shlex.join(["laufruhe", "study", str(problem)]))
+        shutil.rmtree(kept)
+        typer.echo(f"done: {folder / files.REPORT}")
+
+
+@app.command()
 def check(problem: ProblemArgument, json: JsonOption = None) -> None:
     """Validate a problem file.
 

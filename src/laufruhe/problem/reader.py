@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -34,7 +35,23 @@ def load(path: str | Path) -> Problem:
         With one line for everything wrong: file, key, value, rule, remedy.
     """
     path = Path(path)
-    file = _parsed(path)
+    return load_tables(tables_of(path), path)
+
+
+def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
+    """A problem from the tables of its file, changed or not; complaints name the file.
+
+    Raises
+    ------
+    InputError
+        As `load` does.
+    """
+    if "study" in tables:
+        raise InputError(str(path), (Complaint("study", "", "makes this a study file", "use laufruhe study"),))
+    try:
+        file = ProblemFile.model_validate(tables)
+    except ValidationError as error:
+        raise InputError(str(path), complaints_of(error, ProblemFile)) from None
     try:
         if is_open(file):
             return opened(file, lambda closed: _assembled(closed, path))
@@ -46,10 +63,16 @@ def load(path: str | Path) -> Problem:
         raise InputError(str(path), (Complaint("engine", "", rule, remedy),)) from None
 
 
-def _parsed(path: Path) -> ProblemFile:
+def tables_of(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file, their keys not yet checked.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is no TOML.
+    """
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-        tables = tomllib.loads(text)
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except IsADirectoryError:
         raise _unreadable(path, "is a folder", "name a problem file in it") from None
     except FileNotFoundError:
@@ -65,10 +88,6 @@ def _parsed(path: Path) -> ProblemFile:
         raise _unreadable(path, "holds a whole number of thousands of digits", "write it shorter") from None
     except RecursionError:
         raise _unreadable(path, "is nested too deeply", "flatten it") from None
-    try:
-        return ProblemFile.model_validate(tables)
-    except ValidationError as error:
-        raise InputError(str(path), complaints_of(error, ProblemFile)) from None
 
 
 def _unreadable(path: Path, rule: str, remedy: str) -> InputError:

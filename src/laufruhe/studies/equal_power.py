@@ -1,0 +1,84 @@
+"""An engine rebuilt at another size, so that it is evaluated and not scaled (Hasselgruber 1964, eqs. 14-23)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import Engine
+from laufruhe.machine.similarity import EqualPowerScale, equal_power_scale
+from laufruhe.problem.model import Problem, UnbalanceDecision
+
+# what a decision's size is multiplied by when the engine is rebuilt, as powers of its unit
+_FRACTION, _MASS, _UNBALANCE = "", "kg", "kg m"
+
+
+def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
+    """The problem with every cylinder rebuilt so that the engine has the reference's power.
+
+    Brake mean pressure and mean piston speed stay, so the gas model is untouched.
+
+    Raises
+    ------
+    ModelError
+        If its cylinders differ in bore or stroke: one scale would not fit them.
+    """
+    cylinders = problem.engine.slider_cranks
+    if len({(part.crank_radius, part.bore) for part in cylinders}) > 1:
+        raise ModelError("cylinders differ in bore or stroke, so no one scale gives equal power; make them equal")
+    scale = equal_power_scale(len(cylinders), reference_cylinders)
+    return replace(
+        problem,
+        engine=_engine(problem.engine, scale),
+        points=tuple(replace(point, speed=point.speed * scale.speed) for point in problem.points),
+        decisions=tuple(_decision(decision, scale) for decision in problem.decisions),
+    )
+
+
+def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
+    k, m = scale.length, scale.mass
+    return replace(
+        engine,
+        slider_cranks=tuple(
+            replace(
+                part,
+                x=part.x * k,
+                crank_radius=part.crank_radius * k,
+                rod_length=part.rod_length * k,
+                offset=part.offset * k,
+                bore=None if part.bore is None else part.bore * k,
+                reciprocating_mass=part.reciprocating_mass * m,
+                rotating_mass=part.rotating_mass * m,
+                rod_inertia_deficit=part.rod_inertia_deficit * m * k**2,
+                shaft=replace(part.shaft, y=part.shaft.y * k, z=part.shaft.z * k),
+            )
+            for part in engine.slider_cranks
+        ),
+        rotors=tuple(
+            replace(
+                rotor,
+                x=rotor.x * k,
+                unbalance=rotor.unbalance * m * k,
+                radius=None if rotor.radius is None else rotor.radius * k,
+                shaft=replace(rotor.shaft, y=rotor.shaft.y * k, z=rotor.shaft.z * k),
+            )
+            for rotor in engine.rotors
+        ),
+        mounts=tuple(
+            replace(mount, position=(mount.position[0] * k, mount.position[1] * k, mount.position[2] * k))
+            for mount in engine.mounts
+        ),
+    )
+
+
+def _decision(decision: UnbalanceDecision, scale: EqualPowerScale) -> UnbalanceDecision:
+    """Bounds grow with the size in its unit; gains turn that unit into kg m."""
+    size = {_FRACTION: 1.0, _MASS: scale.mass, _UNBALANCE: scale.mass * scale.length}[decision.unit]
+    gain = scale.mass * scale.length / size
+    return replace(
+        decision,
+        lower=decision.lower * size,
+        upper=decision.upper * size,
+        start=decision.start * size,
+        drives=tuple(replace(drive, gain=drive.gain * gain) for drive in decision.drives),
+    )
