@@ -132,7 +132,7 @@ def study(
                 raise typer.Exit(INTERRUPTED) from None
             with files.staged(folder, "--out" if out is not None else "results", file_names(given)) as stage:
                 draw_study(datasets, stage)
-                write_study(given, datasets, stage, shlex.join(["laufruhe", "study", str(problem)]))
+                write_study(given, datasets, stage, shlex.join(["laufruhe", "study", str(problem)]), say)
         shutil.rmtree(kept)
         typer.echo(f"done: {folder / files.REPORT}")
 

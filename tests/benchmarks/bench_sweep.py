@@ -15,8 +15,8 @@ import numpy as np
 from scipy.optimize import NonlinearConstraint, differential_evolution, minimize
 
 from laufruhe import load
-from laufruhe.solve.affine import AffineModel, AffineProblem
-from laufruhe.solve.conic import ConicProgram
+from laufruhe.solvers.affine import AffineModel, AffineProblem
+from laufruhe.solvers.conic import ConicProgram
 from laufruhe.studies.speed_sweep import speed_sweep
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -13,7 +13,7 @@ from laufruhe import load
 from laufruhe.errors import ModelError
 from laufruhe.machine.similarity import equal_power_scale
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.solve import solve
+from laufruhe.solvers import solve
 from laufruhe.studies.economics import front, fronts, shafts_of, with_shafts
 from laufruhe.studies.equal_power import at_equal_power
 

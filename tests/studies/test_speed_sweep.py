@@ -12,7 +12,7 @@ from laufruhe.errors import ModelError
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.model import Limit
 from laufruhe.problem.quantity import Quantity, Subject
-from laufruhe.solve import solve
+from laufruhe.solvers import solve
 from laufruhe.studies.speed_sweep import speed_sweep
 
 PROBLEM = Path(__file__).resolve().parents[2] / "problems" / "tractor-four-lanchester.toml"

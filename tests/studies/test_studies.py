@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.problem.reader import load
 from laufruhe.problem.study_models import CaseTable
 from laufruhe.problem.study_reader import load_study, scene
-from laufruhe.solve import solve
+from laufruhe.report.tractor_study import FIGURES, figure_files
+from laufruhe.solvers import solve
 from laufruhe.studies import points_of, runner
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -96,3 +99,22 @@ def test_two_stroke_shaft_is_the_closed_form(star: str, root: float, second: boo
     assert result.objective is not None
     left = result.objective.value / result.objective.initial
     assert left > 0.5 if second else left < 0.06
+
+
+def test_every_figure_and_statement_is_on_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The whole study by its command: a picture and a dataset a figure, and the list of statements."""
+    monkeypatch.chdir(tmp_path)
+    answer = CliRunner().invoke(app, ["study", str(PROBLEMS / "tractor-study.toml")])
+    assert answer.exit_code == 0, answer.output
+    folder = tmp_path / "results" / "tractor-study"
+    assert {path.name for path in folder.iterdir()} == {"report.md", *figure_files()}
+    page = (folder / "report.md").read_text(encoding="utf-8")
+    for name, figure in FIGURES.items():
+        assert f"({name}.png)" in page
+        assert figure.paper in page
+    assert "statements of the study are confirmed" in page
+
+
+def test_a_study_of_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"study\.parts: is missing; add"):
+        load_study(written(tmp_path, 'title = "t"\n[study]\n'))

@@ -46,7 +46,10 @@ class PartTable(Table):
 class StudyTable(Table):
     """What a study consists of."""
 
-    parts: list[PartTable] = Field(min_length=1)
+    figures: Literal["tractor"] | None = Field(
+        default=None, description="Every figure of Hasselgruber's study, beside what it says."
+    )
+    parts: list[PartTable] = Field(default_factory=list)
 
 
 class StudyFile(Table):

@@ -37,6 +37,8 @@ def load_study(path: Path) -> StudyFile:
 
 def _check(file: StudyFile, path: Path) -> None:
     names = [part.name for part in file.study.parts]
+    if not names and file.study.figures is None:
+        raise _refused(path, "study.parts", "", "is missing", 'add [[study.parts]], or figures = "tractor"')
     for k, part in enumerate(file.study.parts):
         where = f"study.parts[{k + 1}]"
         if names.count(part.name) > 1:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from laufruhe.problem.study_models import StudyFile
 from laufruhe.report import files
+from laufruhe.report.tractor_study import figure_files, write_figures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -14,19 +16,23 @@ if TYPE_CHECKING:
 
 def file_names(study: StudyFile) -> list[str]:
     """Everything that `write_study` makes."""
-    return ["report.md", *(f"{part.name}.{end}" for part in study.study.parts for end in ("nc", "csv", "png"))]
+    own = figure_files() if study.study.figures else []
+    return ["report.md", *own, *(f"{part.name}.{end}" for part in study.study.parts for end in ("nc", "csv", "png"))]
 
 
-def write_study(study: StudyFile, datasets: dict[str, xr.Dataset], folder: Path, command: str) -> None:
-    """Datasets and the report into a folder that exists."""
+def write_study(
+    study: StudyFile, datasets: dict[str, xr.Dataset], folder: Path, command: str, say: Callable[[str], None]
+) -> None:
+    """Datasets, figures and the report into a folder that exists."""
     lines = [f"# {study.title}", "", f"Source: {study.source}", "", f"Made by `{command}`.", ""]
     if study.assumptions:
         lines += ["Assumptions:", "", *(f"- {text}" for text in study.assumptions), ""]
+    if study.study.figures:
+        lines += write_figures(folder, say)
     for part in study.study.parts:
         data = datasets[part.name]
         data.to_netcdf(folder / f"{part.name}.nc")
         data.to_dataframe().to_csv(folder / f"{part.name}.csv")
-        files.write(folder / f"{part.name}.csv", (folder / f"{part.name}.csv").read_text(encoding="utf-8"))
         lines += [
             f"## {part.title}",
             "",

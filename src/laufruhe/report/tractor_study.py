@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ import xarray as xr
 from laufruhe.studies.tractor import COMPUTE, VERDICTS, Verdict
 from laufruhe.studies.tractor.verdict import UNSTATED
 
-__all__ = ["FIGURES", "Figure", "Verdict", "verdict_table"]
+__all__ = ["FIGURES", "Figure", "Verdict", "figure_files", "verdict_table", "write_figures"]
 
 
 @dataclass(frozen=True)
@@ -145,22 +146,42 @@ def _confirmed(verdict: Verdict) -> str:
     return "yes" if verdict.agrees else "**no**"
 
 
-def main(folder: str = "results/tractor-study") -> None:
-    """Every dataset, picture and verdict into a folder."""
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
+def write_figures(folder: Path, say: Callable[[str], None]) -> list[str]:
+    """Dataset and picture of every figure into a folder that exists; the page about them.
+
+    Parameters
+    ----------
+    folder
+        Where the files go.
+    say
+        Told which figure is being made.
+
+    Returns
+    -------
+    Lines of Markdown: what the study says and shows, figure by figure, its statements
+    beside ours, and where the time went.
+    """
     found: dict[str, tuple[Verdict, ...]] = {}
-    for name, figure in FIGURES.items():
+    seconds: dict[str, float] = {}
+    pages: list[str] = []
+    for k, (name, figure) in enumerate(FIGURES.items()):
+        say(f"{name}, {k + 1} of {len(FIGURES)} figures")
+        started = time.perf_counter()
         data = figure.compute()
-        data.to_netcdf(target / f"{name}.nc")
-        figure.draw(data, target / f"{name}.png")
+        data.to_netcdf(folder / f"{name}.nc")
+        figure.draw(data, folder / f"{name}.png")
         found[name] = figure.verdicts(data)
-        stated = [v for v in found[name] if v.paper != UNSTATED]
-        print(f"{name}: {sum(v.agrees for v in stated)} of {len(stated)} statements confirmed")
-    (target / "verdicts.md").write_text(verdict_table(found), encoding="utf-8")
+        seconds[name] = time.perf_counter() - started
+        pages += [f"## {figure.title}", "", f"The study: {figure.paper}", "", f"![{figure.title}]({name}.png)", ""]
+    stated = [v for verdicts in found.values() for v in verdicts if v.paper != UNSTATED]
+    count = f"{sum(v.agrees for v in stated)} of {len(stated)} statements of the study are confirmed."
+    spent = [f"| {name} | {duration:.1f} |" for name, duration in seconds.items()]
+    return [
+        *pages, "## Statements", "", count, "", verdict_table(found), "## Where the time went", "",
+        "| figure | s |", "| --- | ---: |", *spent, f"| all | {sum(seconds.values()):.1f} |", "",
+    ]  # fmt: skip
 
 
-if __name__ == "__main__":
-    import sys
-
-    main(*sys.argv[1:2])
+def figure_files() -> list[str]:
+    """Everything that `write_figures` makes."""
+    return [f"{name}.{end}" for name in FIGURES for end in ("nc", "png")]

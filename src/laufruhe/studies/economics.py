@@ -18,9 +18,9 @@ from laufruhe.machine import Role
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.model import Limit, Problem
 from laufruhe.problem.quantity import Quantity, Subject
-from laufruhe.solve.affine import AffineModel, AffineProblem
-from laufruhe.solve.certificate import best_bound
-from laufruhe.solve.conic import ConicProgram
+from laufruhe.solvers.affine import AffineModel, AffineProblem
+from laufruhe.solvers.certificate import best_bound
+from laufruhe.solvers.conic import ConicProgram
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, over
 from laufruhe.problem.model import Problem
 from laufruhe.problem.study_models import CaseTable, PartTable, Value
 from laufruhe.problem.study_reader import scene
-from laufruhe.solve import solve
+from laufruhe.solvers import solve
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES
-from laufruhe.solve.affine import AffineModel, AffineProblem
-from laufruhe.solve.certificate import best_bound
-from laufruhe.solve.conic import ConicProgram
+from laufruhe.solvers.affine import AffineModel, AffineProblem
+from laufruhe.solvers.certificate import best_bound
+from laufruhe.solvers.conic import ConicProgram
 
 
 @dataclass(frozen=True)
