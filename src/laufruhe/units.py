@@ -46,6 +46,7 @@ def _factor(unit: str, wanted: str) -> float:
         ratio = float(one.to(target).magnitude)
         doubled = float((2.0 * one).to(target).magnitude)
     except Exception as error:
+        # the registry and the tokenizer below it raise a dozen kinds for what is no unit
         if type(error).__name__ == "DimensionalityError":
             raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}") from None
         raise UnitError(f"unit '{unit}' is not known; {advice(wanted)}") from None
@@ -59,7 +60,7 @@ def _factor(unit: str, wanted: str) -> float:
 
 def _turns(unit: str) -> bool:
     """Whether a unit's full name speaks of an angle."""
-    return re.search(r"radian|degree|turn|revolution|minute_of_arc|arcminute|arcsecond|gradian|grade", unit) is not None
+    return re.search(r"radian|degree|turn|revolution|arcminute|arcsecond|grad", unit) is not None
 
 
 _EXAMPLES = {

@@ -17,7 +17,9 @@ from laufruhe.problem.reader import load
 from laufruhe.solvers.batch import prepare, random_decisions
 from laufruhe.solvers.batch_engines import EngineArrays, EngineFamily
 
-READY = sorted(Path("problems").glob("*.toml"))
+PROBLEMS = Path(__file__).parents[2] / "problems"
+# a study file has no engine of its own
+READY = sorted(path for path in PROBLEMS.glob("*.toml") if "[engine]" in path.read_text(encoding="utf-8"))
 COUNT = 12
 
 
