@@ -11,7 +11,7 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_values import excess, limit_value, whole_objective
 from laufruhe.solvers.certificate import Certificate
-from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status
+from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible
 
 Array = NDArray[np.float64]
 
@@ -99,18 +99,4 @@ def infeasible_mounts(
     problem: Problem, initial: Evaluation, conflict: tuple[str, ...], timing: dict[str, float]
 ) -> Result:
     """No design exists: which limits cannot be met together."""
-    names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
-    verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
-    return Result(
-        problem=problem,
-        status=Status.INFEASIBLE,
-        objective=None,
-        certificate=None,
-        decisions=(),
-        limits=mount_limits(problem, initial),
-        initial=initial,
-        final=initial,
-        message=f"no design exists: {names} {verb}",
-        conflict=conflict,
-        timing=timing,
-    )
+    return infeasible(problem, initial, mount_limits(problem, initial), conflict, timing)

@@ -132,3 +132,28 @@ class Result:
     def _repr_html_(self) -> str:
         lines = [html.escape(line.strip()) for line in repr(self).strip("<>").splitlines()]
         return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"
+
+
+def infeasible(
+    problem: Problem,
+    initial: Evaluation,
+    limits: tuple[LimitValue, ...],
+    conflict: tuple[str, ...],
+    timing: dict[str, float],
+) -> Result:
+    """No design exists: which limits cannot be met together, and how the one given stands to them."""
+    names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
+    verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
+    return Result(
+        problem=problem,
+        status=Status.INFEASIBLE,
+        objective=None,
+        certificate=None,
+        decisions=(),
+        limits=limits,
+        initial=initial,
+        final=initial,
+        message=f"no design exists: {names} {verb}",
+        conflict=conflict,
+        timing=timing,
+    )

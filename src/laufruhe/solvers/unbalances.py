@@ -17,7 +17,7 @@ from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.affine import AffineModel, AffineProblem
 from laufruhe.solvers.certificate import Bound, Certificate, Proof, best_bound, kkt_residual
 from laufruhe.solvers.domain import Domain
-from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status
+from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible
 
 Array = NDArray[np.float64]
 
@@ -261,25 +261,12 @@ def decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[Decision
 
 
 def _infeasible(problem: Problem, model: AffineModel, initial: Evaluation, timing: dict[str, float]) -> Result:
-    conflict = _conflict(model.at(model.full_samples), [limit.name for limit in problem.limits])
-    names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
-    verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
-    return Result(
-        problem=problem,
-        status=Status.INFEASIBLE,
-        objective=None,
-        certificate=None,
-        decisions=(),
-        limits=tuple(
-            LimitValue(limit.name, initial.value(limit.quantity), limit.maximum, limit.quantity.unit, False, 0.0)
-            for limit in problem.limits
-        ),
-        initial=initial,
-        final=initial,
-        message=f"no design exists: {names} {verb}",
-        conflict=conflict,
-        timing=timing,
+    limits = tuple(
+        LimitValue(limit.name, initial.value(limit.quantity), limit.maximum, limit.quantity.unit, False, 0.0)
+        for limit in problem.limits
     )
+    conflict = _conflict(model.at(model.full_samples), [limit.name for limit in problem.limits])
+    return infeasible(problem, initial, limits, conflict, timing)
 
 
 def _conflict(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:

@@ -10,7 +10,6 @@ from laufruhe.plots.tractor.sheet import (
     BLUE,
     FORCE,
     GREY,
-    KILOPOND,
     ORANGE,
     SERIES,
     bar_legend,
@@ -18,6 +17,7 @@ from laufruhe.plots.tractor.sheet import (
     group,
     mounts_and_all,
 )
+from laufruhe.studies.tractor.engines import KILOPOND
 
 
 def equal_cylinders(data: xr.Dataset) -> Figure:

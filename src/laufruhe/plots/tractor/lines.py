@@ -21,7 +21,6 @@ from laufruhe.plots.tractor.sheet import (
     FORCE,
     GREEN,
     GREY,
-    KILOPOND,
     ORANGE,
     SERIES,
     VERMILION,
@@ -29,6 +28,7 @@ from laufruhe.plots.tractor.sheet import (
     entitled,
     line,
 )
+from laufruhe.studies.tractor.engines import KILOPOND
 
 
 def parts(data: xr.Dataset) -> Figure:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from laufruhe.machine import (
     CRANKSHAFT,
@@ -28,8 +28,9 @@ from laufruhe.machine import (
     SliderCrank,
 )
 from laufruhe.machine.layouts import Mechanism, build, inline
+from laufruhe.physics.modes import GRAVITY
 
-KILOPOND = 9.80665
+KILOPOND = GRAVITY
 PRESSURE = 1e4 * KILOPOND
 """One kp/cm2 [Pa]."""
 
@@ -161,11 +162,6 @@ def two_stroke_four(star: Sequence[float], rotors: Sequence[Rotor] = (), how: Bu
     throws = [math.radians(angle) for angle in star]
     parts, _ = build(Cycle.TWO_STROKE, inline(4, SPACING), mechanism(how), throws)
     return Engine("two-stroke four", Cycle.TWO_STROKE, parts, tuple(rotors), four_mounts(4, how))
-
-
-def with_rotors(engine: Engine, rotors: Sequence[Rotor]) -> Engine:
-    """The engine with other unbalances."""
-    return replace(engine, rotors=tuple(rotors))
 
 
 def counterweight(fraction: float) -> Rotor:

@@ -8,13 +8,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from laufruhe.physics.elastic_mounts import single_transmissibility
+from laufruhe.physics.modes import sag_for_critical_speed, sag_frequency
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.verdict import Verdict
 
 Array = NDArray[np.float64]
 
-GRAVITY = 9.80665
+RPM = math.pi / 30.0
 DAMPINGS = (0.0, 0.5, 1.0, 2.0, 4.0)
 SPEED_RATIOS = np.linspace(0.0, 3.0, 301)
 CRITICAL_SPEEDS = np.arange(150.0, 1001.0, 10.0)
@@ -23,14 +25,8 @@ EXAMPLE_SPEED = 400.0
 
 def transmissibility(speed_ratio: Array, damping: float) -> Array:
     """Force on the foundation over the exciting force, loss factor eta = psi / (2 pi) (eq. 40, Fig. 31)."""
-    loss = damping / math.tau
     with np.errstate(divide="ignore"):
-        return np.asarray(np.sqrt((1.0 + loss**2) / ((1.0 - speed_ratio**2) ** 2 + loss**2)))
-
-
-def sag(critical_speed: Array | float, order: int) -> Array:
-    """Static sag [m] of a mass whose order excites it at a critical speed [rpm] (eq. 41)."""
-    return np.asarray(GRAVITY / (np.asarray(critical_speed) * order * math.pi / 30.0) ** 2)
+        return single_transmissibility(speed_ratio, damping / math.tau)
 
 
 def isolation() -> xr.Dataset:
@@ -78,14 +74,15 @@ def isolation_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
 def sag_by_speed() -> xr.Dataset:
     """Static sag over the critical speed for orders one and two (Fig. 32)."""
     orders = (1, 2)
+    example = [sag_for_critical_speed(EXAMPLE_SPEED * RPM, order) for order in orders]
     return xr.Dataset(
         {
             "sag": (
                 ("order", "critical_speed"),
-                np.array([sag(CRITICAL_SPEEDS, order) for order in orders]),
+                np.array([[sag_for_critical_speed(n * RPM, order) for n in CRITICAL_SPEEDS] for order in orders]),
                 {"units": "m", "long_name": "static sag"},
             ),
-            "example": (("order",), [float(sag(EXAMPLE_SPEED, order)) for order in orders], {"units": "m"}),
+            "example": (("order",), example, {"units": "m"}),
         },
         coords={
             "order": list(orders),
@@ -98,7 +95,7 @@ def sag_by_speed() -> xr.Dataset:
 def sag_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
     """Of Fig. 32."""
     one, two = (1e3 * float(data["example"].sel(order=order)) for order in (1, 2))
-    softer = 30.0 / math.pi * math.sqrt(GRAVITY / (1e-3 * two))
+    softer = 60.0 * sag_frequency(1e-3 * two)
     return (
         Verdict(
             "Sag for a critical speed of 400 rpm and excitation of first order (Fig. 32)",
