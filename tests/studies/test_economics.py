@@ -179,8 +179,13 @@ def test_worth_is_judged_against_fewer_shafts_and_the_next_engine(four: xr.Datas
 
 @pytest.mark.parametrize(
     ("force", "following", "worth", "why"),
-    [(80.0, 100.0, True, "beside next"), (80.0, 81.0, False, "as smoothly"), (80.0, 70.0, False, "smoother")]
-    + [(88.0, 200.0, False, "slight"), (96.0, 200.0, False, "negligible")],
+    [
+        (80.0, 100.0, True, "beside next"),
+        (80.0, 81.0, False, "as smoothly"),
+        (80.0, 70.0, False, "smoother"),
+        (88.0, 200.0, False, "slight"),
+        (96.0, 200.0, False, "negligible"),
+    ],
 )
 def test_rules_at_made_up_forces(force: float, following: float, worth: bool, why: str) -> None:
     found = worths(_made_up(force, following))[0]

@@ -25,7 +25,7 @@ import xarray as xr
 
 from laufruhe.errors import ModelError
 from laufruhe.studies.economics import Standing
-from laufruhe.studies.tractor.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, UNSTATED, Verdict
+from laufruhe.studies.tractor.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 
 JUDGEMENTS = ("negligible", "noticeable", "better", "worth building", "not worth building")
 
@@ -84,11 +84,11 @@ def _worth(data: xr.Dataset, build: str) -> Worth:
 
 def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
     """What the source says of each build, confirmed or not, by the name of the build."""
-    found = {}
+    found: dict[str, tuple[Verdict, ...]] = {}
     for name in data["build"].values:
         row = data.sel(build=name)
         says, falls = str(row["claim"].item()), float(row["claimed_fall"])
-        own = (_judged(data, str(name), says),) if says else ()
+        own: tuple[Verdict, ...] = (_judged(data, str(name), says),) if says else ()
         own += () if np.isnan(falls) else (_fallen(data, str(name), falls),)
         if own:
             found[str(name)] = own
