@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 ANGLES = 360
 DIRECTIONS = 720
 PIECE = 500
-SHARES = np.linspace(0.0, 1.0, 201)
+SHARES = np.arange(201) / 200.0
 SEVERAL = 3.0
 """A force this many times another decides alone: the rest moves it by less than a third, were they in phase."""
 
@@ -148,6 +148,10 @@ def nominal_force(problem: Problem) -> float:
     return float(np.hypot(force[:, 0], force[:, 1]).max())
 
 
+def _after(before: int, of: int, say: Callable[[int, int], None]) -> Callable[[int, int], None]:
+    return lambda done, _all: say(before + done, of)
+
+
 def tolerance_study(
     problems: Mapping[str, Problem],
     tolerances: Tolerances,
@@ -177,9 +181,7 @@ def tolerance_study(
         engine, speed = problem.engine, problem.points[0].speed
         nominal.append(nominal_force(problem))
         parts.append(worst_parts(engine, speed, tolerances))
-        peaks = random_forces(
-            engine, speed, tolerances, builds, seed, lambda n, _, k=k: say(k * builds + n, len(problems) * builds)
-        )
+        peaks = random_forces(engine, speed, tolerances, builds, seed, _after(k * builds, len(problems) * builds, say))
         drawn.append([peaks.mean(), *np.quantile(peaks, SHARES)])
     table = np.array(drawn)
 
