@@ -225,7 +225,7 @@ def operating_points(file: ProblemFile, folder: Path) -> tuple[OperatingPoint, .
     for k, table in enumerate(file.operating_points):
         speeds = _speeds(table, file.engine.stroke, f"operating_points[{k + 1}]")
         for speed in speeds:
-            at = f"{speed * 30.0 / math.pi:.6g} rpm"
+            at = units.shown(speed, "rad/s", 6)
             name = (f"{table.name} {at}" if len(speeds) > 1 else table.name) if table.name else at
             points.append(OperatingPoint(name, speed, _loaded(gas, table, k), table.weight / len(speeds)))
     all_different([p.name for p in points], "operating_points", "operating points have one name")
