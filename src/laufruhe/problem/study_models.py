@@ -32,13 +32,18 @@ class CaseTable(Table):
     )
 
 
-class PartTable(Table):
-    """One dataset of the study: cases, at every combination of the swept values."""
+class PartBase(Table):
+    """What every part of a study has."""
 
     name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]*$")]
-    kind: Literal["counterweight fraction", "balancer sizing", "layout comparison"]
     title: str
     source: str = ""
+
+
+class PartTable(PartBase):
+    """One dataset of the study: cases, at every combination of the swept values."""
+
+    kind: Literal["counterweight fraction", "balancer sizing", "layout comparison"]
     cases: list[CaseTable] = Field(min_length=1)
     sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
 
