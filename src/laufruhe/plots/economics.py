@@ -37,10 +37,10 @@ def draw_economics(data: xr.Dataset, path: Path) -> None:
         Line2D([], [], color=INK, linestyle=DASHES[0], linewidth=1.2, label="more cylinders, no shafts, equal power"),
     ]
     gap = float(data["gap"].max())
-    said = f"Every point a proven optimum: no design lies lower by more than {100.0 * gap:.1g} %. "
-    heading(
-        drawn.figure, data.attrs["title"], f"{said}Counterweights at their optimum everywhere.", legend, _source(data)
+    said = (
+        f"Every point a proven optimum: no design lies lower by more than {100.0 * gap:.1g} %. Crank weights are free."
     )
+    heading(drawn.figure, data.attrs["title"], said, legend, _source(data))
     save(drawn.figure, path)
 
 
@@ -69,7 +69,8 @@ def _lines(axes: Axes, data: xr.Dataset, colours: dict[str, str]) -> None:
         axes.plot(x[:-1][best], y[:-1][best], "o", color=colour, markersize=4)
         axes.plot(x[:-1][~best], y[:-1][~best], "o", color=colour, markersize=4, fillstyle="none")
         axes.plot(mass, force, "D", color=colour, markersize=6, zorder=3)
-    axes.set_xlim(0.0, 1.06 * float(data["optimum_mass"].max()) or 1.0)
+    # room on the right for the names of the levels
+    axes.set_xlim(0.0, 1.3 * float(data["optimum_mass"].max()) or 1.0)
     axes.set_ylim(0.0, 1.06 * float(data["optimum"].max()))
     axes.set_xlabel("mass on balancer shafts [kg]")
     axes.set_ylabel(f"{data.attrs['objective']} [{data['optimum'].attrs['units']}]")
@@ -89,8 +90,9 @@ def _levels(axes: Axes, data: xr.Dataset) -> None:
         # names of levels close together stand one under the other
         top = min(force, top - LINE * axes.get_ylim()[1])
         colour = INK if more else FAINT
-        label = axes.text(right, top, f"{name}: {force:.0f}", size=7.5, ha="right", va="bottom", color=colour, zorder=4)
-        label.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8})
+        place = top + 0.15 * LINE * axes.get_ylim()[1]
+        label = axes.text(right, place, f"{name}: {force:.0f}", size=7.5, ha="right", va="bottom", color=colour)
+        label.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.0})
 
 
 def _table(axes: Axes, data: xr.Dataset, colours: dict[str, str]) -> None:
