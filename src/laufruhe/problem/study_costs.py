@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from laufruhe.problem import fields as f
 from laufruhe.problem.file_models import Name, Table
-from laufruhe.problem.study_models import CaseTable, PartBase, Value
+from laufruhe.problem.study_parts import CaseTable, PartTable
 
 PLAIN = "plain"
 """Name of the engine without any of the shafts."""
@@ -39,32 +39,29 @@ class BuildTable(Table):
     """One set of shafts."""
 
     name: Name
+    case: Name | None = Field(default=None, description="Case that has them; the first where left out.")
     shafts: list[Name] = Field(
-        default_factory=list, description="Balancer shafts that are built; none where a problem of its own is named."
+        default_factory=list, description="Balancer shafts that are built; none makes the plain engine of another case."
     )
-    problem: str | None = Field(default=None, description="In place of the part's.")
     claim: ClaimTable | None = None
 
     @model_validator(mode="after")
     def _is_not_plain(self) -> BuildTable:
-        if not self.shafts and self.problem is None:
+        if not self.shafts and self.case is None:
             raise _refused("has no shafts, so it is the plain engine, which is always there; name its shafts")
         if len(set(self.shafts)) < len(self.shafts):
             raise _refused("names a shaft twice; name each once")
         return self
 
 
-class EconomicsPart(PartBase):
+class EconomicsTable(PartTable):
     """Least force against number and mass of shafts, beside the engine with one more cylinder at equal power."""
 
     kind: Literal["economics"]
-    problem: str = Field(description="An engine with every shaft that may be built.")
-    set: dict[str, Value] = Field(default_factory=dict, description="As in a case; of every engine of the part.")
-    without: list[str] = Field(default_factory=list, description="As in a case; of the engine with the shafts.")
     mass_limits: list[f.Mass] = Field(min_length=2, description="Masses allowed on the shafts, ascending.")
     builds: list[BuildTable] = Field(min_length=1)
     more_cylinders: list[CaseTable] = Field(
-        min_length=1, description="Plain engines that are rebuilt at equal power; the first decides what is worth it."
+        min_length=1, description="Plain engines, rebuilt at equal power; the first decides what is worth building."
     )
 
     @field_validator("mass_limits")
@@ -75,16 +72,26 @@ class EconomicsPart(PartBase):
         return limits
 
     @model_validator(mode="after")
-    def _names_fit(self) -> EconomicsPart:
+    def _names_fit(self) -> EconomicsTable:
         built = [PLAIN, *(build.name for build in self.builds)]
         names = [*built, *(case.name for case in self.more_cylinders)]
         twice = [name for name in names if names.count(name) > 1]
         if twice:
             raise _refused(f"has two engines called '{twice[0]}'; give each its own name ('{PLAIN}' is taken)")
+        cases = [case.name for case in self.cases]
         for build in self.builds:
             if build.claim is not None and build.claim.against not in built:
-                raise _refused(f"compares '{build.name}' with '{build.claim.against}'; name one of {', '.join(built)}")
+                raise _refused(f"compares '{build.name}' with '{build.claim.against}'; use one of: {', '.join(built)}")
+            if build.case is not None and build.case not in cases:
+                raise _refused(f"builds '{build.name}' on case '{build.case}'; use one of: {', '.join(cases)}")
+        for case in (*self.cases, *self.more_cylinders):
+            if case.equal_power_to is not None:
+                raise _refused(f"rebuilds '{case.name}' by itself; leave equal_power_to out of its cases")
         return self
+
+    def settings(self) -> dict[str, Any]:
+        """Of a front, the masses alone: names and claims change nothing in it."""
+        return {"kind": self.kind, "mass_limits": self.mass_limits}
 
 
 class TolerancesTable(Table):
@@ -119,15 +126,19 @@ class MarkTable(Table):
     force: f.Force
 
 
-class TolerancePart(PartBase):
+class ToleranceTable(PartTable):
     """Free forces that manufacturing tolerances leave, at their worst and at random."""
 
     kind: Literal["tolerance"]
-    cases: list[ToleranceCase] = Field(min_length=1)
+    cases: list[ToleranceCase] = Field(min_length=1)  # type: ignore[assignment]
     tolerances: TolerancesTable
     engines: Annotated[int, Field(ge=100, le=1_000_000)] = Field(default=10_000, description="Built at random.")
     seed: Annotated[int, Field(ge=0)] = 1964
     marks: list[MarkTable] = Field(default_factory=list)
+
+    def settings(self) -> dict[str, Any]:
+        """What random engines hang on; marks are for pictures."""
+        return self.model_dump(include={"kind", "tolerances", "engines", "seed"})
 
 
 class LiteratureTable(Table):
@@ -145,13 +156,17 @@ class FreeForcesCase(CaseTable):
     literature: LiteratureTable = LiteratureTable()
 
 
-class FreeForcesPart(PartBase):
+class FreeForcesTable(PartTable):
     """Free forces and couples of the first two orders by layout, beside the literature."""
 
     kind: Literal["free forces"]
-    cases: list[FreeForcesCase] = Field(min_length=1)
+    cases: list[FreeForcesCase] = Field(min_length=1)  # type: ignore[assignment]
     spacing: f.PositiveLength = Field(description="Unit of length of the couples: the distance of the throws.")
     digits: Annotated[int, Field(ge=0, le=12)] = Field(default=4, description="Printed after the point.")
+
+    def settings(self) -> dict[str, Any]:
+        """The unit of length alone: what is printed elsewhere changes nothing."""
+        return {"kind": self.kind, "spacing": self.spacing}
 
 
 def _refused(text: str) -> PydanticCustomError:

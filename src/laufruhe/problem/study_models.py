@@ -32,18 +32,13 @@ class CaseTable(Table):
     )
 
 
-class PartBase(Table):
-    """What every part of a study has."""
-
-    name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]*$")]
-    title: str
-    source: str = ""
-
-
-class PartTable(PartBase):
+class PartTable(Table):
     """One dataset of the study: cases, at every combination of the swept values."""
 
+    name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]*$")]
     kind: Literal["counterweight fraction", "balancer sizing", "layout comparison"]
+    title: str
+    source: str = ""
     cases: list[CaseTable] = Field(min_length=1)
     sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
 

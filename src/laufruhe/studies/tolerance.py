@@ -7,7 +7,7 @@ so finer balancing promises nothing for engines of fewer than six cylinders.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -108,16 +108,10 @@ def random_forces(
     tolerances: Tolerances,
     builds: int,
     seed: int,
-    say: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Array:
     """Largest free force over the cycle [N] of each of many engines, the nominal force left out.
 
     Masses are even over their tolerance, unbalances even over their disc.
-
-    Parameters
-    ----------
-    say
-        Told how many engines are built, of how many.
     """
     random = np.random.default_rng(seed)
     unit = _unit_forces(engine, speed)
@@ -131,12 +125,10 @@ def random_forces(
     peaks = np.empty(builds)
     # in pieces: all engines at once would take gigabytes
     for start in range(0, builds, PIECE):
-        say(start, builds)
         piece = slice(start, start + PIECE)
         moved = np.tensordot(masses[piece], unit, axes=1)
         zeta = rotating[piece, None] * crank
         peaks[piece] = np.hypot(moved[..., 0] + zeta.imag, moved[..., 1] + zeta.real).max(axis=1)
-    say(builds, builds)
     return peaks
 
 
@@ -148,60 +140,73 @@ def nominal_force(problem: Problem) -> float:
     return float(np.hypot(force[:, 0], force[:, 1]).max())
 
 
-def _after(before: int, of: int, say: Callable[[int, int], None]) -> Callable[[int, int], None]:
-    return lambda done, _all: say(before + done, of)
+@dataclass(frozen=True)
+class Spread:
+    """What tolerances do to the free force of one engine [N].
 
-
-def tolerance_study(
-    problems: Mapping[str, Problem],
-    tolerances: Tolerances,
-    builds: int = 10_000,
-    seed: int = 1964,
-    say: Callable[[int, int], None] = lambda _done, _all: None,
-) -> xr.Dataset:
-    """Nominal free force, the worst that tolerances add, and how it is distributed over random engines.
-
-    Parameters
+    Attributes
     ----------
-    problems
-        Engines by name, each with one operating point.
-    say
-        Told how many engines are built, of how many.
+    nominal
+        Largest over the cycle, of the engine as drawn.
+    worst
+        Largest that each cause adds, by its name.
+    mean
+        Of what is added at random.
+    random
+        What this share (SHARES) of random engines stay below.
+    speed
+        Of the crank [rad/s].
+    """
+
+    nominal: float
+    worst: dict[str, float]
+    mean: float
+    random: tuple[float, ...]
+    speed: float
+
+
+def spread(problem: Problem, tolerances: Tolerances, builds: int = 10_000, seed: int = 1964) -> Spread:
+    """Nominal free force, the worst that tolerances add, and how it is distributed over random engines.
 
     Raises
     ------
     ModelError
-        If an engine has several operating points.
+        If the problem has several operating points.
     """
-    several = [name for name, problem in problems.items() if len(problem.points) != 1]
-    if several:
-        raise ModelError(f"'{several[0]}' needs one operating point where tolerances are studied; give it one")
-    nominal, parts, drawn = [], [], []
-    for k, problem in enumerate(problems.values()):
-        engine, speed = problem.engine, problem.points[0].speed
-        nominal.append(nominal_force(problem))
-        parts.append(worst_parts(engine, speed, tolerances))
-        peaks = random_forces(engine, speed, tolerances, builds, seed, _after(k * builds, len(problems) * builds, say))
-        drawn.append([peaks.mean(), *np.quantile(peaks, SHARES)])
-    table = np.array(drawn)
+    if len(problem.points) != 1:
+        raise ModelError(f"'{problem.name}' needs one operating point where tolerances are studied; give it one")
+    engine, speed = problem.engine, problem.points[0].speed
+    drawn = random_forces(engine, speed, tolerances, builds, seed)
+    quantiles = tuple(float(q) for q in np.quantile(drawn, SHARES))
+    worst = worst_parts(engine, speed, tolerances)
+    return Spread(nominal_force(problem), worst, float(drawn.mean()), quantiles, speed)
+
+
+def compared(spreads: Mapping[str, Spread]) -> xr.Dataset:
+    """Several engines side by side as one labelled dataset."""
+    found = list(spreads.values())
+    worst = np.array([list(own.worst.values()) for own in found])
 
     def newton(words: str) -> dict[str, str]:
         return {"units": "N", "long_name": words}
 
-    worst = np.array([list(own.values()) for own in parts])
     return xr.Dataset(
         {
-            "nominal": ("case", nominal, newton("largest free force of the drawing")),
+            "nominal": ("case", [own.nominal for own in found], newton("largest free force of the drawing")),
             "worst": ("case", worst.sum(axis=1), newton("largest free force that tolerances add")),
             "worst_part": (("case", "cause"), worst, newton("the same from one cause alone")),
-            "mean": ("case", table[:, 0], newton("mean of what tolerances add at random")),
-            "random": (("case", "share"), table[:, 1:], newton("largest free force of this share of random engines")),
+            "mean": ("case", [own.mean for own in found], newton("mean of what tolerances add at random")),
+            "random": (
+                ("case", "share"),
+                np.array([own.random for own in found]),
+                newton("free force that tolerances add, not exceeded by this share of random engines"),
+            ),
         },
         coords={
-            "case": list(problems),
-            "cause": list(parts[0]),
+            "case": list(spreads),
+            "cause": list(found[0].worst),
             "share": ("share", SHARES, {"units": "1", "long_name": "share of random engines that stay below"}),
-            "speed": ("case", [p.points[0].speed for p in problems.values()], {"units": "rad/s"}),
+            "speed": ("case", [own.speed for own in found], {"units": "rad/s"}),
         },
-        attrs={"title": "Tolerances against free forces", "kind": "tolerance", "seed": seed, "builds": builds},
+        attrs={"title": "Tolerances against free forces", "kind": "tolerance"},
     )
