@@ -1,23 +1,27 @@
-"""The study file, key by key: scenes, what of them is swept, and what is compared."""
+"""The study file, key by key: scenes, what of them is swept, and what is compared (docs/studies.md)."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
 
-from laufruhe.problem.file_models import Name, Table
+from laufruhe.problem.file_models import Name, QuantityName, Table
 
-Value = bool | int | float | str
+Value: TypeAlias = bool | int | float | str
 
 
 class SweepTable(Table):
-    """One quantity of the scene and the values that it takes."""
+    """One quantity of the scene and the values that it takes: listed, or spaced between two ends."""
 
     quantity: str = Field(
         description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_fraction."
     )
-    values: list[Value]
+    values: list[Value] | None = None
+    first: int | float | str | None = Field(default=None, alias="from")
+    last: int | float | str | None = Field(default=None, alias="to")
+    points: int | None = Field(default=None, description="Values from the first to the last.")
+    spacing: Literal["linear", "log"] | None = None
 
 
 class CaseTable(Table):
@@ -27,20 +31,53 @@ class CaseTable(Table):
     problem: str
     set: dict[str, Value] = Field(default_factory=dict, description="Paths of the problem file and their new values.")
     without: list[str] = Field(default_factory=list, description="Tables left out, as balancer_shafts or gas.")
-    equal_power_to: Annotated[int, Field(ge=1)] | None = Field(
-        default=None, description="Forces scaled to the power of an engine of this many cylinders."
+    equal_power_to: Annotated[int, Field(ge=1, le=48)] | None = Field(
+        default=None, description="Rebuilt to the power that this many of its cylinders have."
     )
 
 
 class PartTable(Table):
-    """One dataset of the study: cases, at every combination of the swept values."""
+    """What the parts of every kind have: one dataset of the study, its cases, and words about it."""
 
-    name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]*$")]
-    kind: Literal["counterweight fraction", "balancer sizing", "layout comparison"]
-    title: str
+    name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]*$", max_length=60)]
+    title: Annotated[str, Field(min_length=1)]
     source: str = ""
     cases: list[CaseTable] = Field(min_length=1)
+
+    def settings(self) -> dict[str, Any]:
+        """What is asked of every point: all but words, cases, and what is swept."""
+        return self.model_dump(exclude={"name", "title", "source", "cases", "sweep"})
+
+
+class SweptPartTable(PartTable):
+    """Cases at every combination of the swept values."""
+
+    metric: QuantityName | None = Field(default=None, description="In place of the objective of the problem files.")
     sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
+
+
+class CounterweightFractionTable(SweptPartTable):
+    """A metric over the balance fraction, its proven optimum marked."""
+
+    kind: Literal["counterweight fraction"]
+
+
+class BalancerSizingTable(SweptPartTable):
+    """Engines with and without each of their balancer shafts, each at its proven optimum."""
+
+    kind: Literal["balancer sizing"]
+
+
+class LayoutComparisonTable(SweptPartTable):
+    """Engines side by side, of equal cylinders or of equal power."""
+
+    kind: Literal["layout comparison"]
+
+
+# a new kind is one more table here, and one more line in studies.kinds and in report.study_kinds
+AnyPart: TypeAlias = Annotated[
+    CounterweightFractionTable | BalancerSizingTable | LayoutComparisonTable, Field(discriminator="kind")
+]
 
 
 class StudyTable(Table):
@@ -49,7 +86,7 @@ class StudyTable(Table):
     figures: Literal["tractor"] | None = Field(
         default=None, description="Every figure of Hasselgruber's study, beside what it says."
     )
-    parts: list[PartTable] = Field(default_factory=list)
+    parts: list[AnyPart] = Field(default_factory=list)
 
 
 class StudyFile(Table):
