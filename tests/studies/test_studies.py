@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.problem.reader import load
-from laufruhe.problem.study_models import CaseTable
+from laufruhe.problem.study_parts import CaseTable
 from laufruhe.problem.study_reader import load_study, scene
 from laufruhe.report.tractor_study import FIGURES, figure_files
 from laufruhe.solvers import solve

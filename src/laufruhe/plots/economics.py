@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from laufruhe.plots.style import BEFORE, FAINT, INK, heading, page, save
+from laufruhe.plots.style import BEFORE, FAINT, INK, heading, page
 from laufruhe.studies.economics import Standing
 from laufruhe.studies.worth import verdicts, worths
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES = ((0, (6, 2)), (0, (2, 2)), (0, (1, 3)))
 LINE = 0.052
 
 
-def draw_economics(data: xr.Dataset, path: Path) -> None:
+def economics(data: xr.Dataset) -> Figure:
     """Fronts on the left, what each set of shafts does and what is said of it on the right."""
     drawn = page(1, 2, (5.4, 4.4), gap=0.25)
     fronts, words = drawn.panels
@@ -41,7 +37,7 @@ def draw_economics(data: xr.Dataset, path: Path) -> None:
         f"Every point a proven optimum: no design lies lower by more than {100.0 * gap:.1g} %. Crank weights are free."
     )
     heading(drawn.figure, data.attrs["title"], said, legend, _source(data))
-    save(drawn.figure, path)
+    return drawn.figure
 
 
 def _source(data: xr.Dataset) -> str:

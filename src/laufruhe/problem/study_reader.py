@@ -11,7 +11,8 @@ from pydantic import ValidationError
 from laufruhe.errors import Complaint, InputError
 from laufruhe.problem.complaints import Refused, complaints_of, nearest
 from laufruhe.problem.reader import tables_of
-from laufruhe.problem.study_models import AnyPart, CaseTable, StudyFile, SweptPartTable
+from laufruhe.problem.study_models import AnyPart, StudyFile
+from laufruhe.problem.study_parts import CaseTable, SweptPartTable
 from laufruhe.problem.study_paths import changed
 from laufruhe.problem.study_sweeps import axis_of
 

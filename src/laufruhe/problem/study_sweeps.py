@@ -9,7 +9,7 @@ import numpy as np
 
 from laufruhe import units
 from laufruhe.problem.complaints import Refused
-from laufruhe.problem.study_models import SweepTable, Value
+from laufruhe.problem.study_parts import SweepTable, Value
 from laufruhe.problem.study_paths import field_at
 
 MOST_POINTS = 100_000

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import xarray as xr
 from matplotlib.figure import Figure
 
+from laufruhe.plots import economics, layouts, tolerance
 from laufruhe.plots import study as pictures
+from laufruhe.report import cost_tables
 from laufruhe.report import study_tables as tables
 
 
@@ -24,4 +26,7 @@ SHOWN: Mapping[str, Shown] = {
     "counterweight fraction": Shown(tables.by_point, pictures.counterweight_fraction),
     "balancer sizing": Shown(tables.by_shafts, pictures.balancer_sizing),
     "layout comparison": Shown(tables.by_point, pictures.layout_comparison),
+    "economics": Shown(cost_tables.economics, economics.economics),
+    "tolerance": Shown(cost_tables.tolerance, tolerance.tolerance),
+    "free forces": Shown(cost_tables.free_forces, layouts.free_forces),
 }

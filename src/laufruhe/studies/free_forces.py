@@ -117,7 +117,9 @@ def compared(layouts: Mapping[str, Layout], literature: Mapping[str, Mapping[str
     )
     known = [literature.get(name, {}) for name in layouts]
     kinds = ("force", "couple")
-    printed = np.array([[[own.get(f"{what} {order}", math.nan) for what in kinds] for order in ORDERS] for own in known])
+    printed = np.array(
+        [[[own.get(f"{what} {order}", math.nan) for what in kinds] for order in ORDERS] for own in known]
+    )
     interval = np.degrees([own.intervals for own in layouts.values()])
 
     def each(values: NDArray[np.float64], words: str) -> tuple[tuple[str, str], NDArray[np.float64], dict[str, str]]:
@@ -141,3 +143,10 @@ def compared(layouts: Mapping[str, Layout], literature: Mapping[str, Mapping[str
         },
         attrs={"title": "Free forces and couples by layout", "kind": "free forces"},
     )
+
+
+def printed_agree(data: xr.Dataset) -> tuple[int, int]:
+    """How many printed values agree to half of their last digit, and of how many."""
+    half = 0.5 * 10.0 ** -int(data.attrs["digits"]) * (1.0 + 1e-9)
+    apart = np.array([abs(data[what].values - data[f"{what}_printed"].values) for what in ("force", "couple")])
+    return int((apart <= half).sum()), int(np.isfinite(apart).sum())

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from laufruhe.errors import SolverError
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.problem.model import Problem
-from laufruhe.problem.study_models import SweptPartTable
+from laufruhe.problem.study_parts import SweptPartTable
 from laufruhe.problem.study_sweeps import Axis, axis_of
 from laufruhe.solvers import solve, state
 from laufruhe.solvers.result import Result

@@ -14,7 +14,7 @@ from laufruhe import __version__
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.problem.model import Problem
 from laufruhe.problem.reader import load_tables, tables_of
-from laufruhe.problem.study_models import CaseTable
+from laufruhe.problem.study_parts import CaseTable
 from laufruhe.problem.study_reader import scene_tables
 from laufruhe.studies.equal_power import at_equal_power
 

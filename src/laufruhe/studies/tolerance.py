@@ -18,6 +18,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 from laufruhe.problem.model import Problem
+from laufruhe.studies.tractor.verdict import Verdict
 
 Array = NDArray[np.float64]
 
@@ -210,3 +211,21 @@ def compared(spreads: Mapping[str, Spread]) -> xr.Dataset:
         },
         attrs={"title": "Tolerances against free forces", "kind": "tolerance"},
     )
+
+
+def verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
+    """What the source says of finer balancing, engine by engine, confirmed or not.
+
+    It promises nothing where the free force of the drawing is several times the worst sum of
+    tolerances: without tolerances at all the engine would shake as before.
+    """
+    found = []
+    for name in data["case"].values:
+        row = data.sel(case=name)
+        claim, times = str(row["claim"].item()), float(row["nominal"] / row["worst"])
+        if claim:
+            agrees = (times > SEVERAL) == (claim == "promises nothing")
+            why = f"promises nothing where the drawing leaves more than {SEVERAL:g} times what tolerances add at worst"
+            unit = "times the worst sum"
+            found.append(Verdict(f"finer balancing, {name}", claim, times, unit, agrees, why))
+    return tuple(found)

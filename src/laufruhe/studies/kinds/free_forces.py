@@ -30,7 +30,9 @@ def _answer(part: FreeForcesTable, point: Point, scenes: Scenes) -> dict[str, An
 def _dataset(part: FreeForcesTable, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     layouts = {point.case.name: _layout(record) for point, record in zip(points, records, strict=True)}
     printed = {
-        case.name: {key.replace("_", " "): value for key, value in case.literature.model_dump(exclude_none=True).items()}
+        case.name: {
+            key.replace("_", " "): value for key, value in case.literature.model_dump(exclude_none=True).items()
+        }
         for case in part.cases
     }
     return compared(layouts, printed).assign_attrs(title=part.title, source=part.source, digits=part.digits)

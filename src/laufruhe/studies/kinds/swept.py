@@ -7,7 +7,7 @@ from typing import Any
 
 from laufruhe.errors import Complaint, InputError
 from laufruhe.problem.model import Problem
-from laufruhe.problem.study_models import CaseTable, SweptPartTable
+from laufruhe.problem.study_parts import CaseTable, SweptPartTable
 from laufruhe.studies.outcome import axes_of, solved
 from laufruhe.studies.scenes import Point, Scenes
 
