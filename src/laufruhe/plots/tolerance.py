@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter
 
 from laufruhe.physics.modes import GRAVITY
 from laufruhe.plots.style import AFTER, FAINT, INK, heading, page
@@ -27,10 +28,11 @@ def tolerance(data: xr.Dataset) -> Figure:
     for row, name in enumerate(data["case"].values):
         _row(axes, data.sel(case=name), row)
     _marks(axes, data, count)
-    most = max(float(data[v].max()) for v in ("nominal", "worst")) / GRAVITY
-    most = max(most, *(data["mark_force"].values / GRAVITY), LEAST * 10)
+    stated = np.atleast_1d(data.attrs.get("mark_forces", []))
+    most = max([float(data["nominal"].max()), float(data["worst"].max()), *stated]) / GRAVITY
     axes.set_xscale("log")
-    axes.set_xlim(LEAST, 2.0 * most)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set_xlim(LEAST, max(2.0 * most, 10.0 * LEAST))
     axes.set_ylim(count - 0.5, -0.8)
     axes.set_yticks(range(count), [str(name) for name in data["case"].values])
     axes.tick_params(axis="y", length=0)
@@ -40,8 +42,9 @@ def tolerance(data: xr.Dataset) -> Figure:
         Patch(color=SPREAD, label=f"{data.attrs['engines']:,} random engines"),
         Line2D([], [], color=AFTER, marker="|", markersize=12, markeredgewidth=2.5, linestyle="", label="worst sum"),
         Line2D([], [], color=INK, marker="D", markersize=6, linestyle="", label="drawing"),
-        Line2D([], [], color=FAINT, linestyle=(0, (3, 2)), label="stated"),
     ]
+    if len(stated):
+        legend.append(Line2D([], [], color=FAINT, linestyle=(0, (3, 2)), label="stated"))
     words = "What tolerances add, at random and at their worst, beside the free force of the engine as drawn."
     source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
     heading(
@@ -61,16 +64,17 @@ def _row(axes: Axes, data: xr.Dataset, row: int) -> None:
 
 
 def _density(quantiles: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Density over the logarithm of the force, its peak at one, from quantiles two and a half percent apart."""
-    force = np.maximum(quantiles, 1e-6)[::5]
+    """Density over the logarithm of the force, its peak at one, from quantiles four percent apart."""
+    force = np.maximum(quantiles, 1e-6)[::8]
     steps = np.diff(np.log(force))
-    density = np.diff(shares[::5]) / np.maximum(steps, 1e-9)
+    density = np.diff(shares[::8]) / np.maximum(steps, 1e-9)
     middle = np.sqrt(force[1:] * force[:-1])
     places = np.concatenate([force[:1], middle, force[-1:]])
     return places, np.concatenate([[0.0], density / density.max(), [0.0]])
 
 
 def _marks(axes: Axes, data: xr.Dataset, count: int) -> None:
-    for name, force in zip(data["mark"].values, data["mark_force"].values / GRAVITY, strict=True):
+    names, forces = (np.atleast_1d(data.attrs.get(key, [])) for key in ("mark_names", "mark_forces"))
+    for name, force in zip(names, forces / GRAVITY if len(forces) else forces, strict=True):
         axes.plot([force, force], [-0.55, count - 0.5], color=FAINT, linestyle=(0, (3, 2)), linewidth=1.2, zorder=1)
         axes.text(force, -0.58, f"{name}: {force:.0f}", size=7.5, ha="center", va="bottom", color=FAINT)

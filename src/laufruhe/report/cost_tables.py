@@ -10,6 +10,7 @@ from laufruhe.physics.modes import GRAVITY
 from laufruhe.report.study_tables import NOTHING, number, table
 from laufruhe.studies.economics import Standing
 from laufruhe.studies.free_forces import printed_agree
+from laufruhe.studies.tolerance import CAUSES
 from laufruhe.studies.tolerance import verdicts as tolerance_verdicts
 from laufruhe.studies.tractor.verdict import Verdict
 from laufruhe.studies.worth import verdicts, worths
@@ -54,14 +55,13 @@ def _front(data: xr.Dataset) -> list[str]:
 
 def tolerance(data: xr.Dataset) -> list[str]:
     """Nominal, worst and random free forces of every engine [kp], cause by cause, and what was said."""
-    causes = [str(cause) for cause in data["cause"].values]
-    head = ["engine", "drawing [kp]", "worst sum [kp]", *(f"of it {cause} [kp]" for cause in causes)]
+    head = ["engine", "drawing [kp]", "worst sum [kp]", *(f"of it {cause} [kp]" for cause in CAUSES)]
     head += ["random: mean [kp]", "95 % below [kp]", "drawing over worst sum"]
     rows = []
     for name in data["case"].values:
         row = data.sel(case=name)
         nominal, worst = float(row["nominal"]) / GRAVITY, float(row["worst"]) / GRAVITY
-        parts = [f"{float(row['worst_part'].sel(cause=cause)) / GRAVITY:.1f}" for cause in causes]
+        parts = [f"{float(row['worst_' + cause.replace(' ', '_')]) / GRAVITY:.1f}" for cause in CAUSES]
         often = float(row["random"].sel(share=0.95, method="nearest")) / GRAVITY
         cells = [str(name), f"{nominal:.3g}", f"{worst:.1f}", *parts, f"{float(row['mean']) / GRAVITY:.1f}"]
         rows.append([*cells, f"{often:.1f}", f"{nominal / worst:.2g}"])
@@ -102,7 +102,10 @@ def _plain(value: float) -> str:
 def _said(found: Sequence[Verdict]) -> list[str]:
     if not found:
         return []
-    rows = [
-        [v.statement, v.paper, f"{v.ours:+.3g} {v.unit}", "yes" if v.agrees else "**no**", v.why] for v in found
-    ]  # fmt: skip
+    rows = [[v.statement, v.paper, _ours(v), "yes" if v.agrees else "**no**", v.why] for v in found]
     return [*table(["what was said of", "said", "here", "confirmed", "why"], rows, len(rows)), ""]
+
+
+def _ours(verdict: Verdict) -> str:
+    signed = "+" if "%" in verdict.unit else ""
+    return f"{verdict.ours:{signed}.3g} {verdict.unit}"

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 ANGLES = 360
 DIRECTIONS = 720
 PIECE = 500
+CAUSES = ("reciprocating masses", "unbalance", "alignment")
 SHARES = np.arange(201) / 200.0
 SEVERAL = 3.0
 """A force this many times another decides alone: the rest moves it by less than a third, were they in phase."""
@@ -87,11 +88,12 @@ def worst_parts(engine: Engine, speed: float, tolerances: Tolerances) -> dict[st
     angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
     directions = np.stack([np.sin(angles), np.cos(angles)])
     segments = np.abs(_unit_forces(engine, speed) @ directions).sum(axis=0) * tolerances.reciprocating_mass
-    return {
-        "reciprocating masses": float(segments.max()),
-        "unbalance": tolerances.planes * tolerances.unbalance * speed**2,
-        "alignment": sum(tolerances.aligned_masses) * tolerances.alignment * speed**2,
-    }
+    sizes = (
+        float(segments.max()),
+        tolerances.planes * tolerances.unbalance * speed**2,
+        sum(tolerances.aligned_masses) * tolerances.alignment * speed**2,
+    )
+    return dict(zip(CAUSES, sizes, strict=True))
 
 
 def worst_force(engine: Engine, speed: float, tolerances: Tolerances) -> float:
@@ -186,30 +188,30 @@ def spread(problem: Problem, tolerances: Tolerances, builds: int = 10_000, seed:
 def compared(spreads: Mapping[str, Spread]) -> xr.Dataset:
     """Several engines side by side as one labelled dataset."""
     found = list(spreads.values())
-    worst = np.array([list(own.worst.values()) for own in found])
 
     def newton(words: str) -> dict[str, str]:
         return {"units": "N", "long_name": words}
 
+    causes = {
+        f"worst_{cause.replace(' ', '_')}": ("case", [own.worst[cause] for own in found], newton(f"from {cause} alone"))
+        for cause in CAUSES
+    }
+    worst = [sum(own.worst.values()) for own in found]
+    shares = np.array([own.random for own in found])
     return xr.Dataset(
         {
             "nominal": ("case", [own.nominal for own in found], newton("largest free force of the drawing")),
-            "worst": ("case", worst.sum(axis=1), newton("largest free force that tolerances add")),
-            "worst_part": (("case", "cause"), worst, newton("the same from one cause alone")),
+            "worst": ("case", worst, newton("largest free force that tolerances add")),
+            **causes,
             "mean": ("case", [own.mean for own in found], newton("mean of what tolerances add at random")),
-            "random": (
-                ("case", "share"),
-                np.array([own.random for own in found]),
-                newton("free force that tolerances add, not exceeded by this share of random engines"),
-            ),
+            "random": (("case", "share"), shares, newton("added free force that this share of random engines keeps")),
         },
         coords={
             "case": list(spreads),
-            "cause": list(found[0].worst),
             "share": ("share", SHARES, {"units": "1", "long_name": "share of random engines that stay below"}),
             "speed": ("case", [own.speed for own in found], {"units": "rad/s"}),
         },
-        attrs={"title": "Tolerances against free forces", "kind": "tolerance"},
+        attrs={"title": "Tolerances against free forces", "kind": "tolerance", "source": ""},
     )
 
 

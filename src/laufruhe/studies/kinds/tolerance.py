@@ -35,11 +35,11 @@ def _answer(part: ToleranceTable, point: Point, scenes: Scenes) -> dict[str, Any
 
 def _dataset(part: ToleranceTable, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     found = compared({point.case.name: Spread(**record) for point, record in zip(points, records, strict=True)})
-    return found.assign_coords(
-        claim=("case", [case.claim or "" for case in part.cases]),
-        mark=("mark", [mark.name for mark in part.marks]),
-        mark_force=("mark", [mark.force for mark in part.marks], {"units": "N"}),
-    ).assign_attrs(title=part.title, source=part.source, seed=part.seed, engines=part.engines)
+    marks = {mark.name: mark.force for mark in part.marks}
+    shown = {"mark_names": list(marks), "mark_forces": list(marks.values())} if marks else {}
+    return found.assign_coords(claim=("case", [case.claim or "" for case in part.cases])).assign_attrs(
+        title=part.title, source=part.source, seed=part.seed, engines=part.engines, **shown
+    )
 
 
 KIND = Kind(_points, _answer, _dataset)
