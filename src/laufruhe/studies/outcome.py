@@ -67,7 +67,7 @@ class Outcome:
 def solved(problem: Problem) -> Outcome:
     """Solve a scene; one that no solver answers is kept as failed."""
     try:
-        result = solve(problem)
+        result = solve(problem, many=True)
     except SolverError:
         return _outcome(state(problem), FAILED, "none")
     proof = str(result.certificate.kind) if result.certificate else AS_GIVEN if _is_closed(problem) else "none"
