@@ -126,7 +126,8 @@ def coordinates(axes: Sequence[Axis], points: Sequence[Point]) -> dict[str, Any]
     found: dict[str, Any] = {}
     for axis in axes:
         values = [point.changes[axis.quantity] for point in points]
-        shown = [str(value) for value in values] if axis.numbers is None else [axis.number(value) for value in values]
+        number = axis.by_value()
+        shown = [str(value) for value in values] if axis.numbers is None else [number[value] for value in values]
         found[axis.quantity] = ("point", shown, {"units": axis.unit, "long_name": axis.name, "swept": 1})
     return found
 
