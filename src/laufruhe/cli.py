@@ -42,6 +42,10 @@ JsonOption = Annotated[
     Optional[str],  # noqa: UP045  (typer reads it at run time)
     typer.Option("--json", metavar="FILE", help="Write result.json to FILE too; - prints it, and the table to stderr."),
 ]
+StudyJsonOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--json", metavar="FILE", help="Write all parts as JSON to FILE too; - prints them."),
+]
 OutOption = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--out", metavar="DIR", help="Folder of the results.  [default: results/<problem name>]"),
@@ -105,8 +109,12 @@ def evaluate(
 @app.command()
 def study(
     problem: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)],
-    json: JsonOption = None,
+    json: StudyJsonOption = None,
     out: OutOption = None,
+    jobs: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--jobs", metavar="N", help="Processes that may be used.  [default: one a core]"),
+    ] = None,
 ) -> None:
     """Run the sweeps and comparisons of a study file.
 
@@ -115,7 +123,7 @@ def study(
     with _exit_statuses(problem, "interrupted; finished points are kept, the same command goes on"), _progress() as say:
         from laufruhe.cli_study import studied
 
-        text, data = studied(problem, out, say)
+        text, data = studied(problem, out, jobs, say)
         _hand_out(text, data, json)
 
 

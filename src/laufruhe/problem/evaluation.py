@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, OperatingPoint
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.mixed_norms import Norm, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
@@ -149,5 +149,7 @@ def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
 
 def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
     """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
-    samples, fine = mount_samples(evaluation, k), mount_samples(evaluation, k, PEAK_REFINEMENT)
-    return [replace(cycle_measures(samples[:, m]), max=cycle_measures(fine[:, m]).max) for m in range(samples.shape[1])]
+    fine = mount_samples(evaluation, k, PEAK_REFINEMENT)
+    coarse = fine[::PEAK_REFINEMENT]
+    most = lengths(fine).max(axis=0)
+    return [replace(cycle_measures(coarse[:, m]), max=float(most[m])) for m in range(fine.shape[1])]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,14 +41,9 @@ class Axis:
         """The last word of the path, as a reader says it."""
         return self.quantity.split(".")[-1].replace("_", " ")
 
-    @property
-    def label(self) -> str:
-        """Name and unit."""
-        return self.name if self.unit in ("", "1") else f"{self.name} [{self.unit}]"
-
-    def number(self, value: Value) -> float:
-        """One of the values in the axis' unit."""
-        return math.nan if self.numbers is None else self.numbers[self.values.index(value)]
+    def by_value(self) -> dict[Value, float]:
+        """Numbers of the values; none where these are labels."""
+        return dict(zip(self.values, self.numbers, strict=True)) if self.numbers is not None else {}
 
 
 def axis_of(sweep: SweepTable) -> Axis:

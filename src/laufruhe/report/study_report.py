@@ -49,7 +49,7 @@ def write_study(
         lines += _part(part.name, datasets[part.name], folder)
     if datasets:
         spent = [f"| {name} | {duration:.1f} |" for name, duration in seconds.items()]
-        lines += ["## Where the time of the parts went", "", "| part | s |", "| --- | ---: |", *spent,
+        lines += ["## Where the time went", "", "Seconds on one core.", "", "| part | s |", "| --- | ---: |", *spent,
                   f"| all | {sum(seconds.values()):.1f} |", ""]  # fmt: skip
     files.write(folder / files.REPORT, "\n".join(lines))
 
@@ -60,10 +60,21 @@ def _part(name: str, data: xr.Dataset, folder: Path) -> list[str]:
 
     shown, title, source = SHOWN[data.attrs["kind"]], data.attrs["title"], data.attrs["source"]
     data.to_netcdf(folder / f"{name}.nc")
-    data.to_dataframe().to_csv(folder / f"{name}.csv")
+    _flat(data).to_csv(folder / f"{name}.csv")
     save(shown.picture(data), folder / f"{name}.png")
     words = data.attrs["kind"].capitalize() + "." + (f" Source: {source}" if source else "")
     return [f"## {title}", "", words, "", *shown.table(data), "", f"![{title}]({name}.png)", ""]
+
+
+def _flat(data: xr.Dataset) -> Any:
+    """A row a point: what stands for every mount and decision becomes a column each."""
+    wide = [str(dim) for dim in ("mount", "decision") if dim in data.dims]
+    rows = data.drop_dims(wide).to_dataframe()
+    for name, values in data.data_vars.items():
+        if len(values.dims) == 2 and values.dims[1] in wide:
+            for k, of in enumerate(data[values.dims[1]].values):
+                rows[f"{name}: {of}"] = values.values[:, k]
+    return rows
 
 
 def as_json(study: StudyFile, datasets: Mapping[str, xr.Dataset], seconds: Mapping[str, float]) -> str:

@@ -89,6 +89,13 @@ class AffineProblem:
         return sum(weight * norm.value(x) for weight, norm in self.terms)
 
 
+def reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
+    """A size of these norms that is not zero: at no decisions, or at their largest."""
+    sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
+    sizes += [float(np.abs(norm.slope * problem.scales).max(initial=0.0)) for norm in norms]
+    return max(sizes, default=0.0) or 1.0
+
+
 class AffineModel:
     """Spectra of the design without its decisions, and of each decision alone.
 

@@ -32,6 +32,7 @@ class KeptPoints:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.records: dict[str, Any] = {}
+        self.seconds: dict[str, float] = {}
         self._stream: BinaryIO | None = None
         self._whole = self._read()
 
@@ -43,28 +44,24 @@ class KeptPoints:
         whole = content.rfind(b"\n") + 1
         for number, line in enumerate(content[:whole].splitlines(), 1):
             try:
-                mark, record = json.loads(line)
-                self.records[str(mark)] = dict(record)
+                mark, seconds, record = json.loads(line)
+                self.records[str(mark)], self.seconds[str(mark)] = dict(record), float(seconds)
             except (ValueError, TypeError):
                 rule, remedy = "is no finished point of a study", "remove this line, and the point is solved again"
                 raise InputError(str(self.path), (Complaint(f"line {number}", "", rule, remedy),)) from None
         return whole
 
-    def keep(self, mark: str, record: dict[str, Any]) -> None:
-        """Write a record; it has left the process when this returns."""
+    def keep(self, mark: str, seconds: float, record: dict[str, Any]) -> None:
+        """Write a record and what it took; it has left the process when this returns."""
         if self._stream is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             # not in append mode: what follows the last whole line is cut off
             self._stream = self.path.open("r+b" if self.path.is_file() else "wb")
             self._stream.truncate(self._whole)
             self._stream.seek(self._whole)
-        self._stream.write(json.dumps([mark, record]).encode() + b"\n")
+        self._stream.write(json.dumps([mark, round(seconds, 6), record]).encode() + b"\n")
         self._stream.flush()
-        self.records[mark] = record
-
-    def remove(self) -> None:
-        """The study has ended, and its results hold every point."""
-        self.path.unlink(missing_ok=True)
+        self.records[mark], self.seconds[mark] = record, seconds
 
     def __enter__(self) -> KeptPoints:
         return self

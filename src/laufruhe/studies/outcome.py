@@ -67,7 +67,7 @@ class Outcome:
 def solved(problem: Problem) -> Outcome:
     """Solve a scene; one that no solver answers is kept as failed."""
     try:
-        result = solve(problem)
+        result = solve(problem, many=True)
     except SolverError:
         return _outcome(state(problem), FAILED, "none")
     proof = str(result.certificate.kind) if result.certificate else AS_GIVEN if _is_closed(problem) else "none"
@@ -126,7 +126,8 @@ def coordinates(axes: Sequence[Axis], points: Sequence[Point]) -> dict[str, Any]
     found: dict[str, Any] = {}
     for axis in axes:
         values = [point.changes[axis.quantity] for point in points]
-        shown = [str(value) for value in values] if axis.numbers is None else [axis.number(value) for value in values]
+        number = axis.by_value()
+        shown = [str(value) for value in values] if axis.numbers is None else [number[value] for value in values]
         found[axis.quantity] = ("point", shown, {"units": axis.unit, "long_name": axis.name, "swept": 1})
     return found
 

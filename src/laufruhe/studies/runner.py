@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,15 +11,20 @@ from laufruhe.problem.study_models import StudyFile
 from laufruhe.studies.kept import KeptPoints
 from laufruhe.studies.kinds import kind_of
 from laufruhe.studies.scenes import Scenes
+from laufruhe.studies.work import Task, answers
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 def run(
-    study: StudyFile, folder: Path, kept: Path, say: Callable[[int, int], None] = lambda _done, _all: None
+    study: StudyFile,
+    folder: Path,
+    kept: Path,
+    say: Callable[[int, int], None] = lambda _done, _all: None,
+    jobs: int = 1,
 ) -> tuple[dict[str, xr.Dataset], dict[str, float]]:
-    """All parts of a study, each as one dataset, and the seconds that each took.
+    """All parts of a study, each as one dataset, and the seconds that the points of each took on one core.
 
     Parameters
     ----------
@@ -29,22 +34,34 @@ def run(
         File of the finished points; points in it are not solved again.
     say
         Told how many points are done, of how many.
+    jobs
+        Processes that may be used; the results do not depend on it.
+
+    Raises
+    ------
+    InputError
+        If a scene of the study is bad.
     """
     parts, scenes = study.study.parts, Scenes(folder)
     points = {part.name: kind_of(part).points(part, scenes) for part in parts}
-    whole, done = sum(map(len, points.values())), 0
-    datasets, seconds = {}, {}
+    marks = {part.name: [scenes.fingerprint(point, part.settings()) for point in points[part.name]] for part in parts}
     with KeptPoints(kept) as store:
-        for part in parts:
-            started, kind, records = time.perf_counter(), kind_of(part), []
-            for point in points[part.name]:
-                say(done, whole)
-                mark = scenes.fingerprint(point, part.settings())
-                if mark not in store.records:
-                    store.keep(mark, kind.answer(part, point, scenes))
-                records.append(store.records[mark])
-                done += 1
-            datasets[part.name] = kind.dataset(part, points[part.name], records)
-            seconds[part.name] = time.perf_counter() - started
-    say(done, whole)
+        # a scene that stands in two parts of one kind is solved once
+        wanted = {
+            mark: Task(part, point)
+            for part in parts
+            for point, mark in zip(points[part.name], marks[part.name], strict=True)
+        }
+        todo = {mark: task for mark, task in wanted.items() if mark not in store.records}
+        names, whole = list(todo), len(wanted)
+        say(whole - len(todo), whole)
+        with closing(answers(list(todo.values()), scenes, jobs)) as found:
+            for count, answer in enumerate(found, 1):
+                store.keep(names[answer.task], answer.seconds, answer.record)
+                say(whole - len(todo) + count, whole)
+        datasets = {
+            part.name: kind_of(part).dataset(part, points[part.name], [store.records[m] for m in marks[part.name]])
+            for part in parts
+        }
+        seconds = {part.name: sum(store.seconds[mark] for mark in set(marks[part.name])) for part in parts}
     return datasets, seconds

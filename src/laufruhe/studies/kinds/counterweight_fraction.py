@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -60,8 +61,9 @@ def _dataset(
         return dataset(part, points, records, coordinates(axes_of(part), points))
     others = [axis for axis in axes_of(part) if axis is not fraction and axis.quantity != fraction.quantity]
     optimum = np.array([isinstance(point.changes[fraction.quantity], dict) for point in points])
+    number = fraction.by_value()
     values = [
-        _decided(record, fraction.quantity) if best else fraction.number(point.changes[fraction.quantity])
+        _decided(record, fraction.quantity) if best else number[point.changes[fraction.quantity]]
         for point, record, best in zip(points, records, optimum, strict=True)
     ]
     swept = {"units": "1", "long_name": "balance fraction", "swept": 1}
@@ -78,9 +80,10 @@ def _dataset(
 
 
 def _decided(record: Mapping[str, Any], quantity: str) -> float:
-    name = quantity.split(".", 1)[-1]
-    found = [value for decision, value in record["decisions"].items() if decision.endswith(name)]
-    return float(found[0]) if found else float("nan")
+    """The fraction decided for the counterweight of this path, which may count it instead of naming it."""
+    decided = {name: value for name, value in record["decisions"].items() if name.endswith(_FRACTION)}
+    only = next(iter(decided.values())) if len(decided) == 1 else math.nan
+    return float(decided.get(quantity.split(".", 1)[-1], only))
 
 
 KIND = Kind(_points, answer, _dataset)
