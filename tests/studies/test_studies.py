@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -92,7 +93,9 @@ def test_half_written_point_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("star", "root", "second"), [("root-two", 2.0, True), ("root-ten", 10.0, False)])
 def test_two_stroke_shaft_is_the_closed_form(star: str, root: float, second: bool) -> None:
     """Eqs. 30 and 31: U s = m r / 2 a sqrt(2) or sqrt(10); only the second star has no second order."""
-    result = solve(load(PROBLEMS / f"tractor-two-stroke-four-{star}.toml"))
+    problem = load(PROBLEMS / f"tractor-two-stroke-four-{star}.toml")
+    # gas torque stays whatever the shaft does
+    result = solve(replace(problem, points=tuple(replace(point, gas=None) for point in problem.points)))
     size = next(d.value for d in result.decisions if d.name == "shaft.front.unbalance")
     # the solver's own tolerance on the unbalance, at a kink of the objective
     assert size * 0.5 == pytest.approx(1.25 * 0.06 / 2 * 0.125 * root**0.5, rel=2e-3)
