@@ -145,7 +145,7 @@ BAD_ECONOMICS = [
         "has no shaft 'shafd', which 'first order' builds; did you mean 'shaft'",
     ),
     ("tractor-three-shafts.toml", "tractor-six.toml", "no shafts can be weighed; add them"),
-    ('["0 kg", "1 kg"]', "[]", "mass_limits"),
+    ('["0 kg", "1 kg"]', "[]", "mass_limits = []: is no front; give two masses or more"),
     ('["0 kg", "1 kg"]', '["-1 kg", "1 kg"]', "must be at least 0 kg"),
     ('["0 kg", "1 kg"]', '["1 kg", "1 kg"]', "must ascend"),
     ('["0 kg", "1 kg"]', '["0 kg", 1]', "has no unit"),

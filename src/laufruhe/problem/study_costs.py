@@ -58,7 +58,7 @@ class EconomicsTable(PartTable):
     """Least force against number and mass of shafts, beside the engine with one more cylinder at equal power."""
 
     kind: Literal["economics"]
-    mass_limits: list[f.Mass] = Field(min_length=2, description="Masses allowed on the shafts, ascending.")
+    mass_limits: list[f.Mass] = Field(description="Masses allowed on the shafts, ascending.")
     builds: list[BuildTable] = Field(min_length=1)
     more_cylinders: list[CaseTable] = Field(
         min_length=1, description="Plain engines, rebuilt at equal power; the first decides what is worth building."
@@ -67,6 +67,8 @@ class EconomicsTable(PartTable):
     @field_validator("mass_limits")
     @classmethod
     def _ascend(cls, limits: list[float]) -> list[float]:
+        if len(limits) < 2:
+            raise _refused("is no front; give two masses or more")
         if any(b <= a for a, b in pairwise(limits)):
             raise _refused("must ascend; order the masses and name each once")
         return limits
