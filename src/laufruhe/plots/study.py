@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -18,7 +20,6 @@ from laufruhe.report.study_tables import swept_names, with_unit
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#332288", "#999933")
 PANEL = (6.4, 3.6)
-BAR = 0.9
 
 
 def counterweight_fraction(data: xr.Dataset) -> Figure:
@@ -32,19 +33,21 @@ def counterweight_fraction(data: xr.Dataset) -> Figure:
     best = data["optimum"].values
     for label, chosen, colour in _groups(data, [name for name in names if name != along]):
         x, y = data[along].values, data["objective"].values
-        line, dot = chosen & ~best, chosen & best
+        # the optimum is a point of its line too
+        line, dot = np.flatnonzero(chosen), chosen & best
+        line = line[np.argsort(x[line])]
         axes.plot(x[line], y[line], color=colour)
         axes.plot(x[dot], y[dot], "o", color=colour)
         legend.append(Line2D([], [], color=colour, marker="o", label=label))
     axes.set_xlabel("balance fraction")
     _metric_axis(axes, data)
-    return _headed(figure, data, legend, "Dot: the proven optimum, the fraction left open.")
+    return _headed(figure, data, legend, f"Dot: {_claimed(data)}, the fraction left open.")
 
 
 def _best_fraction(data: xr.Dataset) -> Figure:
     names = swept_names(data)
     if not names:
-        return _bars(data, data["case"].values, "Fractions are decided.")
+        return _bars(data, data["case"].values, "The balance fraction is decided.")
     figure, (upper, lower) = _page(2)
     fractions = [k for k, name in enumerate(data["decision"].values) if str(name).endswith("balance_fraction")]
     legend = _lines(upper, data, names, "objective")
@@ -54,15 +57,16 @@ def _best_fraction(data: xr.Dataset) -> Figure:
             lower.plot(place, data["decided"].values[chosen, k], color=colour)
     lower.set_ylabel("best balance fraction")
     lower.set_xlabel(with_unit(data[names[-1]]))
-    return _headed(figure, data, legend, "At the proven optimum of every point.")
+    return _headed(figure, data, legend, f"Every point: {_claimed(data)}.")
 
 
 def balancer_sizing(data: xr.Dataset) -> Figure:
     """Bars of every set of shafts, the plain engine drawn once; lines where something is swept."""
     if swept_names(data):
         return _over_sweep(data, ["shafts"], "Every set of shafts at its own optimum.")
-    labels = [f"{case}\n{_wrapped(str(shafts))}" for case, shafts in zip(data["case"].values, data["shafts"].values,
-                                                                        strict=True)]  # fmt: skip
+    cases, sets = data["case"].values.tolist(), data["shafts"].values.tolist()
+    alone = len(set(cases)) == 1
+    labels = [_wrapped(one) if alone else f"{case}\n{_wrapped(one)}" for case, one in zip(cases, sets, strict=True)]
     return _bars(data, np.array(labels), "Every set of shafts at its own optimum.", data["shafts"].values == "none")
 
 
@@ -116,8 +120,20 @@ def _groups(data: xr.Dataset, names: Sequence[str]) -> list[tuple[str, Any, str]
     for k, key in enumerate(dict.fromkeys(keys)):
         words = [_said(data[name], value) for name, value in zip(told, key, strict=True)]
         chosen = np.array([one == key for one in keys])
-        groups.append((", ".join(words) or str(data["case"].values[0]), chosen, COLOURS[k % len(COLOURS)]))
-    return groups
+        groups.append((", ".join(words) or str(data["case"].values[0]), chosen, k))
+    return [(label, chosen, _colour(k, len(groups))) for label, chosen, k in groups]
+
+
+def _colour(k: int, count: int) -> str:
+    """Of the k-th line: told apart by hue, or ordered from dark to light where there are too many."""
+    return COLOURS[k] if count <= len(COLOURS) else to_hex(colormaps["viridis"](k / (count - 1)))
+
+
+def _legend(entries: Sequence[Artist]) -> Sequence[Artist]:
+    """All entries, or a few of very many: first, last, and some between."""
+    if len(entries) <= len(COLOURS):
+        return entries
+    return [entries[k] for k in np.linspace(0, len(entries) - 1, 5).round().astype(int)]
 
 
 def _said(values: xr.DataArray, value: Any) -> str:
@@ -146,12 +162,21 @@ def _bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> Figure
     _metric_axis(axes, data)
     grey = "no shafts" if once is not None else "as given"
     legend: list[Artist] = [Patch(color=BEFORE, label=grey)] if plain.any() or not single.all() else []
-    legend += [Patch(color=AFTER, label="at the optimum")] if not plain.all() else []
+    legend += [Patch(color=AFTER, label=_claimed(data))] if not plain.all() else []
     return _headed(figure, data, legend, words)
 
 
+def _claimed(data: xr.Dataset) -> str:
+    """What may be said of all that was decided."""
+    decided = data["proof"].values != "as given"
+    return "proven optimum" if np.all(data["proof"].values[decided] == "global") else "best found"
+
+
 def _wrapped(shafts: str) -> str:
-    return "no shafts" if shafts == "none" else shafts.replace(" + ", "\n")
+    """Names of shafts, two a line."""
+    names = shafts.split(" + ")
+    lines = [" + ".join(names[k : k + 2]) for k in range(0, len(names), 2)]
+    return "no shafts" if shafts == "none" else "\n".join(lines)
 
 
 def _page(panels: int, wide: float = PANEL[0]) -> tuple[Figure, tuple[Axes, ...]]:
@@ -166,5 +191,5 @@ def _metric_axis(axes: Axes, data: xr.Dataset) -> None:
 
 def _headed(figure: Figure, data: xr.Dataset, legend: Sequence[Artist], words: str) -> Figure:
     source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
-    heading(figure, data.attrs["title"], words, legend, f"{source}Computed with Laufruhe.")
+    heading(figure, data.attrs["title"], words, _legend(legend), f"{source}Computed with Laufruhe.")
     return figure

@@ -64,7 +64,7 @@ def axis_of(sweep: SweepTable) -> Axis:
     if len(values) < 2:
         rule = "holds one value, which is no sweep" if values else "is empty"
         raise Refused(given, list(values), rule, "give two values or more, or leave the sweep out")
-    unit, numbers = _measured(sweep.quantity, values)
+    unit, numbers = _measured(sweep.quantity, values, given)
     # 1 and true are equal in Python, and 6 m/s is 6000 mm/s
     told_apart = numbers if numbers is not None else tuple(str(value) for value in values)
     if len(set(told_apart)) < len(values):
@@ -73,13 +73,12 @@ def axis_of(sweep: SweepTable) -> Axis:
 
 
 def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
-    for key, value in (("from", sweep.first), ("to", sweep.last), ("points", sweep.points)):
-        if value is None:
-            missing_all = sweep.first is None and sweep.last is None and sweep.points is None
-            if missing_all:
-                raise Refused("values", None, "is missing", "add values, or from, to and points")
-            raise Refused(key, None, "is missing", "a spaced sweep needs from, to and points")
-    assert sweep.first is not None and sweep.last is not None and sweep.points is not None  # noqa: PT018
+    ends = {"from": sweep.first, "to": sweep.last, "points": sweep.points}
+    missing = [key for key, value in ends.items() if value is None]
+    if len(missing) == len(ends):
+        raise Refused("values", None, "is missing", "add values, or from, to and points")
+    if sweep.first is None or sweep.last is None or sweep.points is None:
+        raise Refused(missing[0], None, "is missing", "a spaced sweep needs from, to and points")
     if sweep.points < 2:
         raise Refused("points", sweep.points, "makes no sweep", "give two points or more")
     if sweep.points > MOST_POINTS:
@@ -101,29 +100,32 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
 
 
 def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, ...]]:
-    unit, numbers = _measured(quantity, (first, last))
+    unit, numbers = _measured(quantity, (first, last), "from")
     if numbers is None:
         raise Refused("from", first, "is no number", "list the labels under values")
     return unit, numbers
 
 
-def _measured(quantity: str, values: tuple[Value, ...]) -> tuple[str, tuple[float, ...] | None]:
+def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str, tuple[float, ...] | None]:
     """Unit of the first value, and all values in it; no numbers where they are labels."""
     field = field_at(quantity)
-    if field is None or any(isinstance(value, bool) for value in values):
-        plain = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
-        return ("1", tuple(float(value) for value in plain)) if len(plain) == len(values) else ("", None)
-    if not isinstance(values[0], str):
-        if any(isinstance(value, str) for value in values):
-            raise Refused("values", list(values), "mixes numbers with and without a unit", "write all alike")
-        unit = "deg" if field.plain is not None else "1"
-        return unit, tuple(float(value) for value in values)
-    unit = units.unit_of(values[0]) or "1"
+    plain = [float(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+    texts = [value for value in values if isinstance(value, str)]
+    if field is None or len(plain) + len(texts) < len(values):
+        return ("1", tuple(plain)) if len(plain) == len(values) else ("", None)
+    if not texts:
+        return "deg" if field.plain is not None else "1", tuple(plain)
+    if plain:
+        raise Refused(given, list(values), "mixes numbers with and without a unit", "write all alike")
+    numbers = tuple(_parsed(text, field.unit, given) for text in texts)
+    unit = units.unit_of(texts[0])
+    one = units.parse(f"1 {unit}", field.unit)
+    return unit or "1", tuple(float(f"{number / one:.{_DIGITS}g}") for number in numbers)
+
+
+def _parsed(text: str, unit: str, given: str) -> float:
     try:
-        one = units.parse(f"1 {unit}" if unit != "1" else "1", field.unit)
-        texts = [value if isinstance(value, str) else f"{value!r}" for value in values]
-        numbers = tuple(float(f"{units.parse(text, field.unit) / one:.{_DIGITS}g}") for text in texts)
+        return units.parse(text, unit)
     except units.UnitError as error:
         rule, _, remedy = str(error).partition("; ")
-        raise Refused("values", list(values), rule, remedy) from None
-    return unit, numbers
+        raise Refused(given, text, rule, remedy) from None
