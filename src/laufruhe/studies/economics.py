@@ -160,7 +160,7 @@ class Front:
 def front(problem: Problem, mass_limits: Sequence[float]) -> Front:
     """Least objective under each limit on the mass of the shafts [kg], and without one.
 
-    A problem without shafts is a level line, solved once.
+    A limit that the free optimum keeps changes nothing, so it is not solved for.
 
     Raises
     ------
@@ -171,10 +171,18 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> Front:
     """
     if not problem.objective or any(term.quantity.subject in MASSES for term in problem.objective):
         raise ModelError("shafts are weighed against a load, and none is minimised; minimise mean mount force")
-    optimum, shafts = best(problem), shafts_of(problem)
-    points = tuple(best(problem, limit) if shafts else replace(optimum, mass_limit=limit) for limit in mass_limits)
-    cylinders = len(problem.engine.slider_cranks)
-    return Front(points, optimum, len(shafts), cylinders, objective_name(problem), problem.objective[0].quantity.unit)
+    optimum = best(problem)
+    return Front(
+        points=tuple(
+            replace(optimum, mass_limit=limit) if limit >= optimum.mass else best(problem, limit)
+            for limit in mass_limits
+        ),
+        optimum=optimum,
+        shafts=len(shafts_of(problem)),
+        cylinders=len(problem.engine.slider_cranks),
+        objective=objective_name(problem),
+        unit=problem.objective[0].quantity.unit,
+    )
 
 
 def compared(builds: Sequence[Build], fronts: Sequence[Front]) -> xr.Dataset:
