@@ -31,7 +31,7 @@ def free_forces(data: xr.Dataset) -> Figure:
     legend: list[Artist] = [
         Patch(color=AFTER, label="free"),
         Patch(color=AGAINST, label="of it against the crank"),
-        Line2D([], [], color=INK, marker="o", markersize=3.5, linestyle="", label="printed in tables"),
+        Line2D([], [], color=INK, marker="o", markersize=3.5, linestyle="", label="literature"),
     ]
     words = "Pistons alone, over one cylinder's force, couples times the spacing."
     source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
