@@ -149,7 +149,19 @@ def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
 
 def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
     """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
-    fine = mount_samples(evaluation, k, PEAK_REFINEMENT)
+    fine = _one_period(evaluation, k, PEAK_REFINEMENT)
     coarse = fine[::PEAK_REFINEMENT]
     most = lengths(fine).max(axis=0)
     return [replace(cycle_measures(coarse[:, m]), max=float(most[m])) for m in range(fine.shape[1])]
+
+
+def _one_period(evaluation: Evaluation, k: int, finer: int) -> Array:
+    """As `mount_samples`, without the periods in which the forces repeat."""
+    forces = evaluation.loads[k].mount_forces
+    if forces is None:
+        return mount_samples(evaluation, k, finer)
+    once = forces.reduced()
+    periods = once.base / evaluation.engine.cycle.base_order
+    if periods.denominator != 1 or evaluation.samples % int(periods):
+        return mount_samples(evaluation, k, finer)
+    return once.sample(finer * evaluation.samples // int(periods))

@@ -74,7 +74,8 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     """
     started = time.perf_counter()
     model = AffineModel(problem)
-    initial = evaluate(problem)
+    # most designs are given with what is open at zero, and that one is known
+    initial = evaluate(problem) if any(problem.start) else model.bare
     modelled = time.perf_counter()
     optimum = _refine(problem, model, objective_value(problem, initial), cones or _stated)
     solved = time.perf_counter()

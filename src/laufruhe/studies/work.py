@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
@@ -143,19 +144,20 @@ def _one_thread() -> Iterator[None]:
 
 @contextmanager
 def _no_interrupt() -> Iterator[None]:
-    """Processes started here never see Ctrl-C: it is the parent that keeps what is finished."""
-    if not hasattr(signal, "pthread_sigmask"):
+    """Processes started here never hear Ctrl-C: it is the parent that keeps what is finished."""
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGINT, before)
 
 
 def _serve(pipe: Connection[Any, Any], folder: Path) -> None:
     """A worker: chunks in, one answer a task and a None a chunk out, until the pipe ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     scenes = Scenes(folder)
     try:
         while True:
