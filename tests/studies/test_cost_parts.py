@@ -17,7 +17,7 @@ from laufruhe.report.study_kinds import SHOWN
 from laufruhe.studies import run
 from laufruhe.studies.free_forces import printed_agree
 from laufruhe.studies.kinds import KINDS
-from laufruhe.studies.tolerance import verdicts
+from laufruhe.studies.tolerance_study import verdicts
 from laufruhe.studies.worth import worths
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -58,7 +58,7 @@ claim = "promises nothing"
 [[study.parts.cases]]
 name = "six"
 problem = "{PROBLEMS}/tractor-six.toml"
-claim = "promises nothing"
+claim = "matters"
 """
 LAYOUTS = f"""
 title = "t"
@@ -122,7 +122,7 @@ def test_tolerances_keep_to_the_file(tmp_path: Path) -> None:
     assert four.agrees
     assert not six.agrees
     table = "\n".join(SHOWN["tolerance"].table(data))
-    assert "| finer balancing, six | promises nothing |" in table
+    assert "| finer balancing, six | matters |" in table
     SHOWN["tolerance"].picture(data)
 
 

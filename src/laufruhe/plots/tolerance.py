@@ -13,6 +13,7 @@ from matplotlib.ticker import FuncFormatter
 
 from laufruhe.physics.modes import GRAVITY
 from laufruhe.plots.style import AFTER, FAINT, INK, heading, page
+from laufruhe.studies.tolerance_study import rise_of
 
 SPREAD = "#8fc4e8"
 LEAST = 0.1
@@ -34,7 +35,7 @@ def tolerance(data: xr.Dataset) -> Figure:
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlim(LEAST, max(2.0 * most, 10.0 * LEAST))
     axes.set_ylim(count - 0.5, -0.8)
-    axes.set_yticks(range(count), [str(name) for name in data["case"].values])
+    axes.set_yticks(range(count), [_label(data.sel(case=name)) for name in data["case"].values], size=8)
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="y", visible=False)
     axes.set_xlabel("largest free force over the cycle [kp]")
@@ -45,12 +46,18 @@ def tolerance(data: xr.Dataset) -> Figure:
     ]
     if len(stated):
         legend.append(Line2D([], [], color=FAINT, linestyle=(0, (3, 2)), label="stated"))
-    words = "What tolerances add, at random and at their worst, beside the free force of the engine as drawn."
+    words = "What tolerances add to the free force. Percents: what 95 of 100 engines add to the mean mount force at most."
     source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
     heading(
         drawn.figure, data.attrs["title"], words, legend, f"{source}Seed {data.attrs['seed']}. Computed with Laufruhe."
     )
     return drawn.figure
+
+
+def _label(data: xr.Dataset) -> str:
+    """Name, and what tolerances do to the mounts."""
+    rise = rise_of(data)
+    return str(data["case"].item()) + (f"\n{100.0 * rise:+.1f} %" if np.isfinite(rise) else "")
 
 
 def _row(axes: Axes, data: xr.Dataset, row: int) -> None:

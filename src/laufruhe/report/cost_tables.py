@@ -11,7 +11,8 @@ from laufruhe.report.study_tables import NOTHING, number, table
 from laufruhe.studies.economics import Standing
 from laufruhe.studies.free_forces import printed_agree
 from laufruhe.studies.tolerance import CAUSES
-from laufruhe.studies.tolerance import verdicts as tolerance_verdicts
+from laufruhe.studies.tolerance_study import rise_of
+from laufruhe.studies.tolerance_study import verdicts as tolerance_verdicts
 from laufruhe.studies.tractor.verdict import Verdict
 from laufruhe.studies.worth import verdicts, worths
 
@@ -57,6 +58,7 @@ def tolerance(data: xr.Dataset) -> list[str]:
     """Nominal, worst and random free forces of every engine [kp], cause by cause, and what was said."""
     head = ["engine", "drawing [kp]", "worst sum [kp]", *(f"of it {cause} [kp]" for cause in CAUSES)]
     head += ["random: mean [kp]", "95 % below [kp]", "drawing over worst sum"]
+    head += ["mean mount force, drawing [kp]", "95 % of built engines: at most"]
     rows = []
     for name in data["case"].values:
         row = data.sel(case=name)
@@ -64,7 +66,8 @@ def tolerance(data: xr.Dataset) -> list[str]:
         parts = [f"{float(row['worst_' + cause.replace(' ', '_')]) / GRAVITY:.1f}" for cause in CAUSES]
         often = float(row["random"].sel(share=0.95, method="nearest")) / GRAVITY
         cells = [str(name), f"{nominal:.3g}", f"{worst:.1f}", *parts, f"{float(row['mean']) / GRAVITY:.1f}"]
-        rows.append([*cells, f"{often:.1f}", f"{nominal / worst:.2g}"])
+        cells += [f"{often:.1f}", f"{nominal / worst:.2g}", number(float(row["mount"]) / GRAVITY, 3)]
+        rows.append([*cells, f"{100.0 * rise_of(row):+.1f} %"])
     return [*table(head, rows, len(rows)), "", *_said(tolerance_verdicts(data))]
 
 

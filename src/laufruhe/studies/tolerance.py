@@ -7,18 +7,15 @@ so finer balancing promises nothing for engines of fewer than six cylinders.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 from laufruhe.problem.model import Problem
-from laufruhe.studies.tractor.verdict import Verdict
 
 Array = NDArray[np.float64]
 
@@ -26,9 +23,6 @@ ANGLES = 360
 DIRECTIONS = 720
 PIECE = 500
 CAUSES = ("reciprocating masses", "unbalance", "alignment")
-SHARES = np.arange(201) / 200.0
-SEVERAL = 3.0
-"""A force this many times another decides alone: the rest moves it by less than a third, were they in phase."""
 
 
 @dataclass(frozen=True)
@@ -141,93 +135,3 @@ def nominal_force(problem: Problem) -> float:
     steps = ANGLES * problem.engine.cycle.turns
     force = _sampled(shaking_loads(problem.engine, point, problem.fidelity).sample(steps))
     return float(np.hypot(force[:, 0], force[:, 1]).max())
-
-
-@dataclass(frozen=True)
-class Spread:
-    """What tolerances do to the free force of one engine [N].
-
-    Attributes
-    ----------
-    nominal
-        Largest over the cycle, of the engine as drawn.
-    worst
-        Largest that each cause adds, by its name.
-    mean
-        Of what is added at random.
-    random
-        What this share (SHARES) of random engines stay below.
-    speed
-        Of the crank [rad/s].
-    """
-
-    nominal: float
-    worst: dict[str, float]
-    mean: float
-    random: tuple[float, ...]
-    speed: float
-
-
-def spread(problem: Problem, tolerances: Tolerances, builds: int = 10_000, seed: int = 1964) -> Spread:
-    """Nominal free force, the worst that tolerances add, and how it is distributed over random engines.
-
-    Raises
-    ------
-    ModelError
-        If the problem has several operating points.
-    """
-    if len(problem.points) != 1:
-        raise ModelError(f"'{problem.name}' needs one operating point where tolerances are studied; give it one")
-    engine, speed = problem.engine, problem.points[0].speed
-    drawn = random_forces(engine, speed, tolerances, builds, seed)
-    quantiles = tuple(float(q) for q in np.quantile(drawn, SHARES))
-    worst = worst_parts(engine, speed, tolerances)
-    return Spread(nominal_force(problem), worst, float(drawn.mean()), quantiles, speed)
-
-
-def compared(spreads: Mapping[str, Spread]) -> xr.Dataset:
-    """Several engines side by side as one labelled dataset."""
-    found = list(spreads.values())
-
-    def newton(words: str) -> dict[str, str]:
-        return {"units": "N", "long_name": words}
-
-    causes = {
-        f"worst_{cause.replace(' ', '_')}": ("case", [own.worst[cause] for own in found], newton(f"from {cause} alone"))
-        for cause in CAUSES
-    }
-    worst = [sum(own.worst.values()) for own in found]
-    shares = np.array([own.random for own in found])
-    return xr.Dataset(
-        {
-            "nominal": ("case", [own.nominal for own in found], newton("largest free force of the drawing")),
-            "worst": ("case", worst, newton("largest free force that tolerances add")),
-            **causes,
-            "mean": ("case", [own.mean for own in found], newton("mean of what tolerances add at random")),
-            "random": (("case", "share"), shares, newton("added free force that this share of random engines keeps")),
-        },
-        coords={
-            "case": list(spreads),
-            "share": ("share", SHARES, {"units": "1", "long_name": "share of random engines that stay below"}),
-            "speed": ("case", [own.speed for own in found], {"units": "rad/s"}),
-        },
-        attrs={"title": "Tolerances against free forces", "kind": "tolerance", "source": ""},
-    )
-
-
-def verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
-    """What the source says of finer balancing, engine by engine, confirmed or not.
-
-    It promises nothing where the free force of the drawing is several times the worst sum of
-    tolerances: without tolerances at all the engine would shake as before.
-    """
-    found = []
-    for name in data["case"].values:
-        row = data.sel(case=name)
-        claim, times = str(row["claim"].item()), float(row["nominal"] / row["worst"])
-        if claim:
-            agrees = (times > SEVERAL) == (claim == "promises nothing")
-            why = f"promises nothing where the drawing leaves more than {SEVERAL:g} times what tolerances add at worst"
-            unit = "times the worst sum"
-            found.append(Verdict(f"finer balancing, {name}", claim, times, unit, agrees, why))
-    return tuple(found)

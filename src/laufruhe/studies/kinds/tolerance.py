@@ -10,7 +10,8 @@ from laufruhe.problem.study_costs import ToleranceTable
 from laufruhe.studies.kinds.kind import Kind
 from laufruhe.studies.kinds.swept import refused
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.tolerance import Spread, Tolerances, compared, spread
+from laufruhe.studies.tolerance import Tolerances
+from laufruhe.studies.tolerance_study import Spread, compared, spread
 
 if TYPE_CHECKING:
     import xarray as xr
