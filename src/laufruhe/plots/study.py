@@ -22,6 +22,8 @@ COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#3
 PANEL = (6.4, 3.6)
 # width of a letter of a tick [inch], and the points of a line from which on dots would hide it
 LETTER, MOST_DOTS = 0.066, 40
+# nothing lies between two labels
+LABELLED: dict[str, Any] = {"marker": "o", "markersize": 6, "linestyle": ""}
 
 
 def counterweight_fraction(data: xr.Dataset) -> Figure:
@@ -100,18 +102,13 @@ def _over_sweep(data: xr.Dataset, told_apart: Sequence[str], words: str) -> Figu
 def _lines(axes: Axes, data: xr.Dataset, names: Sequence[str], variable: str) -> list[Artist]:
     """One line for every case and combination of all named but the last, over the last."""
     legend: list[Artist] = []
-    places = _places(data, names[-1])
+    places, values = _places(data, names[-1]), data[names[-1]].values
+    numbers = values.dtype.kind in "fi"
     for label, chosen, colour in _groups(data, names[:-1]):
-        axes.plot(
-            places[chosen],
-            data[variable].values[chosen],
-            color=colour,
-            marker="." if chosen.sum() <= MOST_DOTS else "",
-            markersize=4,
-        )
-        legend.append(Line2D([], [], color=colour, label=label))
-    values = data[names[-1]].values
-    if values.dtype.kind not in "fi":
+        style = {"marker": "." if chosen.sum() <= MOST_DOTS else "", "markersize": 4} if numbers else LABELLED
+        axes.plot(places[chosen], data[variable].values[chosen], color=colour, **style)
+        legend.append(Line2D([], [], color=colour, label=label, **({} if numbers else LABELLED)))
+    if not numbers:
         labels = list(dict.fromkeys(values.tolist()))
         axes.set_xticks(range(len(labels)), [str(label) for label in labels], size=8)
     _metric_axis(axes, data)
@@ -211,7 +208,8 @@ def _page(panels: int, wide: float = PANEL[0]) -> tuple[Figure, tuple[Axes, ...]
 
 def _metric_axis(axes: Axes, data: xr.Dataset) -> None:
     axes.set_ylabel(f"{data.attrs['metric']} [{data['objective'].attrs['units']}]")
-    axes.set_ylim(bottom=0.0)
+    top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", "objective_given"))
+    axes.set_ylim(0.0, 1.08 * top or 1.0)
 
 
 def _headed(figure: Figure, data: xr.Dataset, legend: Sequence[Artist], words: str) -> Figure:
