@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 import laufruhe.studies.scenes
 from laufruhe.cli import app
 from laufruhe.errors import InputError
+from laufruhe.problem.model import Limit
 from laufruhe.problem.reader import load
 from laufruhe.problem.study_parts import CaseTable
 from laufruhe.problem.study_reader import load_study
@@ -31,6 +32,7 @@ from laufruhe.studies import Point, Scenes, run, work
 from laufruhe.studies.kept import NAME, KeptPoints
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
+from laufruhe.studies.outcome import solved
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPEED = "operating_points.1.mean_piston_speed"
@@ -137,6 +139,12 @@ def test_limits_on_absent_shafts_are_none(tmp_path: Path) -> None:
     assert data["objective"].values[-1] == pytest.approx(227.3, abs=0.1)
 
 
+def test_mass_of_no_shafts_is_zero(tmp_path: Path) -> None:
+    data = computed(study(tmp_path, part("balancer sizing", ["tractor-three"], more='metric = "balancer mass"')))
+    assert data["objective"].values[0] == 0.0
+    assert data["objective"].attrs["units"] == "kg"
+
+
 def test_groups_follow_decisions() -> None:
     problem = load(PROBLEMS / "tractor-four-lanchester-and-moment.toml")
     assert shaft_groups(problem) == [("force left", "force right"), ("moment left", "moment right")]
@@ -158,6 +166,15 @@ def test_nothing_open_is_not_called_an_optimum(tmp_path: Path) -> None:
     assert parts["coords"]["proof"]["data"] == ["as given", "global"]
     assert parts["data_vars"]["lower_bound"]["data"][0] is None
     assert parts["seconds"] > 0.0
+
+
+def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
+    problem = load(PROBLEMS / "tractor-four-lanchester.toml")
+    force = Limit("force", problem.objective[0].quantity, 1.0)
+    kept = solved(replace(problem, limits=(force,)))
+    assert (kept.status, kept.proof) == ("infeasible", "none")
+    assert kept.objective_given == pytest.approx(893.3, abs=0.1)
+    assert np.isnan([kept.objective, kept.lower_bound, *kept.mean]).all()
 
 
 def test_goes_on_from_a_file_cut_at_any_byte(tmp_path: Path, small: Path) -> None:

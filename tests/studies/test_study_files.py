@@ -40,6 +40,7 @@ def case(name: str, problem: str, more: str = "") -> str:
 
 VEE = PROBLEMS / "vee-six-60.toml"
 FOUR = PROBLEMS / "tractor-four-lanchester.toml"
+FIGURES = study().replace("[study]", '[study]\nfigures = "tractor"').replace('name = "p"', 'name = "fig-10"')
 LONGER = case("T", str(FOUR), 'set = { "engine.stroke" = "100 mm" }')
 BAD = [
     (study("counterweight fracton"), "did you mean 'counterweight fraction'?"),
@@ -61,6 +62,8 @@ BAD = [
     (study(sweep=swept(SPEED, "")), "values: is missing; add values, or from, to and points"),
     (study(sweep=swept(SPEED, 'values = ["6 m/s", "8 m/s"]\npoints = 3')), "are given beside from"),
     (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "log"')), "has no logarithm"),
+    (study(sweep=swept(FRACTION, "from = 0\nto = inf\npoints = 3")), "is not finite"),
+    (FIGURES, "is a figure of the study itself"),
     (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "cubic"')), "use one of: linear, log"),
     (study(sweep=2 * swept(FRACTION, "values = [0, 1]")), "is swept twice"),
     (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{FRACTION}" = 0.5 }}', "is swept, and set by"),

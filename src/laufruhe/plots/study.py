@@ -16,10 +16,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from laufruhe.plots.style import AFTER, BEFORE, heading, page
-from laufruhe.report.study_tables import swept_names, with_unit
+from laufruhe.report.study_tables import settled, swept_names, with_unit
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#332288", "#999933")
 PANEL = (6.4, 3.6)
+# width of a letter of a tick [inch], and the points of a line from which on dots would hide it
+LETTER, MOST_DOTS = 0.066, 40
+# nothing lies between two labels
+LABELLED: dict[str, Any] = {"marker": "o", "markersize": 6, "linestyle": ""}
 
 
 def counterweight_fraction(data: xr.Dataset) -> Figure:
@@ -64,10 +68,19 @@ def balancer_sizing(data: xr.Dataset) -> Figure:
     """Bars of every set of shafts, the plain engine drawn once; lines where something is swept."""
     if swept_names(data):
         return _over_sweep(data, ["shafts"], "Every set of shafts at its own optimum.")
-    cases, sets = data["case"].values.tolist(), data["shafts"].values.tolist()
-    alone = len(set(cases)) == 1
-    labels = [_wrapped(one) if alone else f"{case}\n{_wrapped(one)}" for case, one in zip(cases, sets, strict=True)]
-    return _bars(data, np.array(labels), "Every set of shafts at its own optimum.", data["shafts"].values == "none")
+    plain = data["shafts"].values == "none"
+    if np.ptp(data["objective"].values[plain]) == 0.0:
+        # cases that differ in their shafts alone have one plain engine
+        shown = np.concatenate([np.flatnonzero(plain)[:1], np.flatnonzero(~plain)])
+        data, shared = data.isel(point=shown), True
+    else:
+        shared = False
+    alone = len(set(data["case"].values.tolist())) == 1
+    labels = [
+        _wrapped(shafts) if alone or (shared and shafts == "none") else f"{case}\n{_wrapped(shafts)}"
+        for case, shafts in zip(data["case"].values.tolist(), data["shafts"].values.tolist(), strict=True)
+    ]
+    return _bars(data, labels, "Every set of shafts at its own optimum.", data["shafts"].values == "none")
 
 
 def layout_comparison(data: xr.Dataset) -> Figure:
@@ -89,12 +102,13 @@ def _over_sweep(data: xr.Dataset, told_apart: Sequence[str], words: str) -> Figu
 def _lines(axes: Axes, data: xr.Dataset, names: Sequence[str], variable: str) -> list[Artist]:
     """One line for every case and combination of all named but the last, over the last."""
     legend: list[Artist] = []
-    places = _places(data, names[-1])
+    places, values = _places(data, names[-1]), data[names[-1]].values
+    numbers = values.dtype.kind in "fi"
     for label, chosen, colour in _groups(data, names[:-1]):
-        axes.plot(places[chosen], data[variable].values[chosen], color=colour, marker=".", markersize=4)
-        legend.append(Line2D([], [], color=colour, label=label))
-    values = data[names[-1]].values
-    if values.dtype.kind not in "fi":
+        style = {"marker": "." if chosen.sum() <= MOST_DOTS else "", "markersize": 4} if numbers else LABELLED
+        axes.plot(places[chosen], data[variable].values[chosen], color=colour, **style)
+        legend.append(Line2D([], [], color=colour, label=label, **({} if numbers else LABELLED)))
+    if not numbers:
         labels = list(dict.fromkeys(values.tolist()))
         axes.set_xticks(range(len(labels)), [str(label) for label in labels], size=8)
     _metric_axis(axes, data)
@@ -138,25 +152,27 @@ def _legend(entries: Sequence[Artist]) -> Sequence[Artist]:
 
 def _said(values: xr.DataArray, value: Any) -> str:
     unit = values.attrs.get("units", "")
-    text = f"{value:g}" if isinstance(value, float) else str(value)
-    return text if unit in ("", "1") else f"{text} {unit}"
+    if not isinstance(value, float):
+        return str(value)
+    return f"{values.attrs['long_name']} {value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 
 def _bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> Figure:
     """As given in grey beside the optimum in blue; one grey bar where nothing is open, or `once` says so."""
     count = data.sizes["point"]
-    figure, (axes,) = _page(1, max(PANEL[0], 1.15 * count))
+    widest = max(len(line) for label in labels for line in str(label).split("\n"))
+    figure, (axes,) = _page(1, max(PANEL[0], count * max(1.15, 0.2 + LETTER * widest)))
     alone = data["proof"].values == "as given"
     single = alone if once is None else np.ones(count, dtype=bool)
     plain = alone | (np.zeros(count, dtype=bool) if once is None else once)
     given, best = data["objective_given"].values, data["objective"].values
+    most = max(np.nanmax(given, initial=0.0), np.nanmax(best, initial=0.0))
     for k in range(count):
         if single[k]:
-            bars = axes.bar([k], [best[k]], 0.5, color=BEFORE if plain[k] else AFTER, linewidth=0)
-            axes.bar_label(bars, fmt="%.4g", size=7.5)
+            _bar(axes, k, best[k], 0.5, BEFORE if plain[k] else AFTER, most)
             continue
         for shift, value, colour in ((-0.2, given[k], BEFORE), (0.2, best[k], AFTER)):
-            axes.bar_label(axes.bar([k + shift], [value], 0.36, color=colour, linewidth=0), fmt="%.4g", size=7.5)
+            _bar(axes, k + shift, value, 0.36, colour, most)
     axes.set_xticks(range(count), [str(label) for label in labels], size=7.5)
     axes.grid(axis="x", visible=False)
     _metric_axis(axes, data)
@@ -164,6 +180,12 @@ def _bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> Figure
     legend: list[Artist] = [Patch(color=BEFORE, label=grey)] if plain.any() or not single.all() else []
     legend += [Patch(color=AFTER, label=_claimed(data))] if not plain.all() else []
     return _headed(figure, data, legend, words)
+
+
+def _bar(axes: Axes, place: float, value: float, width: float, colour: str, most: float) -> None:
+    """One bar and its value; what rounding leaves of a balanced engine is zero."""
+    drawn = axes.bar([place], [value], width, color=colour, linewidth=0)
+    axes.bar_label(drawn, [f"{settled(value, most):.4g}" if np.isfinite(value) else "none"], size=7.5)
 
 
 def _claimed(data: xr.Dataset) -> str:
@@ -186,7 +208,8 @@ def _page(panels: int, wide: float = PANEL[0]) -> tuple[Figure, tuple[Axes, ...]
 
 def _metric_axis(axes: Axes, data: xr.Dataset) -> None:
     axes.set_ylabel(f"{data.attrs['metric']} [{data['objective'].attrs['units']}]")
-    axes.set_ylim(bottom=0.0)
+    top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", "objective_given"))
+    axes.set_ylim(0.0, 1.08 * top or 1.0)
 
 
 def _headed(figure: Figure, data: xr.Dataset, legend: Sequence[Artist], words: str) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,6 +110,8 @@ def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, .
 def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str, tuple[float, ...] | None]:
     """Unit of the first value, and all values in it; no numbers where they are labels."""
     field = field_at(quantity)
+    if any(isinstance(value, float) and not math.isfinite(value) for value in values):
+        raise Refused(given, list(values), "is not finite", "give numbers")
     plain = [float(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
     texts = [value for value in values if isinstance(value, str)]
     if field is None or len(plain) + len(texts) < len(values):

@@ -69,12 +69,21 @@ def _part(name: str, data: xr.Dataset, folder: Path) -> list[str]:
 def _flat(data: xr.Dataset) -> Any:
     """A row a point: what stands for every mount and decision becomes a column each."""
     wide = [str(dim) for dim in ("mount", "decision") if dim in data.dims]
-    rows = data.drop_dims(wide).to_dataframe()
+    narrow = data.drop_dims(wide)
+    units = {str(name): values.attrs.get("units", "") for name, values in narrow.variables.items()}
+    rows = narrow.to_dataframe().rename(columns={name: _headed(name, unit) for name, unit in units.items()})
+    of_decisions = data["decision_unit"].values.tolist() if "decision_unit" in data.coords else []
     for name, values in data.data_vars.items():
         if len(values.dims) == 2 and values.dims[1] in wide:
-            for k, of in enumerate(data[values.dims[1]].values):
-                rows[f"{name}: {of}"] = values.values[:, k]
+            across = data[values.dims[1]].values
+            named = of_decisions if values.dims[1] == "decision" else [values.attrs.get("units", "")] * len(across)
+            for k, (of, unit) in enumerate(zip(across, named, strict=True)):
+                rows[_headed(f"{name}: {of}", unit)] = values.values[:, k]
     return rows
+
+
+def _headed(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
 def as_json(study: StudyFile, datasets: Mapping[str, xr.Dataset], seconds: Mapping[str, float]) -> str:

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MOST_ROWS = 80
+NEGLIGIBLE = 1e-9
 NOTHING = "–"
 _PROOFS = {"global": "proven", "global within gap": "proven within gap", "local": "local", "none": "not proven"}
 
@@ -27,6 +28,11 @@ def with_unit(values: xr.DataArray) -> str:
 def number(value: float, digits: int = 5) -> str:
     """A number of a table; a dash where there is none."""
     return NOTHING if value != value else f"{value:.{digits}g}"
+
+
+def settled(value: float, scale: float) -> float:
+    """Zero for what rounding leaves beside a scale: an engine in balance has no small force."""
+    return 0.0 if abs(value) < NEGLIGIBLE * abs(scale) else value
 
 
 def by_point(data: xr.Dataset, *named: str) -> list[str]:
@@ -60,6 +66,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], whole: int) -> lis
 
 def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
     given, best, bound = (float(row[name]) for name in ("objective_given", "objective", "lower_bound"))
+    best = settled(best, given)
     proof, status = str(row["proof"].item()), str(row["status"].item())
     decided = proof != "as given"
     change = f"{100.0 * (best / given - 1.0):+.1f} %" if decided and given and best == best else NOTHING

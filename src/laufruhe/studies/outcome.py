@@ -65,11 +65,13 @@ class Outcome:
 
 
 def solved(problem: Problem) -> Outcome:
-    """Solve a scene; one that no solver answers is kept as failed."""
+    """Solve a scene; one without a design is kept as given, and says why."""
     try:
         result = solve(problem, many=True)
     except SolverError:
         return _outcome(state(problem), FAILED, "none")
+    if result.objective is None:
+        return _outcome(state(problem), str(result.status), "none")
     proof = str(result.certificate.kind) if result.certificate else AS_GIVEN if _is_closed(problem) else "none"
     return _outcome(result, str(result.status), proof)
 
@@ -127,9 +129,14 @@ def coordinates(axes: Sequence[Axis], points: Sequence[Point]) -> dict[str, Any]
     for axis in axes:
         values = [point.changes[axis.quantity] for point in points]
         number = axis.by_value()
-        shown = [str(value) for value in values] if axis.numbers is None else [number[value] for value in values]
+        shown = [label(value) for value in values] if axis.numbers is None else [number[value] for value in values]
         found[axis.quantity] = ("point", shown, {"units": axis.unit, "long_name": axis.name, "swept": 1})
     return found
+
+
+def label(value: Any) -> str:
+    """A value as a problem file has it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def dataset(

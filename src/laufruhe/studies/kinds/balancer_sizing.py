@@ -73,11 +73,12 @@ def _counting(problem: Problem) -> Problem:
 
     terms = [(term, counted(term.quantity)) for term in problem.objective]
     limits = [(limit, counted(limit.quantity)) for limit in problem.limits]
-    return replace(
-        problem,
-        objective=tuple(replace(term, quantity=quantity) for term, quantity in terms if quantity is not None),
-        limits=tuple(replace(limit, quantity=quantity) for limit, quantity in limits if quantity is not None),
-    )
+    limits_left = tuple(replace(limit, quantity=quantity) for limit, quantity in limits if quantity is not None)
+    terms_left = tuple(replace(term, quantity=quantity) for term, quantity in terms if quantity is not None)
+    if not terms_left:
+        # the mass of no shafts is zero, whatever else is open
+        return replace(problem, limits=limits_left, decisions=())
+    return replace(problem, objective=terms_left, limits=limits_left)
 
 
 def _dataset(part: BalancerSizingTable, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
