@@ -46,7 +46,7 @@ def tolerance(data: xr.Dataset) -> Figure:
     ]
     if len(stated):
         legend.append(Line2D([], [], color=FAINT, linestyle=(0, (3, 2)), label="stated"))
-    words = "What tolerances add to the free force. Percents: what 95 of 100 engines add to the mean mount force at most."
+    words = "What tolerances add to the free force. Percents: what 95 of 100 add to the mean mount force at most."
     source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
     heading(
         drawn.figure, data.attrs["title"], words, legend, f"{source}Seed {data.attrs['seed']}. Computed with Laufruhe."
