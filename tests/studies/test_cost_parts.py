@@ -194,6 +194,14 @@ def test_several_operating_points_have_no_tolerance(tmp_path: Path) -> None:
     refused(tmp_path, part, "has several in 'six', and tolerances are studied at one")
 
 
+def test_open_stars_are_left_to_solve(tmp_path: Path) -> None:
+    text = (PROBLEMS / "tractor-three-shafts.toml").read_text(encoding="utf-8")
+    (tmp_path / "open.toml").write_text(
+        text.replace("firing_order = [1, 3, 2]", 'cylinders = 3\nthrows = "open"'), encoding="utf-8"
+    )
+    refused(tmp_path, ECONOMICS.replace(f"{PROBLEMS}/tractor-three-shafts.toml", "open.toml"), "use laufruhe solve")
+
+
 def test_limits_that_no_design_keeps_are_one_line(tmp_path: Path) -> None:
     text = (PROBLEMS / "tractor-three-shafts.toml").read_text(encoding="utf-8")
     quiet = '\n[[constraints]]\nlimit = "maximum mount force"\nmax = "1 N"\n'

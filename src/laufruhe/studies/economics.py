@@ -81,7 +81,8 @@ class FrontPoint:
     lower_bound
         What no design within the limit falls below [SI].
     price
-        Fall of the least objective per kilogram more [SI / kg].
+        Fall of the least objective per kilogram more [SI / kg]; zero where the limit does
+        not bind, and at no mass at all, where the solver's price has nothing to vary.
     """
 
     mass_limit: float

@@ -73,6 +73,9 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
     asked: dict[str, Point] = {}
     for point in points:
         problem = scenes.problem(point)
+        if problem.phasing is not None:
+            rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
+            raise refused(scenes, point.case, "phasing", rule, remedy)
         objective = tuple(problem.objective)
         if not objective:
             raise refused(scenes, point.case, "objective", "is missing, so shafts have nothing to lower", "add one")
