@@ -19,6 +19,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import laufruhe.studies.scenes
+from laufruhe import cli_study
 from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.problem.model import Limit
@@ -241,6 +242,20 @@ def test_points_hang_on_all_that_they_use(tmp_path: Path, monkeypatch: pytest.Mo
 def pool_at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(work, "POOL_PAYS", 0.0)
     return
+
+
+def test_progress_says_how_long_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of what this run has done, not of what was kept; and not more often than can be read."""
+    now, said = [0.0], []
+    monkeypatch.setattr(cli_study.time, "perf_counter", lambda: now[0])
+    tell = cli_study._Teller(said.append)
+    tell(5000, 10_000)
+    now[0] = 10.0
+    tell(5100, 10_000)
+    now[0] = 10.1
+    tell(5101, 10_000)
+    tell(10_000, 10_000)
+    assert said == ["5000 of 10000 points", "5100 of 10000 points, about 8 min left", "10000 of 10000 points"]
 
 
 def test_cores_change_nothing(tmp_path: Path, small: Path, pool_at_once: None) -> None:

@@ -175,7 +175,7 @@ def _bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> Figure
             _bar(axes, k + shift, value, 0.36, colour, most)
     axes.set_xticks(range(count), [str(label) for label in labels], size=7.5)
     axes.grid(axis="x", visible=False)
-    _metric_axis(axes, data)
+    _metric_axis(axes, data, *(() if single.all() else ("objective_given",)))
     grey = "no shafts" if once is not None else "as given"
     legend: list[Artist] = [Patch(color=BEFORE, label=grey)] if plain.any() or not single.all() else []
     legend += [Patch(color=AFTER, label=_claimed(data))] if not plain.all() else []
@@ -206,9 +206,9 @@ def _page(panels: int, wide: float = PANEL[0]) -> tuple[Figure, tuple[Axes, ...]
     return drawn.figure, drawn.panels
 
 
-def _metric_axis(axes: Axes, data: xr.Dataset) -> None:
+def _metric_axis(axes: Axes, data: xr.Dataset, *drawn: str) -> None:
     axes.set_ylabel(f"{data.attrs['metric']} [{data['objective'].attrs['units']}]")
-    top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", "objective_given"))
+    top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", *drawn))
     axes.set_ylim(0.0, 1.08 * top or 1.0)
 
 
