@@ -179,10 +179,13 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
             rows = norm.rows(x) + cp.reshape(moves.reshape(k * d, -1) @ z, (k, d), order="C")
             held.append(norm.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
     program = cp.Problem(cp.Minimize(cp.sum(cp.hstack(sizes))), held)
-    try:
-        program.solve(solver=cp.CLARABEL)
-    except cp.error.SolverError:
-        return x
+    with warnings.catch_warnings():
+        # the design is evaluated again, however inaccurate this was
+        warnings.simplefilter("ignore")
+        try:
+            program.solve(solver=cp.CLARABEL)
+        except cp.error.SolverError:
+            return x
     if z.value is None:
         return x
     lighter = x + still @ np.asarray(z.value)
