@@ -36,7 +36,7 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
     with files.staged(folder, "--out" if out is not None else "results", file_names(study)) as stage:
         write_study(study, datasets, seconds, stage, shlex.join(["laufruhe", "study", str(path)]), say)
     kept.unlink(missing_ok=True)
-    spent = "".join(f"{duration:8.1f} s  {name}\n" for name, duration in seconds.items())
+    spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())
     text = f"{spent}done in {time.perf_counter() - started:.1f} s: {folder / files.REPORT}\n"
     return text, as_json(study, datasets, seconds)
 
