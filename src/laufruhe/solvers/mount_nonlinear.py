@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.evaluation import Evaluation, evaluate, remounted
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
 from laufruhe.problem.mount_values import excess, whole_objective
@@ -37,6 +37,8 @@ SLACK = 1e-5
 MOST_MARGINS = 3
 # candidates for each start: their modes cost a thousandth of a search
 POOL = 40
+LEAST_POOL = 640
+POOL_SAMPLES = 72
 ITERATIONS = 150
 MOST_AROUND = 3
 SPREAD = 0.4
@@ -70,9 +72,8 @@ def solve_joint(problem: Problem, workers: int | None = None) -> Result:
     """
     started = time.perf_counter()
     initial = evaluate(problem)
-    balanced = _balanced(problem)
+    points = start_points(problem)
     joint = JointProgram(problem)
-    points = _starts(problem, joint.model.domains, balanced)
     modelled = time.perf_counter()
     optima = _searched(problem, joint, points, workers)
     best, design = _first_allowed(problem, joint, optima)
@@ -119,11 +120,13 @@ def _balanced(problem: Problem) -> list[complex] | None:
     return _unbalances_of(problem, result) if result.decisions else None
 
 
-def _starts(
-    problem: Problem, domains: Sequence[Domain], balanced: list[complex] | None
-) -> list[tuple[list[float], Array]]:
-    """The design as given, then points spread over all bounds: stiffness by ratio, unbalances in their sets."""
-    design = problem.mount_design
+def start_points(problem: Problem) -> list[tuple[list[float], Array]]:
+    """Mounts and columns of unbalances that a search starts from.
+
+    The design as given, then points spread over all bounds: stiffness by ratio,
+    unbalances in their sets.
+    """
+    design, domains, balanced = problem.mount_design, domains_of(problem.decisions), _balanced(problem)
     decisions = design.decisions
     ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
     low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
@@ -131,7 +134,10 @@ def _starts(
     low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
     wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
     spread = spread_starts(
-        np.concatenate([low_log, -wide]), np.concatenate([high_log, wide]), POOL * design.starts, design.seed
+        np.concatenate([low_log, -wide]),
+        np.concatenate([high_log, wide]),
+        max(POOL * design.starts, LEAST_POOL),
+        design.seed,
     )
     best = _columns(domains, problem.start if balanced is None else balanced)
     found = [(given.tolist(), best)]
@@ -147,17 +153,19 @@ def _starts(
 
 
 def _promising(problem: Problem, pool: Array, count: int, wanted: int) -> Array:
-    """Points of the pool that break the limits on modes and sag least; half of them taken as they come."""
-    limits = [m for m in problem.mount_design.limits if m.quantity.measure is not MountMeasure.TRANSMISSIBILITY]
-    if not limits:
-        return pool[:wanted]
-    bare = replace(evaluate(replace(problem, points=())), loads=())
-    misses = []
+    """Points of the pool that break limits on mounts least and are worth most; a third taken as they come."""
+    given = replace(evaluate(problem), samples=POOL_SAMPLES)
+    whole = abs(whole_objective(problem, given)) or 1.0
+    scores = []
     for row in pool:
-        engine = problem.mount_design.applied(problem.engine, row[:count].tolist())
-        design = replace(bare, engine=engine)
-        misses.append(sum(max(excess(limit, design), 0.0) for limit in limits))
-    best = np.argsort(misses, kind="stable")
+        try:
+            design = remounted(given, problem.mount_design.applied(problem.engine, row[:count].tolist()))
+        except ModelError:
+            scores.append(np.inf)
+            continue
+        misses = sum(max(excess(limit, design), 0.0) for limit in problem.mount_design.limits)
+        scores.append(misses + whole_objective(problem, design) / whole)
+    best = np.argsort(scores, kind="stable")
     chosen = list(best[: wanted - wanted // 3])
     chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
     return pool[chosen]
