@@ -29,6 +29,7 @@ from laufruhe.solvers.mount_result import (
 )
 from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear, spread_starts
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
+from laufruhe.solvers.transmitted_bound import transmitted_bound
 from laufruhe.solvers.unbalances import decision_values, solve_unbalances
 
 Array = NDArray[np.float64]
@@ -274,10 +275,10 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
 
 
 def _bound(problem: Problem) -> float:
-    """What the convex part alone proves of the objective; zero where it says nothing."""
+    """What no design goes under: by least transmitted forces (E34), or by the convex part alone; zero for neither."""
     convex = _convex_part(problem)
     if convex is None or problem.objective or convex.mount_design.terms != problem.mount_design.terms:
-        return 0.0
+        return transmitted_bound(problem)
     certificate = solve_convex_mounts(convex).certificate
     return certificate.lower_bound if certificate is not None else 0.0
 

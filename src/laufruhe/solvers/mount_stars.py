@@ -1,4 +1,4 @@
-"""Stars decided together with mounts and balance (E29, E30).
+"""Stars decided together with mounts and balance (E35).
 
 Even stars are finitely many. On the mounts as given each one's balance is a cone
 program, whose dual rows bound every other star (S14): that ranks them. The best of the
@@ -66,7 +66,7 @@ class _Found:
 
 
 def solve_star_mounts(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Result:
-    """The best of the stars, each with mounts and balance decided together (E29, E30).
+    """The best of the stars, each with mounts and balance decided together (E35).
 
     Parameters
     ----------
