@@ -73,6 +73,9 @@ class _Request:
         return shlex.join(words if self.tolerance is None else [*words, "--tolerance", f"{self.tolerance:g}"])
 
 
+_Answer = Callable[["Problem", Callable[[str], None]], "Result"]
+
+
 @app.command()
 def solve(
     problem: ProblemArgument,
@@ -94,7 +97,7 @@ def evaluate(
     Mount forces and orders of the file's own numbers; nothing is decided.
     """
 
-    def stated(given: Problem) -> Result:
+    def stated(given: Problem, _: Callable[[str], None]) -> Result:
         from laufruhe.solvers import state
 
         return state(given)
@@ -255,7 +258,7 @@ def _leave(status: int) -> NoReturn:
     os._exit(status)
 
 
-def _run(request: _Request, answer: Callable[[Problem], Result]) -> NoReturn:
+def _run(request: _Request, answer: _Answer) -> NoReturn:
     """Read, answer, write and show; leaves with the exit status of the result."""
     with _exit_statuses(request.problem):
         with _progress() as say:
@@ -265,7 +268,7 @@ def _run(request: _Request, answer: Callable[[Problem], Result]) -> NoReturn:
     raise AssertionError("unreachable")
 
 
-def _written(request: _Request, answer: Callable[[Problem], Result], say: Callable[[str], None]) -> tuple[Result, Path]:
+def _written(request: _Request, answer: _Answer, say: Callable[[str], None]) -> tuple[Result, Path]:
     """The result, its files in place, and the folder that they are in."""
     from laufruhe.problem.reader import load
     from laufruhe.report import files
@@ -283,7 +286,7 @@ def _written(request: _Request, answer: Callable[[Problem], Result], say: Callab
         open_numbers = len(problem.decisions) + len(problem.mount_design.decisions)
         what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
         say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
-        result = answer(problem)
+        result = answer(problem, say)
         pictures: tuple[str, ...] = ()
         if request.pictures:
             from laufruhe.plots import draw
@@ -328,13 +331,13 @@ class _Clock:
         self.seconds[what] = time.perf_counter() - self._started
 
 
-def _solved(problem: Problem) -> Result:
+def _solved(problem: Problem, say: Callable[[str], None]) -> Result:
     """The solver's result, or a result that says why there is none."""
     from laufruhe.solvers import solve, state
     from laufruhe.solvers.result import Status
 
     try:
-        return solve(problem)
+        return solve(problem, say)
     except SolverError as error:
         return replace(state(problem), status=Status.FAILED, message=str(error))
 

@@ -157,7 +157,9 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[_Star], say:
         say(f"mounts of star {k + 1} of {len(stars)}")
         candidate = _candidate(phasing, star)
         if candidate is not None:
-            found.append(_Found(star, candidate, solve_mounts(_problem_of(problem, phasing, candidate, few))))
+            # a process of its own costs more than so few starts
+            own = _problem_of(problem, phasing, candidate, few)
+            found.append(_Found(star, candidate, solve_mounts(own, workers=1 if len(stars) > 1 else None)))
     return sorted(found, key=lambda f: f.key)
 
 
