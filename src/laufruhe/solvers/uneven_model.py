@@ -120,7 +120,7 @@ class UnevenModel:
     def _signal(self, quantity: Quantity, speed: float, at: Symbols) -> list[tuple[float, list[Any]]]:
         """Per order, the vectors (re, im), shape (d, 2), of each mount or of the block."""
         out = []
-        for h, wrench in sorted(self._wrench(speed, at).items()):
+        for h, wrench in sorted(self.wrench(speed, at).items()):
             if quantity.orders is not None and h not in quantity.orders:
                 continue
             if quantity.subject is not Subject.MOUNT_FORCE:
@@ -138,7 +138,7 @@ class UnevenModel:
             out.append((h, [ca.DM(m.real) @ wrench + ca.DM(m.imag) @ turned for m in maps]))
         return out or [(1.0, [ca.DM.zeros(1, 2)])]
 
-    def _wrench(self, speed: float, at: Symbols) -> dict[float, Any]:
+    def wrench(self, speed: float, at: Symbols) -> dict[float, Any]:
         """Wrench coefficients (re, im) by order, shape (6, 2)."""
         total: dict[float, Any] = {}
         for k, part in enumerate(self.problem.engine.slider_cranks):
