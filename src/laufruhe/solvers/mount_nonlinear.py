@@ -15,6 +15,7 @@ from laufruhe.problem.evaluation import Evaluation, evaluate, remounted
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
 from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.problem.phasing import Candidate
 from laufruhe.solvers.accuracy import sampling_error
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.domain import Domain, domains_of
@@ -29,6 +30,7 @@ from laufruhe.solvers.mount_result import (
 )
 from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear, spread_starts
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
+from laufruhe.solvers.throw_moves import ThrowMoves
 from laufruhe.solvers.transmitted_bound import transmitted_bound
 from laufruhe.solvers.unbalances import decision_values, solve_unbalances
 
@@ -43,12 +45,15 @@ POOL_SAMPLES = 72
 ITERATIONS = 150
 MOST_AROUND = 3
 SPREAD = 0.4
+# of the throws that a search starts from, about their star [rad]
+NUDGE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class _Design:
-    """Decisions and what the exact model says of them."""
+    """Decisions and what the exact model says of them; the problem has its throws where they were moved to."""
 
+    problem: Problem
     mounts: list[float]
     unbalances: list[complex]
     evaluation: Evaluation
@@ -71,33 +76,63 @@ def solve_joint(problem: Problem, workers: int | None = None) -> Result:
     SolverError
         If a process of the solver dies.
     """
+    return _solved(problem, workers, None, None)[0]
+
+
+def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tuple[Result, Candidate]:
+    """As `solve_joint`, with throws that may leave the star of the problem; and where they were moved to (E36).
+
+    Parameters
+    ----------
+    problem
+        Of the star.
+    moves
+        What may move.
+    even
+        Result of the star itself, to start from first.
+    """
+    first = None
+    if even is not None and even.decisions:
+        found = {decision.name: decision.value for decision in even.decisions}
+        domains = domains_of(problem.decisions)
+        mounts = [found[decision.name] for decision in problem.mount_design.decisions]
+        first = mounts, _columns(domains, _unbalances_of(problem, even))
+    result, turns = _solved(problem, None, moves, first)
+    return result, moves.candidate(turns)
+
+
+def _solved(
+    problem: Problem, workers: int | None, moves: ThrowMoves | None, first: tuple[list[float], Array] | None
+) -> tuple[Result, Array]:
+    """Result, and deviations of the throws."""
     started = time.perf_counter()
     initial = evaluate(problem)
     points = start_points(problem)
-    joint = JointProgram(problem)
+    points = points if first is None else [first, *points[1:]]
+    joint = JointProgram(problem, moves=moves)
     modelled = time.perf_counter()
     optima = _searched(problem, joint, points, workers)
-    best, design = _first_allowed(problem, joint, optima)
+    best, design = _first_allowed(joint, optima)
     if design is not None and design.excess > FEASIBLE:
-        best, design = _tightened(problem, best, design)
+        best, design = _tightened(problem, moves, best, design)
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
     if best is None or design is None:
-        return _none(problem, joint, initial, optima, timing)
-    proven = _rebalanced(problem, design)
+        return _none(problem, joint, initial, optima, timing), np.zeros(0 if moves is None else moves.size)
+    proven = _rebalanced(design)
     design = design if proven is None or proven[0].value >= design.value else proven[0]
-    return _result(problem, joint, initial, design, best, optima, proven, timing)
+    return _result(problem, joint, initial, design, best, optima, proven, timing), joint.turns(best.x)
 
 
 def _searched(
     problem: Problem, joint: JointProgram, points: Sequence[tuple[list[float], Array]], workers: int | None
 ) -> tuple[LocalOptimum, ...]:
     """Local optima from the points, and from others drawn around the best of them."""
-    starts = [joint.start(mounts, columns) for mounts, columns in points]
+    generator = np.random.default_rng(problem.mount_design.seed)
+    starts = [joint.start(mounts, columns, _nudged(joint, generator, k)) for k, (mounts, columns) in enumerate(points)]
     optima = solve_nonlinear(joint.program, starts, workers, ITERATIONS)
     around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
     if not around or len(points) < 2:
         return optima
-    generator = np.random.default_rng(problem.mount_design.seed)
     decisions = problem.mount_design.decisions
     low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
     again = []
@@ -107,10 +142,18 @@ def _searched(
             high - low, np.abs(x[: len(low)])
         )
         columns = x[len(low) : len(low) + joint.columns]
-        again.append(joint.start(np.clip(mounts, low, high).tolist(), columns))
+        again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
     more = solve_nonlinear(joint.program, again, workers, ITERATIONS)
     moved = [replace(optimum, start=optimum.start + len(points)) for optimum in more]
     return tuple(sorted((*optima, *moved), key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
+
+
+def _nudged(joint: JointProgram, generator: np.random.Generator, k: int) -> Array:
+    """Throws to start from: on their star first, then beside it, for a star that is its own image may be a saddle."""
+    if joint.moves is None or k == 0:
+        return joint.turns(np.zeros(joint.program.x.numel()))
+    nudge = NUDGE * generator.normal(size=joint.moves.size)
+    return np.clip(nudge, joint.moves.lower, joint.moves.upper)
 
 
 def _balanced(problem: Problem) -> list[complex] | None:
@@ -189,17 +232,15 @@ def _judged(problem: Problem, mounts: list[float], unbalances: list[complex]) ->
     worst = max((excess(limit, evaluation) for limit in problem.mount_design.limits), default=0.0)
     loads = [(evaluation.value(limit.quantity), limit.maximum) for limit in problem.limits]
     worst = max([worst, *((value - most) / (most or 1.0) for value, most in loads)])
-    return _Design(mounts, unbalances, evaluation, whole_objective(problem, evaluation), worst)
+    return _Design(problem, mounts, unbalances, evaluation, whole_objective(problem, evaluation), worst)
 
 
-def _first_allowed(
-    problem: Problem, joint: JointProgram, optima: Sequence[LocalOptimum]
-) -> tuple[LocalOptimum | None, _Design | None]:
+def _first_allowed(joint: JointProgram, optima: Sequence[LocalOptimum]) -> tuple[LocalOptimum | None, _Design | None]:
     """The best optimum by the exact model: within limits first, then by value."""
     found = []
     for optimum in optima:
         if optimum.usable:
-            design = _judged(problem, *joint.split(optimum.x))
+            design = _judged(joint.designed(optimum.x), *joint.split(optimum.x))
             if design is not None:
                 found.append((optimum, design))
     if not found:
@@ -208,7 +249,7 @@ def _first_allowed(
 
 
 def _tightened(
-    problem: Problem, best: LocalOptimum | None, design: _Design
+    problem: Problem, moves: ThrowMoves | None, best: LocalOptimum | None, design: _Design
 ) -> tuple[LocalOptimum | None, _Design | None]:
     """Again with limits a little tighter: a peak between the samples breaks its limit by a little."""
     margin = 0.0
@@ -216,17 +257,18 @@ def _tightened(
         if best is None or design.excess <= FEASIBLE or design.excess > 0.05:
             break
         margin += 1.05 * design.excess
-        joint = JointProgram(problem, margin)
+        joint = JointProgram(problem, margin, moves)
         again = solve_nonlinear(joint.program, [best.x], workers=1)
-        better, allowed = _first_allowed(problem, joint, again)
+        better, allowed = _first_allowed(joint, again)
         if better is None or allowed is None:
             break
         best, design = better, allowed
     return best, design
 
 
-def _rebalanced(problem: Problem, design: _Design) -> tuple[_Design, float] | None:
+def _rebalanced(design: _Design) -> tuple[_Design, float] | None:
     """Unbalances decided anew on the mounts found, with proof; None where that is not convex."""
+    problem = design.problem
     if not problem.decisions or not problem.objective or problem.mount_design.terms:
         return None
     if any(limit.quantity.unit == "" for limit in problem.mount_design.limits):
@@ -301,7 +343,8 @@ def _result(
 ) -> Result:
     objective = objective_of(problem, initial, design.evaluation)
     scale = max(abs(design.value), 1e-3 * abs(objective.initial)) if objective else 1.0
-    bound = _bound(problem)
+    # throws that move are not in the bound
+    bound = _bound(problem) if joint.moves is None else 0.0
     gap = max(design.value - bound, 0.0) / (scale or 1.0)
     certificate = Certificate(
         Proof.GLOBAL if gap <= problem.tolerance else Proof.LOCAL, bound, gap, best.kkt_residual,
@@ -311,7 +354,7 @@ def _result(
     prices = [joint.price(limit.name, best.multipliers) for limit in problem.mount_design.limits]
     status = Status.FAILED if not met else Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     return Result(
-        problem=problem,
+        problem=design.problem,
         status=status,
         objective=objective,
         certificate=certificate,

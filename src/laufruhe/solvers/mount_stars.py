@@ -4,7 +4,8 @@ Even stars are finitely many. On the mounts as given each one's balance is a con
 program, whose dual rows bound every other star (S14): that ranks them. The best of the
 ranking then have mounts and balance decided together, each as a problem of its own. The
 ranking chooses what is looked at and proves nothing of the joint problem, so the result
-says how many stars were left out.
+says how many stars were left out. Where firing may be uneven, throws then leave the
+best of these stars, as further variables of the same smooth program (E36).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from laufruhe.problem.mount_values import whole_objective
 from laufruhe.problem.phasing import Candidate, Method, Phasing
 from laufruhe.problem.quantity import MASSES, Quantity, Subject
 from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.mount_nonlinear import solve_moved
 from laufruhe.solvers.mount_result import mount_objective_name
 from laufruhe.solvers.mounts import solve_mounts
 from laufruhe.solvers.phasing_result import names_of, no_result, phase_decisions
@@ -32,6 +34,8 @@ from laufruhe.solvers.star_answers import MOST_LISTED
 from laufruhe.solvers.star_cuts import search_designs
 from laufruhe.solvers.star_families import Family, families_of
 from laufruhe.solvers.star_model import StarModel
+from laufruhe.solvers.throw_moves import ThrowMoves
+from laufruhe.solvers.uneven import firing_intervals, starts_of
 
 MOST_SEARCHED = 3
 FEWER_STARTS = 4
@@ -56,6 +60,7 @@ class _Found:
     star: _Star
     candidate: Candidate
     result: Result
+    moved: bool = False
 
     @property
     def key(self) -> tuple[bool, float]:
@@ -78,24 +83,20 @@ def solve_star_mounts(problem: Problem, say: Callable[[str], None] = lambda _: N
     Raises
     ------
     ModelError
-        If throws may leave the even steps, or there are too many stars to list.
+        If there are too many stars to list.
     SolverError
         If a solver stops without an answer.
     """
     phasing = problem.phasing
     if phasing is None:
         raise ValueError("nothing of the phasing is open")
-    if phasing.continuous:
-        raise ModelError(
-            "uneven throws are open together with mounts; let the firing be even, or fix one of the two and solve again"
-        )
     started = time.perf_counter()
     stars, designs = _stars(problem, phasing)
-    if not stars:
-        return no_result(problem, "no star and firing order keeps the firing intervals allowed")
     ranked = time.perf_counter()
     found = _solved_shortly(problem, phasing, stars, say)
     found = _solved_fully(problem, found, say)
+    if phasing.continuous:
+        found = sorted([*found, *_moved(problem, phasing, found, say)], key=lambda f: f.key)
     timing = {"rank": ranked - started, "solve": time.perf_counter() - ranked}
     return replace(_result(problem, phasing, found, designs), timing=timing)
 
@@ -106,6 +107,8 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[_Star], int]:
         sets = [b for b in _sets(len(phasing.shafts.optional)) if phasing.shafts.allows(b)]
         bank, split = (b[0] if b is not None else None for b in (phasing.bank, phasing.split))
         return [_Star(phasing.throws, None, built, (bank, split)) for built in sets], len(sets)
+    if phasing.throw_bounds is not None:
+        return [], 0
     families, _ = families_of(phasing)
     if sum(family.size for family in families) > MOST_LISTED:
         raise ModelError(f"more than {MOST_LISTED} stars are open together with mounts; fix the firing order")
@@ -188,6 +191,26 @@ def _solved_fully(problem: Problem, found: list[_Found], say: Callable[[str], No
     return sorted(out, key=lambda f: f.key)
 
 
+def _moved(problem: Problem, phasing: Phasing, found: list[_Found], say: Callable[[str], None]) -> list[_Found]:
+    """Designs whose throws have left the best stars, or the middle of their own bounds (E36)."""
+    starts: list[tuple[Candidate, Result | None]] = [
+        (each.candidate, each.result) for each in found[:MOST_SEARCHED] if not each.key[0]
+    ]
+    starts = starts or [(start.candidate, None) for start in starts_of(phasing, None)[:MOST_SEARCHED]]
+    out = []
+    for k, (candidate, even) in enumerate(starts):
+        say(f"throws that leave star {k + 1} of {len(starts)}")
+        own = _problem_of(problem, phasing, candidate, problem.mount_design.starts)
+        layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
+        result, moved = solve_moved(own, ThrowMoves(phasing, layout, candidate, phasing.intervals), even)
+        if result.objective is not None and not phasing.intervals.holds(firing_intervals(phasing, moved)):
+            continue
+        built = tuple(k for k, names in enumerate(phasing.shafts.optional) if not set(names) & set(moved.left_out))
+        star = _Star(moved.throws, None, built, (moved.bank_angle, moved.split_pin))
+        out.append(_Found(star, moved, result, moved=True))
+    return out
+
+
 def _result(problem: Problem, phasing: Phasing, found: list[_Found], designs: int) -> Result:
     given = evaluate(problem)
     if not found:
@@ -195,7 +218,7 @@ def _result(problem: Problem, phasing: Phasing, found: list[_Found], designs: in
     best = found[0]
     if best.key[0]:
         return _none(problem, found, given, designs)
-    whole = len(found) == designs
+    whole = len(found) == designs and not phasing.continuous
     result, objective = best.result, best.result.objective
     initial = whole_objective(problem, given)
     details = PhasingResult(
@@ -237,9 +260,12 @@ def _certificate(found: list[_Found], whole: bool, method: str) -> Certificate |
 
 
 def _method(found: list[_Found], designs: int) -> str:
-    text = f"mounts and balance decided for each of {len(found)} star(s)"
-    left = designs - len(found)
-    return text if left <= 0 else f"{text}, the best of {designs} on the mounts as given"
+    moved = sum(each.moved for each in found)
+    even = len(found) - moved
+    text = f"mounts and balance decided for each of {even} star(s)" if even else "mounts, balance and throws decided"
+    if even and designs > even:
+        text += f", the best of {designs} on the mounts as given"
+    return f"{text}; throws moved from {moved} start(s)" if moved else text
 
 
 def _built(phasing: Phasing, found: _Found) -> tuple[str, ...]:
@@ -250,8 +276,9 @@ def _entry(phasing: Phasing, found: _Found, proven: bool) -> RankedStar:
     certificate, star = found.result.certificate, found.star
     bound = certificate.lower_bound if certificate is not None else 0.0
     proven = proven and certificate is not None and certificate.kind is Proof.GLOBAL
+    only = replace(phasing, firing_order=found.candidate.firing_order) if found.moved else phasing
     return ranked_star(
-        phasing, phasing.layout(*star.geometry), star.throws, star.steps, found.key[1], bound, proven,
+        only, phasing.layout(*star.geometry), star.throws, star.steps, found.key[1], bound, proven,
         _built(phasing, found), star.geometry,
     )  # fmt: skip
 

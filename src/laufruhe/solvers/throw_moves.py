@@ -19,6 +19,8 @@ from laufruhe.problem.phasing import Candidate, Intervals, Phasing
 Array = NDArray[np.float64]
 
 REACH = math.radians(60.0)
+# [rad]
+STAYS = 1e-8
 
 
 class ThrowMoves:
@@ -80,7 +82,8 @@ class ThrowMoves:
 
     def candidate(self, x: Array) -> Candidate:
         """The design at deviations x."""
-        throws, bank, split = self.angles(x)
+        # a rounding beside a step would pass for another firing angle
+        throws, bank, split = self.angles(np.where(np.abs(x) < STAYS, 0.0, x))
         return replace(
             self.start,
             throws=tuple(float(angle) % math.tau for angle in throws),
