@@ -37,6 +37,7 @@ from laufruhe.solvers.unbalances import decision_values, solve_unbalances
 Array = NDArray[np.float64]
 
 SLACK = 1e-5
+WORTH_SAYING = 1.01
 MOST_MARGINS = 3
 # candidates for each start: their modes cost a thousandth of a search
 POOL = 40
@@ -373,7 +374,7 @@ def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design,
     apart = distinct(optima, scale)
     text = f"IPOPT from {len(optima)} starts, {len(usable)} of which ended at "
     text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
-    if len(apart) > 1 and apart[0].value > 0.0:
+    if len(apart) > 1 and apart[-1].value > WORTH_SAYING * apart[0].value > 0.0:
         text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
     if proven is not None:
         text += f"; balance on these mounts proven within {proven[1]:.0e}"
