@@ -14,6 +14,8 @@ from laufruhe.solvers.mount_convex import is_convex
 
 ROOT = Path(__file__).parents[2]
 SEEDS = range(10)
+# of an open star; all of them are looked at by the ready problem itself
+STARS = 3
 
 
 def elastic_problems() -> list[Problem]:
@@ -26,6 +28,8 @@ def elastic_problems() -> list[Problem]:
 def row_of(problem: Problem) -> str:
     """One line of the table."""
     values, seconds = [], []
+    if problem.phasing is not None:
+        problem = replace(problem, phasing=replace(problem.phasing, best=STARS))
     for seed in SEEDS:
         design = replace(problem.mount_design, seed=seed)
         started = time.perf_counter()

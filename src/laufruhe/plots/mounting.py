@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -38,6 +38,9 @@ _STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 _RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
 _RPM = 30.0 / math.pi
 RUN_SECONDS = 3.0
+MOST_SWINGS = 2e3
+# criticals beyond this many times the highest speed are left out
+REACH_OVER = 5.0
 
 
 def _designs(result: Result) -> list[Evaluation]:
@@ -243,7 +246,9 @@ def run_up(result: Result) -> Figure:
     facts = facts_of(result.final)
     order = facts.orders[0] if facts.orders else 1.0
     driven = [facts.modes.frequencies[j] for j in facts.excited] or [facts.modes.frequencies[-1]]
-    last = 1.5 * critical_speed(max(driven), order)
+    fastest = max(point.speed for point in result.problem.points)
+    slow = [speed for f in driven if (speed := critical_speed(f, order)) <= REACH_OVER * fastest]
+    last = 1.5 * max(slow, default=fastest)
     point = min(result.problem.points, key=lambda p: p.speed)
     most = [0.0, 0.0]
     for design, colour in zip(_designs(result), colours_of(result), strict=True):
@@ -272,7 +277,11 @@ def run_up(result: Result) -> Figure:
 def _run(design: Evaluation, inertia: Spectrum, gas: Spectrum | None, first: float, last: float) -> RunUp:
     # gas torque orders beyond these shake the block by less than a line's width
     kept = None if gas is None else gas.kept(12.0)
-    return run_through(mounting_in(design.engine), inertia.kept(12.0), kept, first, last, RUN_SECONDS, 60, "RK45", 1e-4)
+    mounting = mounting_in(design.engine)
+    # a mode that swings a million times in a run is followed, not resolved
+    stiff = RUN_SECONDS * mounting.modes.frequencies[-1] > MOST_SWINGS
+    method: Literal["RK45", "Radau"] = "Radau" if stiff else "RK45"
+    return run_through(mounting, inertia.kept(12.0), kept, first, last, RUN_SECONDS, 60, method, 1e-4)
 
 
 FIGURES: Mapping[str, Callable[[Result], Figure]] = {

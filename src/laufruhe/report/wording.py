@@ -6,7 +6,7 @@ import math
 
 from laufruhe.machine import Cycle
 from laufruhe.problem.model import Problem
-from laufruhe.report.measures import changed
+from laufruhe.report.measures import breaks_a_limit, changed
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.result import DecisionValue, Result, Status
 
@@ -110,7 +110,8 @@ def headline(result: Result) -> str:
     given, decided = figure(o.initial, o.unit), figure(o.value, o.unit, scale=o.initial)
     sentence = f"{name} falls from {given} to {decided}"
     if o.value > o.initial:
-        sentence = f"{name} goes from {given}, which breaks a limit, to {decided}"
+        why = ", which breaks a limit," if breaks_a_limit(result.problem, result.initial) else ""
+        sentence = f"{name} goes from {given}{why} to {decided}"
     return f"{sentence} ({change}), {_proven(result.certificate)}."
 
 

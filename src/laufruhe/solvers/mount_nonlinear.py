@@ -139,9 +139,8 @@ def _searched(
     again = []
     for k in range(max(len(points) // 2, 1)):
         x = around[k % len(around)].x
-        mounts = x[: len(low)] + SPREAD * generator.normal(size=len(low)) * np.minimum(
-            high - low, np.abs(x[: len(low)])
-        )
+        found = np.array(joint.split(x)[0])
+        mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
         columns = x[len(low) : len(low) + joint.columns]
         again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
     more = solve_nonlinear(joint.program, again, workers, ITERATIONS)

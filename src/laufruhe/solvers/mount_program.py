@@ -50,6 +50,8 @@ Array = NDArray[np.float64]
 LEAST_SAMPLES = 32
 SAMPLES_PER_ORDER = 4
 SOFTNESS = (1e-2, 1e-4, 1e-7)
+# bounds of a stiffness that are further apart leave a start no place between them
+WIDE = 100.0
 # a typical deviation of a throw [rad]
 TURN = 0.1
 
@@ -105,7 +107,10 @@ class JointProgram:
         design = problem.mount_design
         self._count = len(design.decisions)
         self.columns = sum(domain.width for domain in self.model.domains)
-        self._d, self._u = ca.MX.sym("mounts", self._count), ca.MX.sym("unbalances", self.columns)
+        self._by_ratio = np.array([d.is_stiffness and d.upper > WIDE * d.lower > 0.0 for d in design.decisions], bool)
+        self._v, self._u = ca.MX.sym("mounts", self._count), ca.MX.sym("unbalances", self.columns)
+        numbers = [ca.exp(self._v[k]) if wide else self._v[k] for k, wide in enumerate(self._by_ratio)]
+        self._d = ca.vertcat(*numbers) if numbers else self._v
         self._t = ca.MX.sym("throws", 0 if moves is None else moves.size)
         self._loads = self._loads_of(moves)
         self._e = ca.MX.sym("softness")
@@ -149,7 +154,7 @@ class JointProgram:
         lower, upper = self._bounds()
         constraints = ca.vertcat(*self._held.expressions) if self._held.expressions else None
         return NonlinearProgram(
-            ca.vertcat(self._d, self._u, self._t, self._vectors, self._squares, tops),
+            ca.vertcat(self._v, self._u, self._t, self._vectors, self._squares, tops),
             least,
             lower,
             upper,
@@ -167,8 +172,8 @@ class JointProgram:
 
     def _bounds(self) -> tuple[Array, Array]:
         decisions, domains = self.problem.mount_design.decisions, self.model.domains
-        low = [d.lower for d in decisions]
-        high = [d.upper for d in decisions]
+        low = self._inner([d.lower for d in decisions]).tolist()
+        high = self._inner([d.upper for d in decisions]).tolist()
         for domain in domains:
             most = domain.decision.upper
             low += [domain.decision.lower] if domain.width == 1 else [-most, -most]
@@ -368,10 +373,17 @@ class JointProgram:
         pairs = zip(self._held.names, self._held.slopes, multipliers, strict=True)
         return abs(float(sum(slope * m for other, slope, m in pairs if other == name)))
 
+    def _inner(self, mounts: Sequence[float]) -> Array:
+        """Decisions about mounts as the program has them: by ratio where bounds lie far apart."""
+        values = np.asarray(mounts, dtype=float)
+        return np.where(self._by_ratio, np.log(np.where(self._by_ratio, values, 1.0)), values)
+
     def split(self, x: Array) -> tuple[list[float], list[complex]]:
         """Decisions about mounts and about unbalances."""
         design = self.problem.mount_design
-        mounts = [float(np.clip(v, d.lower, d.upper)) for v, d in zip(x[: self._count], design.decisions, strict=True)]
+        inner = x[: self._count]
+        outer = np.where(self._by_ratio, np.exp(np.where(self._by_ratio, inner, 0.0)), inner)
+        mounts = [float(np.clip(v, d.lower, d.upper)) for v, d in zip(outer, design.decisions, strict=True)]
         columns = x[self._count : self._count + self.columns].copy()
         for domain in self.model.domains:
             columns[domain.columns] = domain.project(columns)
@@ -394,13 +406,13 @@ class JointProgram:
     def start(self, mounts: Sequence[float], columns: Array, turns: Array | None = None) -> Array:
         """Variables at given decisions: modes and largest values follow from them."""
         turns = np.zeros(self._t.numel()) if turns is None else turns
-        parts = [np.asarray(mounts, dtype=float), columns, turns]
+        parts = [self._inner(mounts), columns, turns]
         if self._modal:
             parts += self._modes_at(mounts)
         if self._tops:
-            given = [self._d, self._u, self._t]
+            given = [self._v, self._u, self._t]
             values = ca.Function("tops", given, [ca.vertcat(*(value for _, value in self._tops))])
-            parts.append(1.05 * np.asarray(values(list(mounts), columns, turns), dtype=float).reshape(-1))
+            parts.append(1.05 * np.asarray(values(self._inner(mounts), columns, turns), dtype=float).reshape(-1))
         return np.concatenate(parts)
 
     def _modes_at(self, mounts: Sequence[float]) -> list[Array]:
