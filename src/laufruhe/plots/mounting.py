@@ -25,7 +25,7 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_design import MountMeasure, mounting_in
 from laufruhe.report.measures import changed, hardest_point
 from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of
-from laufruhe.report.wording import number
+from laufruhe.report.wording import figure, number
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -250,23 +250,27 @@ def run_up(result: Result) -> Figure:
     slow = [speed for f in driven if (speed := critical_speed(f, order)) <= REACH_OVER * fastest]
     last = 1.5 * max(slow, default=fastest)
     point = min(result.problem.points, key=lambda p: p.speed)
-    most = [0.0, 0.0]
+    most, worst = [0.0, 0.0], []
     for design, colour in zip(_designs(result), colours_of(result), strict=True):
         inertia, gas = split_loads(design.engine, point, design.fidelity)
+        runs = []
         for (style, _), (first, end) in zip(_RUNS, ((0.0, last), (last, 0.0)), strict=True):
             run = _run(design, inertia, gas, first, end)
+            runs.append(run)
             for k, (axes, values, factor) in enumerate(
                 zip(drawn.panels, (run.force, run.travel), (1.0, 1e3), strict=True)
             ):
                 axes.plot(run.speeds * _RPM, factor * values, color=colour, linestyle=style, linewidth=1.4)
                 most[k] = max(most[k], factor * float(values.max(initial=0.0)))
+        force, travel = max(run.worst_force for run in runs), max(run.worst_travel for run in runs)
+        worst.append(f"at most {figure(force, 'N', 3)}, {figure(travel, 'm', 3)}")
     for axes, label, top in zip(drawn.panels, ("largest force [N]", "largest travel [mm]"), most, strict=True):
         axes.set(xlim=(0.0, last * _RPM), ylim=(0.0, 1.1 * top or 1.0), ylabel=label)
     drawn.panels[0].tick_params(labelbottom=False)
     drawn.panels[1].set_xlabel("crank speed [rpm]")
     legend: list[Artist] = [
-        Line2D([], [], color=colour, linewidth=2.0, label=name)
-        for colour, name in zip(colours_of(result), names_of(result), strict=True)
+        Line2D([], [], color=colour, linewidth=2.0, label=f"{name}: {text}")
+        for colour, name, text in zip(colours_of(result), names_of(result), worst, strict=True)
     ]
     legend += [Line2D([], [], color=INK, linestyle=style, label=name) for style, name in _RUNS]
     lines = f"On any mount, in {RUN_SECONDS:g} s at constant acceleration; loads of {point.name}."
