@@ -15,7 +15,7 @@ from laufruhe.solvers.mount_convex import is_convex
 ROOT = Path(__file__).parents[2]
 SEEDS = range(10)
 # of an open star; all of them are looked at by the ready problem itself
-STARS = 3
+STARS = 12
 
 
 def elastic_problems() -> list[Problem]:
