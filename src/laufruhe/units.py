@@ -121,10 +121,20 @@ def parse(text: str, unit: str) -> float:
     return value
 
 
-_SHOWN = {"rad": ("deg", math.degrees(1.0)), "rad/s": ("rpm", 30.0 / math.pi), "m": ("mm", 1e3)}
+_SHOWN = {
+    "rad": ("deg", math.degrees(1.0)),
+    "rad/s": ("rpm", 30.0 / math.pi),
+    "m": ("mm", 1e3),
+    "N/m": ("N/mm", 1e-3),
+}
+
+
+def readable(unit: str) -> tuple[str, float]:
+    """The unit that a report shows, and its factor on an SI value."""
+    return _SHOWN.get(unit, (unit, 1.0))
 
 
 def shown(value: float, unit: str, digits: int = 4) -> str:
-    """Value and unit as a report prints them: angles in degrees, lengths in mm, speeds in rpm."""
-    name, factor = _SHOWN.get(unit, (unit, 1.0))
+    """Value and unit as a report prints them: degrees, mm, rpm, N/mm."""
+    name, factor = readable(unit)
     return f"{value * factor:.{digits}g} {name}".rstrip()

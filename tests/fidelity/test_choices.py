@@ -62,10 +62,10 @@ def test_rod_of_two_masses_differs_by_its_deficit_only() -> None:
     assert not np.array_equal(without.coefficients[:, 3], rigid.coefficients[:, 3])
 
 
-def test_no_gas_is_a_motored_engine() -> None:
+def test_no_gas_is_an_engine_without_a_gas_model() -> None:
     engine = tractor.engine((0, 180, 180, 0))
-    motored = shaking_loads(engine, replace(POINT, gas=None))
-    assert np.array_equal(shaking_loads(engine, POINT, Fidelity(gas=False)).coefficients, motored.coefficients)
+    bare = shaking_loads(engine, replace(POINT, gas=None))
+    assert np.array_equal(shaking_loads(engine, POINT, Fidelity(gas=False)).coefficients, bare.coefficients)
 
 
 def test_order_of_parts_does_not_matter() -> None:

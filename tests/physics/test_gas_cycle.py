@@ -18,7 +18,13 @@ from laufruhe.machine import Cycle, PressureTrace, Seiliger, Shaft, SliderCrank,
 from laufruhe.physics.cylinder_volume import dead_centres, indicated_mean_pressure, swept_rate, swept_volume
 from laufruhe.physics.gas_cycle import cylinder_pressure
 from laufruhe.physics.pressure_trace import trace_pressure
-from laufruhe.physics.seiliger_cycle import compression_end_pressure, seiliger_cut_off, seiliger_imep, seiliger_pressure
+from laufruhe.physics.seiliger_cycle import (
+    compression_end_pressure,
+    motored_cycle,
+    seiliger_cut_off,
+    seiliger_imep,
+    seiliger_pressure,
+)
 from laufruhe.physics.wiebe_cycle import wiebe_heat, wiebe_pressure
 
 BAR, AT = 1e5, 98_066.5
@@ -365,6 +371,10 @@ class TestWiebe:
         angles = np.linspace(-2.8, 2.8, 41)
         adiabatic = gas.intake_pressure * (17.0 / (1.0 + 16.0 * _volume(part, angles))) ** 1.35
         np.testing.assert_allclose(wiebe_pressure(gas, part, cycle, angles), adiabatic, rtol=1e-8)
+        whole = cycle.angle * np.arange(720) / 720
+        cold = seiliger_pressure(motored_cycle(BURN, cycle), part, cycle, whole)
+        gas = replace(gas, exhaust_pressure=BURN.exhaust_pressure, imep=0.0)
+        np.testing.assert_allclose(cold, wiebe_pressure(gas, part, cycle, whole), rtol=1e-8)
 
 
 class TestTrace:

@@ -9,7 +9,7 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
-from laufruhe.machine import Cycle
+from laufruhe.machine import Cycle, Seiliger
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.reader import load
 
@@ -132,6 +132,8 @@ BAD = [
         """balancer_shafts[2].unbalances[1].coupled.ass = "mirrored": is not a key here; did you mean 'as'?"""),
     bad("unknown key", "\"1.25 kg\"\n", "\"1.25 kg\"\nzylinder = 4\n",
         "engine.zylinder = 4: is not a key here; did you mean 'cylinders'?"),
+    bad("motored and fired", "[gas]", 'motored = true\nimep = "5 bar"\n[gas]',
+        "operating_points[1].imep: is given to a motored engine, which burns nothing; leave imep or motored out"),
     bad("missing key", "stroke = \"120 mm\"\n", "",
         "engine.stroke: is missing; add it"),
     bad("missing unit", '"120 mm"', "120",
@@ -375,6 +377,19 @@ class TestOnEvaluation:
             ModelError, match=r"imep .* bar cannot be reached with peak_pressure .* between .* and .*; .*"
         ):
             evaluate(problem)
+
+
+class TestOperatingPoints:
+    """What the gas does at one of them."""
+
+    def test_motored_compresses_and_burns_nothing(self, tmp_path: Path) -> None:
+        gas = load(written(tmp_path, changed(WHOLE, "[gas]", "motored = true\n[gas]"))).points[0].gas
+        assert isinstance(gas, Seiliger)
+        assert gas.imep == 0.0
+        assert gas.peak_pressure == gas.intake_pressure * gas.compression_ratio**gas.compression_exponent
+
+    def test_without_gas(self, tmp_path: Path) -> None:
+        assert load(written(tmp_path, changed(WHOLE, "[gas]", "gas = false\n[gas]"))).points[0].gas is None
 
 
 def trace(folder: Path, rows: str, cycle: str = "two-stroke") -> Path:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, Seiliger, SliderCrank
+from laufruhe.machine import Cycle, Seiliger, SliderCrank, Wiebe
 from laufruhe.physics.cylinder_volume import ChargedCylinder, dead_centres, gas_exchange_pressure, in_bar
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -101,6 +101,24 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
 def compression_end_pressure(gas: Seiliger) -> float:
     """Pressure at the smallest volume before heat comes [Pa] (G4)."""
     return float(gas.intake_pressure * gas.compression_ratio**gas.compression_exponent)
+
+
+def motored_cycle(gas: Seiliger | Wiebe, cycle: Cycle) -> Seiliger:
+    """The same charge without heat: expansion follows compression back (G4, G5 with peak p_c and n_2 = n_1).
+
+    Its indicated mean pressure is that of the gas exchange alone.
+    """
+    exponent = gas.compression_exponent if isinstance(gas, Seiliger) else gas.heat_ratio
+    return Seiliger(
+        peak_pressure=gas.intake_pressure * gas.compression_ratio**exponent,
+        imep=gas_exchange_pressure(gas, cycle),
+        compression_ratio=gas.compression_ratio,
+        compression_exponent=exponent,
+        expansion_exponent=exponent,
+        intake_pressure=gas.intake_pressure,
+        exhaust_pressure=gas.exhaust_pressure,
+        crankcase_pressure=gas.crankcase_pressure,
+    )
 
 
 def seiliger_imep(gas: Seiliger, cycle: Cycle, cut_off_ratio: float) -> float:

@@ -27,6 +27,7 @@ from laufruhe.report.measures import changed, hardest_point
 from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of
 from laufruhe.report.wording import figure, number
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
 Array = NDArray[np.float64]
 
@@ -36,7 +37,7 @@ LIMIT = "#D55E00"
 # styles tell orders apart in print as well
 _STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 _RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
-_RPM = 30.0 / math.pi
+_RPM = readable("rad/s")[1]
 RUN_SECONDS = 3.0
 MOST_SWINGS = 2e3
 # criticals beyond this many times the highest speed are left out

@@ -98,7 +98,7 @@ def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], so
         handles=list(legend),
         loc="upper left",
         bbox_to_anchor=(left, 1 - 0.65 / high),
-        ncols=len(legend),
+        ncols=_legend_columns([str(artist.get_label()) for artist in legend], wide),
         frameon=False,
         fontsize=9,
         borderpad=0.2,
@@ -108,6 +108,14 @@ def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], so
         labelcolor=INK,
     )
     figure.text(left, 0.14 / high, fitted(source, wide, 7), size=7, va="bottom", color=FAINT)
+
+
+def _legend_columns(labels: Sequence[str], inches: float) -> int:
+    """Entries side by side: all of them, or half where the figure is too narrow for one row."""
+    letters = sum(len(label) for label in labels)
+    handles_and_gaps = 4.0 * len(labels)
+    fits = 9.0 / 72.0 * (0.53 * letters + handles_and_gaps) <= inches - 0.6
+    return len(labels) if fits else -(-len(labels) // 2)
 
 
 def source_line(result: Result, note: str = "") -> str:

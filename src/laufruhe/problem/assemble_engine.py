@@ -13,6 +13,7 @@ from laufruhe.machine import CRANKSHAFT, Cycle, OperatingPoint, PressureTrace, R
 from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
 from laufruhe.machine.layouts import Layout, Mechanism, Throw, boxer, build, even_throws, inline, vee
 from laufruhe.machine.slider_crank import radius_for_stroke
+from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.problem.complaints import Refused, blamed_on, nearest
 from laufruhe.problem.file_models import (
     EngineTable,
@@ -220,14 +221,14 @@ def all_different(things: list[Any], where: str, rule: str) -> None:
 
 def operating_points(file: ProblemFile, folder: Path) -> tuple[OperatingPoint, ...]:
     """Speeds and loads."""
-    gas = gas_of(file, folder)
+    gas, cycle = gas_of(file, folder), cycle_of(file.engine)
     points = []
     for k, table in enumerate(file.operating_points):
         speeds = _speeds(table, file.engine.stroke, f"operating_points[{k + 1}]")
         for speed in speeds:
-            at = f"{speed * 30.0 / math.pi:.6g} rpm"
+            at = units.shown(speed, "rad/s", 6)
             name = (f"{table.name} {at}" if len(speeds) > 1 else table.name) if table.name else at
-            points.append(OperatingPoint(name, speed, _loaded(gas, table, k), table.weight / len(speeds)))
+            points.append(OperatingPoint(name, speed, _loaded(gas, table, cycle, k), table.weight / len(speeds)))
     all_different([p.name for p in points], "operating_points", "operating points have one name")
     return tuple(points)
 
@@ -256,15 +257,19 @@ def _speed(table: OperatingPointTable, stroke: float, where: str) -> float:
     return math.pi * float(table.mean_piston_speed or 0.0) / stroke
 
 
-def _loaded(gas: GasModel | None, table: OperatingPointTable, k: int) -> GasModel | None:
+def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, k: int) -> GasModel | None:
     where = f"operating_points[{k + 1}]"
-    if table.motored:
+    if table.motored and table.imep is not None:
+        rule = "is given to a motored engine, which burns nothing"
+        raise Refused(f"{where}.imep", None, rule, "leave imep or motored out")
+    if not table.gas:
         return None
-    if table.imep is None:
+    if not table.motored and table.imep is None:
         return gas
     if gas is None or isinstance(gas, PressureTrace):
-        raise Refused(f"{where}.imep", None, "needs a gas model that can be solved for it", "add [gas] or leave it out")
-    return replace(gas, imep=table.imep)
+        key = "motored" if table.motored else "imep"
+        raise Refused(f"{where}.{key}", None, "needs [gas] with model seiliger or wiebe", "give that, or leave it out")
+    return motored_cycle(gas, cycle) if table.imep is None else replace(gas, imep=table.imep)
 
 
 def gas_of(file: ProblemFile, folder: Path) -> GasModel | None:

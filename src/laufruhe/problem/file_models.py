@@ -147,7 +147,8 @@ class OperatingPointTable(Table):
     speed: f.Speed | None = None
     mean_piston_speed: f.PistonSpeed | None = None
     imep: f.Pressure | None = Field(default=None, description="In place of that of [gas].")
-    motored: bool = False
+    motored: bool = Field(default=False, description="The charge is compressed and gets no heat.")
+    gas: bool = Field(default=True, description="false leaves the gas out altogether.")
     up_to: f.Speed | None = Field(default=None, description="Last speed of a range that starts at speed.")
     steps: Annotated[int, Field(ge=2, le=1000)] | None = Field(default=None, description="Speeds in the range.")
     weight: f.Positive = 1.0

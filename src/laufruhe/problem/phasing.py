@@ -63,7 +63,7 @@ class Candidate:
         [rad]; None where the layout has none.
     left_out
         Names of the optional shafts that are not built.
-    motored
+    without_gas
         Whether gas is left out, for parts of an engine that could not run.
     """
 
@@ -72,7 +72,7 @@ class Candidate:
     bank_angle: float | None = None
     split_pin: float | None = None
     left_out: tuple[str, ...] = ()
-    motored: bool = False
+    without_gas: bool = False
 
 
 @dataclass(frozen=True)

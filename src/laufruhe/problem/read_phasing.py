@@ -252,8 +252,8 @@ def _with(file: ProblemFile, count: int, candidate: Candidate) -> ProblemFile:
         order = None if candidate.firing_order is None else list(candidate.firing_order)
         engine = engine.model_copy(update={"throws": list(candidate.throws), "firing_order": order})
     update: dict[str, object] = {"engine": engine}
-    if candidate.motored:
-        points = [point.model_copy(update={"motored": True, "imep": None}) for point in file.operating_points]
+    if candidate.without_gas:
+        points = [point.model_copy(update={"gas": False}) for point in file.operating_points]
         update["operating_points"] = points
     return file.model_copy(update=update)
 

@@ -95,7 +95,7 @@ def _unreadable(path: Path, rule: str, remedy: str) -> InputError:
 
 
 def _assembled(file: ProblemFile, path: Path) -> Problem:
-    has_gas = file.gas is not None and not all(point.motored for point in file.operating_points)
+    has_gas = file.gas is not None and any(point.gas for point in file.operating_points)
     cylinders, throws = moving_parts(file.engine, has_gas)
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)

@@ -19,8 +19,9 @@ from laufruhe.report.measures import (
     shaking_orders,
 )
 from laufruhe.report.mode_grids import mode_grids
-from laufruhe.report.wording import DASH, aligned, is_nothing, number, percent, readable, trimmed, with_unit
+from laufruhe.report.wording import DASH, aligned, is_nothing, number, percent, trimmed, with_unit
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
+from laufruhe.units import readable
 
 Array = NDArray[np.float64]
 

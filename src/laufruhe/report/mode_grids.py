@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.report.grid import Grid
 from laufruhe.report.measures import changed
 from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.report.wording import DASH, figure, number, trimmed
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
 
 def mode_grids(result: Result) -> list[Grid]:
@@ -28,7 +27,7 @@ def _modes(facts: MountingFacts, title: str) -> Grid:
     rows = []
     for j, (name, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies, strict=True)):
         driven = j in facts.excited
-        critical = critical_speed(frequency, order) * 30.0 / math.pi if order and driven else 0.0
+        critical = critical_speed(frequency, order) * readable("rad/s")[1] if order and driven else 0.0
         shares = [f"{round(100.0 * share, 1) + 0.0:.1f}" for share in facts.modes.energy[:, j]]
         rows.append(
             (name, number(frequency), "yes" if driven else "no", number(critical) if critical else DASH, *shares)

@@ -6,9 +6,10 @@ import math
 from typing import Any
 
 from laufruhe.report.grid import Grid
-from laufruhe.report.wording import DASH, number, readable, trimmed
+from laufruhe.report.wording import DASH, number, trimmed
 from laufruhe.solvers.ranking import PhasingResult, RankedOrder, RankedStar
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
 ORDERS_SHOWN = 6
 

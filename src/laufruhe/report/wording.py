@@ -9,17 +9,12 @@ from laufruhe.problem.model import Problem
 from laufruhe.report.measures import breaks_a_limit, changed
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.result import DecisionValue, Result, Status
+from laufruhe.units import readable
 
 DASH = "-"
 NOTHING = 1e-9
 # A change that would be printed as 0.0 %.
 UNFELT = 5e-4
-_SHOWN = {
-    "rad": ("deg", math.degrees(1.0)),
-    "rad/s": ("rpm", 30.0 / math.pi),
-    "m": ("mm", 1e3),
-    "N/m": ("N/mm", 1e-3),
-}
 
 
 def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
@@ -53,11 +48,6 @@ def trimmed(value: float, digits: int = 4) -> str:
     """As `number`, without zeros that say nothing: bounds and limits as they were typed."""
     text = number(value, digits)
     return text.rstrip("0").rstrip(".") if "." in text and "e" not in text else text
-
-
-def readable(unit: str) -> tuple[str, float]:
-    """The unit that a report shows, and its factor on an SI value."""
-    return _SHOWN.get(unit, (unit, 1.0))
 
 
 def with_unit(value: float, unit: str) -> str:

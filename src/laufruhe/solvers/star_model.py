@@ -130,7 +130,7 @@ class StarModel:
 
     def _motored(self, star: Sequence[int]) -> AffineModel:
         throws = star_throws(self.layout, star, self.space.phases)
-        candidate = Candidate(throws, None, *self.geometry, motored=True)
+        candidate = Candidate(throws, None, *self.geometry, without_gas=True)
         return AffineModel(_normalised(self.phasing.realise(candidate)), keep_all=True)
 
     def at(self, samples: int) -> StarProblem:

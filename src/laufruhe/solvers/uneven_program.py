@@ -142,7 +142,7 @@ def _columns_of(model: UnevenModel, result: Result) -> Array:
 def rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
     """The throw that each rotor turns with: found by moving one throw at a time."""
     out = {}
-    still = replace(candidate, firing_order=None, motored=True)
+    still = replace(candidate, firing_order=None, without_gas=True)
     before = _rotor_states(phasing.realise(still))
     for k in range(len(candidate.throws)):
         throws = tuple(angle + (0.1 if j == k else 0.0) for j, angle in enumerate(candidate.throws))

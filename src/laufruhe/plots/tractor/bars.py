@@ -17,6 +17,7 @@ from laufruhe.plots.tractor.sheet import (
     group,
     mounts_and_all,
 )
+from laufruhe.report.wording import with_unit
 from laufruhe.studies.tractor.engines import KILOPOND
 
 
@@ -48,7 +49,7 @@ def equal_power(data: xr.Dataset) -> Figure:
     group(drawn.panels[0], mean, most, names, SERIES[: len(mean)])
     drawn.panels[0].set_ylabel(FORCE)
     rows = zip(data["cylinders"].values, data["displacement"].values, data["crank_speed"].values, strict=True)
-    labels = [f"{z} cyl.: {1e3 * v:.2f} l, {n * 9.549297:.0f} rpm" for z, v, n in rows]
+    labels = [f"{z} cyl.: {1e3 * v:.2f} l, {with_unit(float(n), 'rad/s')}" for z, v, n in rows]
     return entitled(
         drawn.figure,
         "Two, three, four and six cylinders of equal total power",

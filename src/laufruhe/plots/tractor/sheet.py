@@ -22,12 +22,13 @@ from laufruhe.studies.tractor.engines import KILOPOND
 GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
 SERIES = (GREY, SKY, ORANGE, BLUE, VERMILION, GREEN)
 FORCE = "force on the mount [kp]"
-SOURCE = "After Hasselgruber 1964, {}. 1 kp = 9.81 N. Computed with Laufruhe, exact kinematics."
+SOURCE = "After Hasselgruber 1964, {}. Computed with Laufruhe, exact kinematics."
 
 
 def entitled(figure: Figure, title: str, line: str, legend: Sequence[Artist], number_of: str) -> Figure:
     """Title, what is seen, legend and source."""
-    heading(figure, title, line, legend, SOURCE.format(number_of))
+    kiloponds = " 1 kp = 9.81 N." if any("kp" in axes.get_ylabel() + axes.get_title() for axes in figure.axes) else ""
+    heading(figure, title, line, legend, SOURCE.format(number_of) + kiloponds)
     return figure
 
 

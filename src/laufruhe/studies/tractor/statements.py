@@ -13,7 +13,7 @@ from laufruhe.machine import Cycle, Engine, GasModel, Seiliger
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.order_coefficients import inertia_roll_orders
-from laufruhe.physics.seiliger_cycle import compression_end_pressure, seiliger_imep
+from laufruhe.physics.seiliger_cycle import compression_end_pressure, motored_cycle, seiliger_imep
 from laufruhe.physics.shaking_loads import Fidelity, gas_torque, rotor_loads, shaking_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
@@ -76,9 +76,8 @@ class Unprinted:
 
     @property
     def motored(self) -> Seiliger:
-        """No heat: expansion follows compression back."""
-        exponent = self.compression_exponent
-        return Seiliger(self.compression_end, 0.0, self.compression_ratio, exponent, exponent)
+        """No heat."""
+        return motored_cycle(self.cycle(0.0, self.compression_end), Cycle.FOUR_STROKE)
 
 
 @dataclass(frozen=True)
