@@ -24,8 +24,9 @@ from laufruhe.problem.model import Problem  # noqa: E402
 from laufruhe.problem.mount_design import mounting_in  # noqa: E402
 from laufruhe.problem.mount_values import excess, whole_objective  # noqa: E402
 from laufruhe.problem.reader import load  # noqa: E402
-from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint, start_points  # noqa: E402
+from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint  # noqa: E402
 from laufruhe.solvers.mount_program import JointProgram  # noqa: E402
+from laufruhe.solvers.mount_starts import start_points  # noqa: E402
 from laufruhe.solvers.nonlinear import NonlinearProgram, processors, solve_nonlinear  # noqa: E402
 from mounts.test_moving_block import simulated_forces  # noqa: E402
 

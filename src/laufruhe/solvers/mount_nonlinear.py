@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.evaluation import Evaluation, evaluate, remounted
+from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
 from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.phasing import Candidate
 from laufruhe.solvers.accuracy import sampling_error
 from laufruhe.solvers.certificate import Certificate, Proof
-from laufruhe.solvers.domain import Domain, domains_of
+from laufruhe.solvers.domain import domains_of
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mount_program import JointProgram
 from laufruhe.solvers.mount_result import (
@@ -28,7 +27,8 @@ from laufruhe.solvers.mount_result import (
     mount_limits,
     objective_of,
 )
-from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear, spread_starts
+from laufruhe.solvers.mount_starts import columns_of, start_points, unbalances_of
+from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
 from laufruhe.solvers.throw_moves import ThrowMoves
 from laufruhe.solvers.transmitted_bound import transmitted_bound
@@ -39,10 +39,6 @@ Array = NDArray[np.float64]
 SLACK = 1e-5
 WORTH_SAYING = 1.01
 MOST_MARGINS = 3
-# candidates for each start: their modes cost a thousandth of a search
-POOL = 40
-LEAST_POOL = 640
-POOL_SAMPLES = 72
 ITERATIONS = 150
 MOST_AROUND = 3
 SPREAD = 0.4
@@ -97,7 +93,7 @@ def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tup
         found = {decision.name: decision.value for decision in even.decisions}
         domains = domains_of(problem.decisions)
         mounts = [found[decision.name] for decision in problem.mount_design.decisions]
-        first = mounts, _columns(domains, _unbalances_of(problem, even))
+        first = mounts, columns_of(domains, unbalances_of(problem, even))
     result, turns = _solved(problem, None, moves, first)
     return result, moves.candidate(turns)
 
@@ -156,73 +152,6 @@ def _nudged(joint: JointProgram, generator: np.random.Generator, k: int) -> Arra
     return np.clip(nudge, joint.moves.lower, joint.moves.upper)
 
 
-def _balanced(problem: Problem) -> list[complex] | None:
-    """Unbalances that are best on the mounts as given, where that is convex."""
-    if not problem.decisions or not problem.objective:
-        return None
-    result = solve_unbalances(replace(problem, mount_design=NOTHING_ASKED))
-    return _unbalances_of(problem, result) if result.decisions else None
-
-
-def start_points(problem: Problem) -> list[tuple[list[float], Array]]:
-    """Mounts and columns of unbalances that a search starts from.
-
-    The design as given, then points spread over all bounds: stiffness by ratio,
-    unbalances in their sets.
-    """
-    design, domains, balanced = problem.mount_design, domains_of(problem.decisions), _balanced(problem)
-    decisions = design.decisions
-    ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
-    low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
-    given = np.array([d.start for d in decisions])
-    low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
-    wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
-    spread = spread_starts(
-        np.concatenate([low_log, -wide]),
-        np.concatenate([high_log, wide]),
-        max(POOL * design.starts, LEAST_POOL),
-        design.seed,
-    )
-    best = _columns(domains, problem.start if balanced is None else balanced)
-    found = [(given.tolist(), best)]
-    spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
-    spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
-    for k, row in enumerate(_promising(problem, spread, len(low), design.starts - 1)):
-        mounts = row[: len(low)]
-        own = row[len(low) :].copy()
-        for domain in domains:
-            own[domain.columns] = domain.project(own)
-        found.append((mounts.tolist(), own if k % 2 else best))
-    return found
-
-
-def _promising(problem: Problem, pool: Array, count: int, wanted: int) -> Array:
-    """Points of the pool that break limits on mounts least and are worth most; a third taken as they come."""
-    given = replace(evaluate(problem), samples=POOL_SAMPLES)
-    whole = abs(whole_objective(problem, given)) or 1.0
-    scores = []
-    for row in pool:
-        try:
-            design = remounted(given, problem.mount_design.applied(problem.engine, row[:count].tolist()))
-        except ModelError:
-            scores.append(np.inf)
-            continue
-        misses = sum(max(excess(limit, design), 0.0) for limit in problem.mount_design.limits)
-        scores.append(misses + whole_objective(problem, design) / whole)
-    best = np.argsort(scores, kind="stable")
-    chosen = list(best[: wanted - wanted // 3])
-    chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
-    return pool[chosen]
-
-
-def _columns(domains: Sequence[Domain], values: Sequence[complex]) -> Array:
-    out = np.zeros(sum(domain.width for domain in domains))
-    for domain, value in zip(domains, values, strict=True):
-        out[domain.columns] = domain.columns_of(value)
-        out[domain.columns] = domain.project(out)
-    return out
-
-
 def _judged(problem: Problem, mounts: list[float], unbalances: list[complex]) -> _Design | None:
     try:
         evaluation = evaluate(problem, problem.design(unbalances, mounts))
@@ -278,19 +207,9 @@ def _rebalanced(design: _Design) -> tuple[_Design, float] | None:
     result = solve_unbalances(replace(problem, engine=held, mount_design=NOTHING_ASKED))
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return None
-    values = _unbalances_of(problem, result)
+    values = unbalances_of(problem, result)
     judged = _judged(problem, design.mounts, values)
     return None if judged is None or judged.excess > 10.0 * FEASIBLE else (judged, result.certificate.gap)
-
-
-def _unbalances_of(problem: Problem, result: Result) -> list[complex]:
-    """Complex decisions from the sizes and angles of a result."""
-    found = {decision.name: decision.value for decision in result.decisions}
-    values = []
-    for decision in problem.decisions:
-        angle = found.get(decision.name.rsplit(".", 1)[0] + ".angle", decision.angle[0])
-        values.append(cmath.rect(found[decision.name], angle))
-    return values
 
 
 def _convex_part(problem: Problem) -> Problem | None:
@@ -327,7 +246,7 @@ def _bound(problem: Problem) -> float:
 
 def _unbalance_values(problem: Problem, values: Sequence[complex]) -> tuple[DecisionValue, ...]:
     domains = domains_of(problem.decisions)
-    x = _columns(domains, values)
+    x = columns_of(domains, values)
     return tuple(entry for domain in domains for entry in decision_values(domain, x, np.zeros_like(x)))
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -38,6 +38,7 @@ from laufruhe.problem.mount_design import (
 from laufruhe.problem.mount_values import whole_objective
 from laufruhe.problem.quantity import ON_MOUNTS, Quantity, Subject
 from laufruhe.solvers.affine import AffineModel
+from laufruhe.solvers.gathered import Gathered
 from laufruhe.solvers.mount_loads import FixedThrows, Loads, MovedThrows
 from laufruhe.solvers.mount_symbols import SymbolicResponse, elimination, response, symbolic_mounts, waves
 from laufruhe.solvers.nonlinear import NonlinearProgram, softened_lengths
@@ -65,26 +66,6 @@ class _Point:
     base: float
     orders: Array
     response: SymbolicResponse
-
-
-@dataclass
-class _Gathered:
-    """Constraints as they are collected, every one of size one."""
-
-    expressions: list[Any] = field(default_factory=list)
-    lower: list[float] = field(default_factory=list)
-    upper: list[float] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    slopes: list[float] = field(default_factory=list)
-
-    def add(self, expression: Any, lower: float, upper: float, name: str, slope: float = 0.0) -> None:
-        """One constraint, or a column of them; `slope` is that of its side over the limit it comes from."""
-        count = expression.numel()
-        self.expressions.append(ca.reshape(expression, count, 1))
-        self.lower += [lower] * count
-        self.upper += [upper] * count
-        self.names += [name] * count
-        self.slopes += [slope] * count
 
 
 class JointProgram:
@@ -117,7 +98,7 @@ class JointProgram:
         self._along, self._root = torque_roll_rows(self._mounting)
         self._mounts = symbolic_mounts(design, self._mounting.block, self._d)
         self._points = self._responses()
-        self._held = _Gathered()
+        self._held = Gathered()
         self._tops: list[tuple[Any, Any]] = []
         self._modal = any(
             limit.quantity.measure in (MountMeasure.FREQUENCIES, MountMeasure.DECOUPLING) for limit in design.limits
