@@ -5,26 +5,21 @@ Heavy imports happen inside the commands, so that `laufruhe --help` answers at o
 
 from __future__ import annotations
 
-import math
 import os
-import shlex
 import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn, Optional
 
 import typer
 
-from laufruhe.errors import Complaint, InputError, ModelError, SolverError
+from laufruhe.cli_screen import DONE, FAILED, exit_statuses, hand_out, progress
+from laufruhe.cli_solve import Answer, Request, checked_tolerance, json_file, show_result, solved, written
 
 if TYPE_CHECKING:
     from laufruhe.problem.model import Problem
     from laufruhe.solvers.result import Result
-
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 app = typer.Typer(
     name="laufruhe",
@@ -42,6 +37,10 @@ JsonOption = Annotated[
     Optional[str],  # noqa: UP045  (typer reads it at run time)
     typer.Option("--json", metavar="FILE", help="Write result.json to FILE too; - prints it, and the table to stderr."),
 ]
+StudyJsonOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--json", metavar="FILE", help="Write all parts as JSON to FILE too; - prints them."),
+]
 OutOption = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--out", metavar="DIR", help="Folder of the results.  [default: results/<problem name>]"),
@@ -55,27 +54,6 @@ ToleranceOption = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class _Request:
-    """What was typed."""
-
-    verb: str
-    problem: Path
-    json: str | None
-    out: Path | None
-    pictures: bool
-    tolerance: float | None = None
-
-    @property
-    def command(self) -> str:
-        """The line that makes the same result again."""
-        words = ["laufruhe", self.verb, str(self.problem)]
-        return shlex.join(words if self.tolerance is None else [*words, "--tolerance", f"{self.tolerance:g}"])
-
-
-_Answer = Callable[["Problem", Callable[[str], None]], "Result"]
-
-
 @app.command()
 def solve(
     problem: ProblemArgument,
@@ -85,7 +63,7 @@ def solve(
     tolerance: ToleranceOption = None,
 ) -> None:
     """Decide what the problem leaves open, and prove how good that is."""
-    _run(_Request("solve", problem, json, out, not no_plots, tolerance), _solved)
+    _run(Request("solve", problem, json, out, not no_plots, tolerance), solved)
 
 
 @app.command()
@@ -102,42 +80,34 @@ def evaluate(
 
         return state(given)
 
-    _run(_Request("evaluate", problem, json, out, not no_plots), stated)
+    _run(Request("evaluate", problem, json, out, not no_plots), stated)
 
 
 @app.command()
 def study(
     problem: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)],
+    json: StudyJsonOption = None,
     out: OutOption = None,
+    jobs: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--jobs", metavar="N", help="Processes that may be used.  [default: one a core]"),
+    ] = None,
 ) -> None:
     """Run the sweeps and comparisons of a study file.
 
     Finished points are kept; a study that was interrupted goes on where it stopped.
     """
-    with _exit_statuses(problem):
-        import shutil
-
-        from laufruhe.plots.study import draw_study
-        from laufruhe.problem.study_reader import load_study
+    kept = "interrupted; finished points are kept, the same command goes on"
+    with exit_statuses(problem, kept), ExitStack() as places:
+        from laufruhe.cli_study import studied
         from laufruhe.report import files
-        from laufruhe.report.study_report import file_names, write_study
-        from laufruhe.studies import run
-        from laufruhe.studies.runner import UNFINISHED
 
-        given = load_study(problem)
-        folder = out if out is not None else Path("results") / problem.stem
-        kept = folder / UNFINISHED
-        with _progress() as say:
-            try:
-                datasets = run(given, problem.parent, kept, lambda k, n: say(f"{k} of {n} points"))
-            except KeyboardInterrupt:
-                _complain("laufruhe: interrupted; finished points are kept, the same command goes on")
-                raise typer.Exit(INTERRUPTED) from None
-            with files.staged(folder, "--out" if out is not None else "results", file_names(given)) as stage:
-                draw_study(datasets, stage)
-                write_study(given, datasets, stage, shlex.join(["laufruhe", "study", str(problem)]), say)
-        shutil.rmtree(kept)
-        typer.echo(f"done: {folder / files.REPORT}")
+        copy = json_file(Request("study", problem, json, None, False), places)
+        with progress() as say:
+            text, data = studied(problem, out, jobs, say)
+        if copy is not None:
+            files.write(copy, data)
+        hand_out(text, data, "-" if json == "-" else None)
 
 
 @app.command()
@@ -146,19 +116,19 @@ def check(problem: ProblemArgument, json: JsonOption = None) -> None:
 
     Says what it leaves open; nothing is solved, and no results folder is made.
     """
-    with _exit_statuses(problem), ExitStack() as places:
+    with exit_statuses(problem), ExitStack() as places:
         from laufruhe.problem.reader import load
         from laufruhe.report import files
         from laufruhe.report.json_result import as_json
         from laufruhe.report.wording import one_line
         from laufruhe.solvers import state
 
-        json_file = _json_file(_Request("check", problem, json, None, False), places)
+        copy = json_file(Request("check", problem, json, None, False), places)
         given = load(problem)
         # a load that no mount carries, or a gas cycle that cannot be met, shows only here
         stated = state(given)
-        if json_file is not None:
-            files.write(json_file, as_json(stated))
+        if copy is not None:
+            files.write(copy, as_json(stated))
         if json == "-":
             sys.stdout.write(as_json(stated))
         typer.echo(f"ok: {one_line(given)}", err=json == "-")
@@ -172,12 +142,12 @@ FidelityTolerance = Annotated[
 @app.command()
 def explain(problem: ProblemArgument, json: JsonOption = None, tolerance: FidelityTolerance = 1e-3) -> None:
     """Say what of the physics this scene needs, what it does not, and why."""
-    with _exit_statuses(problem):
+    with exit_statuses(problem):
         from laufruhe.cli_fidelity import explained
 
-        _checked_tolerance(tolerance)
+        checked_tolerance(tolerance)
         text, data = explained(problem, tolerance)
-        _hand_out(text, data, json)
+        hand_out(text, data, json)
 
 
 @app.command()
@@ -190,29 +160,11 @@ def trade(
     ] = None,
 ) -> None:
     """Measure speed against accuracy of every fidelity, on these problems."""
-    with _exit_statuses(problems[0]), _progress() as say:
+    with exit_statuses(problems[0]), progress() as say:
         from laufruhe.cli_fidelity import traded
 
         text, data = traded(problems, out or Path("results") / "trade", say)
-        _hand_out(text, data, json)
-
-
-def _hand_out(text: str, data: str, json: str | None) -> None:
-    """Text on the screen, data where they were asked for."""
-    typer.echo(text, nl=False, err=json == "-")
-    if json == "-":
-        typer.echo(data, nl=False)
-    elif json is not None:
-        from laufruhe.report import files
-
-        with files.staged_file(Path(json), "--json") as place:
-            files.write(place, data)
-
-
-def _checked_tolerance(tolerance: float) -> None:
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
-        complaint = Complaint("--tolerance", f"{tolerance:g}", "must be a number above zero", "try 1e-3")
-        raise InputError("laufruhe", (complaint,))
+        hand_out(text, data, json)
 
 
 def _show_version(wanted: bool) -> None:
@@ -258,147 +210,11 @@ def _leave(status: int) -> NoReturn:
     os._exit(status)
 
 
-def _run(request: _Request, answer: _Answer) -> NoReturn:
+def _run(request: Request, answer: Answer) -> NoReturn:
     """Read, answer, write and show; leaves with the exit status of the result."""
-    with _exit_statuses(request.problem):
-        with _progress() as say:
-            result, folder = _written(request, answer, say)
-        _show(result, request.json == "-", folder)
+    with exit_statuses(request.problem):
+        with progress() as say:
+            result, folder = written(request, answer, say)
+        show_result(result, request.json == "-", folder)
         raise typer.Exit(DONE if result.status in ("optimal", "feasible") else FAILED)
     raise AssertionError("unreachable")
-
-
-def _written(request: _Request, answer: _Answer, say: Callable[[str], None]) -> tuple[Result, Path]:
-    """The result, its files in place, and the folder that they are in."""
-    from laufruhe.problem.reader import load
-    from laufruhe.report import files
-    from laufruhe.report.json_result import as_json
-    from laufruhe.report.markdown import as_markdown
-
-    say("reading the problem")
-    clock = _Clock()
-    problem = _with_tolerance(load(request.problem), request.tolerance)
-    clock.stop("load")
-    with ExitStack() as places:
-        option, folder = ("--out", request.out) if request.out is not None else ("results", _default_folder(problem))
-        stage = places.enter_context(files.staged(folder, option))
-        json_file = _json_file(request, places)
-        open_numbers = len(problem.decisions) + len(problem.mount_design.decisions)
-        what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
-        say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
-        result = answer(problem, say)
-        pictures: tuple[str, ...] = ()
-        if request.pictures:
-            from laufruhe.plots import draw
-
-            say("drawing")
-            clock.start()
-            pictures = draw(result, stage)
-            clock.stop("plots")
-        result = replace(result, timing={**result.timing, **clock.seconds})
-        text = as_json(result)
-        files.write(stage / files.RESULT, text)
-        files.write(stage / files.REPORT, as_markdown(result, pictures, request.command))
-        if json_file is not None:
-            files.write(json_file, text)
-    return result, folder
-
-
-def _json_file(request: _Request, places: ExitStack) -> Path | None:
-    from laufruhe.report import files
-
-    if request.json in (None, "-"):
-        return None
-    path = Path(str(request.json))
-    if path.resolve() == request.problem.resolve():
-        raise InputError("laufruhe", (Complaint("--json", str(path), "is the problem file", "name another file"),))
-    return places.enter_context(files.staged_file(path, "--json"))
-
-
-class _Clock:
-    """Seconds by what they were spent on."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self.start()
-
-    def start(self) -> None:
-        """Count from now."""
-        self._started = time.perf_counter()
-
-    def stop(self, what: str) -> None:
-        """Book the time since the start."""
-        self.seconds[what] = time.perf_counter() - self._started
-
-
-def _solved(problem: Problem, say: Callable[[str], None]) -> Result:
-    """The solver's result, or a result that says why there is none."""
-    from laufruhe.solvers import solve, state
-    from laufruhe.solvers.result import Status
-
-    try:
-        return solve(problem, say)
-    except SolverError as error:
-        return replace(state(problem), status=Status.FAILED, message=str(error))
-
-
-def _show(result: Result, as_text: bool, folder: Path) -> None:
-    from laufruhe.report.json_result import as_json
-    from laufruhe.report.tables import show
-
-    if as_text:
-        sys.stdout.write(as_json(result))
-        sys.stdout.flush()
-    show(result, sys.stderr if as_text else sys.stdout, folder)
-    if result.status in ("infeasible", "failed"):
-        _complain(f"{result.problem.name}: {result.status}: {result.message}")
-
-
-def _default_folder(problem: Problem) -> Path:
-    # a file called '...toml' would name the folder above
-    return Path("results") / (problem.name.strip(".") or "problem")
-
-
-def _with_tolerance(problem: Problem, tolerance: float | None) -> Problem:
-    if tolerance is None:
-        return problem
-    _checked_tolerance(tolerance)
-    return replace(problem, tolerance=tolerance)
-
-
-def _complain(lines: str) -> None:
-    typer.echo(lines, err=True)
-
-
-@contextmanager
-def _exit_statuses(path: Path) -> Iterator[None]:
-    """What went wrong as one line a complaint, and as an exit status."""
-    try:
-        yield
-    except InputError as error:
-        _complain(str(error))
-        raise typer.Exit(BAD_INPUT) from None
-    except ModelError as error:
-        _complain(f"{path}: {error}")
-        raise typer.Exit(BAD_INPUT) from None
-    except KeyboardInterrupt:
-        _complain("laufruhe: interrupted, nothing was written")
-        raise typer.Exit(INTERRUPTED) from None
-    except BrokenPipeError:
-        # whoever read the output has gone; click ends quietly
-        raise
-    except OSError as error:
-        _complain(f"laufruhe: results cannot be written ({error.strerror or error})")
-        raise typer.Exit(FAILED) from None
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    """Says on a terminal what is going on; silent in a pipe."""
-    if not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    from rich.console import Console
-
-    with Console(stderr=True, markup=False).status("starting") as status:
-        yield lambda text: status.update(text)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from laufruhe import load
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.model import Limit
 from laufruhe.problem.quantity import Quantity, Subject
@@ -29,8 +29,24 @@ def test_sweep_meets_single_solves() -> None:
         assert point.force == pytest.approx(alone.objective.value, rel=2e-4)
 
 
-def test_limits_are_refused() -> None:
+def test_limit_holds_at_every_speed() -> None:
     problem = load(PROBLEM)
-    limit = Limit("mass", Quantity(Subject.BALANCER_MASS, Norm.SUM), 1.0)
-    with pytest.raises(ModelError, match="loads alone"):
-        speed_sweep(replace(problem, limits=(limit,)), [100.0])
+    mass = Quantity(Subject.BALANCER_MASS, Norm.SUM)
+    limited = replace(problem, limits=(Limit("mass", mass, 0.5),))
+    rated = problem.points[0].speed
+    tight, free = (speed_sweep(p, [0.7 * rated, rated]) for p in (limited, replace(problem, limits=())))
+    assert all(a.force > 1.01 * b.force for a, b in zip(tight, free, strict=True))
+    assert all(a.lower_bound <= a.force * (1.0 + 1e-9) for a in tight)
+
+
+def test_several_operating_points_are_refused() -> None:
+    problem = load(PROBLEM)
+    with pytest.raises(ModelError, match="one operating point"):
+        speed_sweep(replace(problem, points=problem.points * 2), [100.0])
+
+
+def test_a_limit_that_no_design_meets_is_an_error() -> None:
+    problem = load(PROBLEM)
+    force = Limit("force", problem.objective[0].quantity, 1.0)
+    with pytest.raises(SolverError, match="no design at 100"):
+        speed_sweep(replace(problem, limits=(force,)), [100.0])

@@ -46,6 +46,11 @@ class Spectrum:
         Orders above half the number of samples are folded, not dropped: every
         value is that of the whole series at its angle.
         """
+        if len(self.coefficients) <= (samples + 1) // 2:
+            # no order reaches half the number of samples, so none is folded
+            half = 0.5 * samples * self.coefficients
+            half[:1] *= 2.0
+            return np.asarray(np.fft.irfft(half, samples, axis=0))
         folded = np.zeros((samples, *self.coefficients.shape[1:]), dtype=complex)
         for start in range(0, len(self.coefficients), samples):
             block = self.coefficients[start : start + samples]

@@ -89,6 +89,13 @@ class AffineProblem:
         return sum(weight * norm.value(x) for weight, norm in self.terms)
 
 
+def reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
+    """A size of these norms that is not zero: at no decisions, or at their largest."""
+    sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
+    sizes += [float(np.abs(norm.slope * problem.scales).max(initial=0.0)) for norm in norms]
+    return max(sizes, default=0.0) or 1.0
+
+
 class AffineModel:
     """Spectra of the design without its decisions, and of each decision alone.
 
@@ -98,6 +105,11 @@ class AffineModel:
     ----------
     whole_cycle
         Rows over the whole working cycle, even where the loads repeat within it.
+
+    Attributes
+    ----------
+    bare
+        The design with every decision at zero.
     """
 
     def __init__(self, problem: Problem, keep_all: bool = False, whole_cycle: bool = False) -> None:
@@ -108,7 +120,7 @@ class AffineModel:
         bare = evaluate(problem, problem.design([0.0] * len(problem.decisions)))
         mounting = mounting_of(problem.engine)
         changes = [_change(problem, k, direction) for k, d in enumerate(self.domains) for direction in d.directions]
-        self._bare, self._changes = bare, changes
+        self.bare, self._changes = bare, changes
         orders = [Fraction(abs(r.shaft.ratio)).limit_denominator(1000) for rotors in changes for r in rotors]
         self._slopes = {
             subject: [
@@ -144,7 +156,7 @@ class AffineModel:
     def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
         """Per operating point the wrench of the bare design, and of one unit of every column."""
         slopes = self._slopes[Subject.SHAKING_FORCE]
-        return [(loads.wrench, tuple(by)) for loads, by in zip(self._bare.loads, slopes, strict=True)]
+        return [(loads.wrench, tuple(by)) for loads, by in zip(self.bare.loads, slopes, strict=True)]
 
     def norm(self, quantity: Quantity, samples: int) -> AffineNorm:
         """A quantity at `samples` steps over the common period."""
@@ -152,11 +164,11 @@ class AffineModel:
 
     def _norm(self, quantity: Quantity, samples: int) -> AffineNorm:
         if quantity.subject in MASSES:
-            bare = mass_rows(quantity, self._bare.engine.rotors)
-            slopes = [mass_rows(quantity, _only(self._bare.engine, rotors)).vectors for rotors in self._changes]
+            bare = mass_rows(quantity, self.bare.engine.rotors)
+            slopes = [mass_rows(quantity, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]
             return _stacked(bare, slopes, self._keep_all)
         subject = quantity.subject if quantity.subject in ON_MOUNTS else Subject.SHAKING_FORCE
-        bare = self._rows(quantity, [loads.signal(quantity.subject) for loads in self._bare.loads], samples)
+        bare = self._rows(quantity, [loads.signal(quantity.subject) for loads in self.bare.loads], samples)
         by_point = self._slopes[subject]
         slopes = [
             self._rows(quantity, [by_point[p][k] for p in range(len(by_point))], samples).vectors

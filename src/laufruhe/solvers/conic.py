@@ -17,36 +17,12 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.solvers.affine import AffineNorm, AffineProblem
+from laufruhe.solvers.affine import AffineNorm, AffineProblem, reach
 from laufruhe.solvers.certificate import Multipliers
+from laufruhe.solvers.direct_cones import TIGHT, ConicSolution
 from laufruhe.solvers.domain import Domain
 
 Array = NDArray[np.float64]
-
-# flat optima need a small gap before their decisions are digits one can build
-_TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
-
-
-@dataclass(frozen=True, eq=False)
-class ConicSolution:
-    """What the cone solver returned; nothing in it is believed before it is evaluated.
-
-    Attributes
-    ----------
-    x
-        Decision vector; None where the limits cannot be met together.
-    multipliers
-        Dual rows of terms and limits.
-    solver_seconds
-        Spent inside the cone solver.
-    iterations
-        Of the interior-point method.
-    """
-
-    x: Array | None
-    multipliers: Multipliers
-    solver_seconds: float
-    iterations: int
 
 
 @dataclass
@@ -83,9 +59,9 @@ class ConicProgram:
         self._reusable = reusable
         # decisions in units of their bounds, rows in units of what they can reach
         self._y = cp.Variable(problem.size)
-        self._unit = _reach(problem, [norm for _, norm in problem.terms])
+        self._unit = reach(problem, [norm for _, norm in problem.terms])
         self._terms = [self._cone(norm, self._unit) for _, norm in problem.terms]
-        self._limits = [self._cone(norm, _reach(problem, [norm])) for _, norm in problem.limits]
+        self._limits = [self._cone(norm, reach(problem, [norm])) for _, norm in problem.limits]
         self._maxima = [
             self._number(np.array(maximum / cone.unit))
             for (maximum, _), cone in zip(problem.limits, self._limits, strict=True)
@@ -132,7 +108,7 @@ class ConicProgram:
             # an inaccurate answer is judged by its certificate, not by a warning
             warnings.simplefilter("ignore")
             try:
-                self._program.solve(solver=cp.CLARABEL, **_TIGHT)
+                self._program.solve(solver=cp.CLARABEL, **TIGHT)
             except cp.error.SolverError as error:
                 raise SolverError(f"the cone solver gave up ({error})") from None
         return self._answer(problem)
@@ -164,13 +140,6 @@ class ConicProgram:
 
 def _value(norm: AffineNorm, cone: _Cone) -> Any:
     return norm.weights @ cone.heads if norm.norm is Norm.SUM else cone.heads
-
-
-def _reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
-    """A size of these norms that is not zero: at no decisions, or at their largest."""
-    sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
-    sizes += [float(np.abs(norm.slope * problem.scales).max(initial=0.0)) for norm in norms]
-    return max(sizes, default=0.0) or 1.0
 
 
 def _membership(domain: Domain, y: Any) -> list[Any]:
@@ -210,10 +179,13 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
             rows = norm.rows(x) + cp.reshape(moves.reshape(k * d, -1) @ z, (k, d), order="C")
             held.append(norm.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
     program = cp.Problem(cp.Minimize(cp.sum(cp.hstack(sizes))), held)
-    try:
-        program.solve(solver=cp.CLARABEL)
-    except cp.error.SolverError:
-        return x
+    with warnings.catch_warnings():
+        # the design is evaluated again, however inaccurate this was
+        warnings.simplefilter("ignore")
+        try:
+            program.solve(solver=cp.CLARABEL)
+        except cp.error.SolverError:
+            return x
     if z.value is None:
         return x
     lighter = x + still @ np.asarray(z.value)

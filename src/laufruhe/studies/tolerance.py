@@ -1,7 +1,8 @@
 """Free forces that manufacturing tolerances leave, at their worst and at random.
 
 Hasselgruber 1964, on errors of balancing: all tolerances at their limits, summed
-algebraically, make about 100 kp where the second order of a four-cylinder makes 1000 kp.
+algebraically, make about 100 kp where the second order of a four-cylinder makes 1000 kp;
+so finer balancing promises nothing for engines of fewer than six cylinders.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 ANGLES = 360
 DIRECTIONS = 720
+PIECE = 500
+CAUSES = ("reciprocating masses", "unbalance", "alignment")
 
 
 @dataclass(frozen=True)
@@ -71,19 +73,39 @@ def _sampled(wrench: Array) -> Array:
     return np.asarray(wrench[:, 1:3])
 
 
-def worst_force(engine: Engine, speed: float, tolerances: Tolerances) -> float:
-    """Largest free force [N] that any combination within the tolerances makes.
+def worst_parts(engine: Engine, speed: float, tolerances: Tolerances) -> dict[str, float]:
+    """Largest free force [N] of each kind of tolerance, all of that kind at their limits.
 
-    What is added up is a sum of segments and discs; its farthest point is sought by
-    support functions on directions half a degree apart, so it is 1e-5 low at most.
+    What masses add up to is a sum of segments; its farthest point is sought by support
+    functions on directions half a degree apart, so it is 1e-5 low at most.
     """
     angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
     directions = np.stack([np.sin(angles), np.cos(angles)])
     segments = np.abs(_unit_forces(engine, speed) @ directions).sum(axis=0) * tolerances.reciprocating_mass
-    return float(segments.max()) + sum(tolerances.unbalances) * speed**2
+    sizes = (
+        float(segments.max()),
+        tolerances.planes * tolerances.unbalance * speed**2,
+        sum(tolerances.aligned_masses) * tolerances.alignment * speed**2,
+    )
+    return dict(zip(CAUSES, sizes, strict=True))
 
 
-def random_forces(engine: Engine, speed: float, tolerances: Tolerances, builds: int, seed: int) -> Array:
+def worst_force(engine: Engine, speed: float, tolerances: Tolerances) -> float:
+    """Largest free force [N] that any combination within the tolerances makes.
+
+    Unbalances may point anywhere, so their discs add their radii to the farthest point of
+    the segments: the parts add up.
+    """
+    return sum(worst_parts(engine, speed, tolerances).values())
+
+
+def random_forces(
+    engine: Engine,
+    speed: float,
+    tolerances: Tolerances,
+    builds: int,
+    seed: int,
+) -> Array:
     """Largest free force over the cycle [N] of each of many engines, the nominal force left out.
 
     Masses are even over their tolerance, unbalances even over their disc.
@@ -99,30 +121,17 @@ def random_forces(engine: Engine, speed: float, tolerances: Tolerances, builds: 
     crank = np.exp(2j * np.pi * engine.cycle.turns * np.arange(samples) / samples)
     peaks = np.empty(builds)
     # in pieces: all engines at once would take gigabytes
-    for start in range(0, builds, 500):
-        piece = slice(start, start + 500)
+    for start in range(0, builds, PIECE):
+        piece = slice(start, start + PIECE)
         moved = np.tensordot(masses[piece], unit, axes=1)
         zeta = rotating[piece, None] * crank
         peaks[piece] = np.hypot(moved[..., 0] + zeta.imag, moved[..., 1] + zeta.real).max(axis=1)
     return peaks
 
 
-def tolerance_study(problem: Problem, tolerances: Tolerances, builds: int = 10_000, seed: int = 1964) -> xr.Dataset:
-    """Nominal free force, the worst that tolerances add, and what they add at random."""
-    names, speeds = [p.name for p in problem.points], [p.speed for p in problem.points]
-    engine = problem.engine
-    steps = ANGLES * engine.cycle.turns
-    loads = [_sampled(shaking_loads(engine, p, problem.fidelity).sample(steps)) for p in problem.points]
-    nominal = [float(np.hypot(force[:, 0], force[:, 1]).max()) for force in loads]
-    worst = [worst_force(engine, speed, tolerances) for speed in speeds]
-    drawn = np.array([random_forces(engine, speed, tolerances, builds, seed) for speed in speeds])
-    newton = {"units": "N"}
-    return xr.Dataset(
-        {
-            "nominal": ("point", nominal, {**newton, "long_name": "largest free force of the drawing"}),
-            "worst": ("point", worst, {**newton, "long_name": "largest free force that tolerances add"}),
-            "random": (("point", "build"), drawn, {**newton, "long_name": "free force that tolerances add at random"}),
-        },
-        coords={"point": names, "speed": ("point", speeds, {"units": "rad/s"})},
-        attrs={"title": "Tolerances against free forces", "kind": "tolerance", "seed": seed},
-    )
+def nominal_force(problem: Problem) -> float:
+    """Largest free force over the cycle [N] of the engine as drawn, at its operating point."""
+    point = problem.points[0]
+    steps = ANGLES * problem.engine.cycle.turns
+    force = _sampled(shaking_loads(problem.engine, point, problem.fidelity).sample(steps))
+    return float(np.hypot(force[:, 0], force[:, 1]).max())

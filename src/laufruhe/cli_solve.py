@@ -1,0 +1,147 @@
+"""What solve, evaluate and check do with what was typed: problem in, result out, files in their place."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from laufruhe.cli_screen import complain
+from laufruhe.errors import Complaint, InputError, SolverError
+
+if TYPE_CHECKING:
+    from laufruhe.problem.model import Problem
+    from laufruhe.solvers.result import Result
+
+Answer = Callable[["Problem", Callable[[str], None]], "Result"]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was typed."""
+
+    verb: str
+    problem: Path
+    json: str | None
+    out: Path | None
+    pictures: bool
+    tolerance: float | None = None
+
+    @property
+    def command(self) -> str:
+        """The line that makes the same result again."""
+        words = ["laufruhe", self.verb, str(self.problem)]
+        return shlex.join(words if self.tolerance is None else [*words, "--tolerance", f"{self.tolerance:g}"])
+
+
+def written(request: Request, answer: Answer, say: Callable[[str], None]) -> tuple[Result, Path]:
+    """The result, its files in place, and the folder that they are in."""
+    from laufruhe.problem.reader import load
+    from laufruhe.report import files
+    from laufruhe.report.json_result import as_json
+    from laufruhe.report.markdown import as_markdown
+
+    say("reading the problem")
+    clock = _Clock()
+    problem = _with_tolerance(load(request.problem), request.tolerance)
+    clock.stop("load")
+    with ExitStack() as places:
+        option, folder = ("--out", request.out) if request.out is not None else ("results", _default_folder(problem))
+        stage = places.enter_context(files.staged(folder, option))
+        copy = json_file(request, places)
+        open_numbers = len(problem.decisions) + len(problem.mount_design.decisions)
+        what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
+        say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
+        result = answer(problem, say)
+        pictures: tuple[str, ...] = ()
+        if request.pictures:
+            from laufruhe.plots import draw
+
+            say("drawing")
+            clock.start()
+            pictures = draw(result, stage)
+            clock.stop("plots")
+        result = replace(result, timing={**result.timing, **clock.seconds})
+        text = as_json(result)
+        files.write(stage / files.RESULT, text)
+        files.write(stage / files.REPORT, as_markdown(result, pictures, request.command))
+        if copy is not None:
+            files.write(copy, text)
+    return result, folder
+
+
+def json_file(request: Request, places: ExitStack) -> Path | None:
+    """Where a copy of the result goes, if one is wanted as a file."""
+    from laufruhe.report import files
+
+    if request.json in (None, "-"):
+        return None
+    path = Path(str(request.json))
+    if path.resolve() == request.problem.resolve():
+        raise InputError("laufruhe", (Complaint("--json", str(path), "is the problem file", "name another file"),))
+    return places.enter_context(files.staged_file(path, "--json"))
+
+
+class _Clock:
+    """Seconds by what they were spent on."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.start()
+
+    def start(self) -> None:
+        """Count from now."""
+        self._started = time.perf_counter()
+
+    def stop(self, what: str) -> None:
+        """Book the time since the start."""
+        self.seconds[what] = time.perf_counter() - self._started
+
+
+def solved(problem: Problem, say: Callable[[str], None]) -> Result:
+    """The solver's result, or a result that says why there is none."""
+    from laufruhe.solvers import solve, state
+    from laufruhe.solvers.result import Status
+
+    try:
+        return solve(problem, say)
+    except SolverError as error:
+        return replace(state(problem), status=Status.FAILED, message=str(error))
+
+
+def show_result(result: Result, as_text: bool, folder: Path) -> None:
+    """Tables on the screen, or JSON there and tables beside it."""
+    from laufruhe.report.json_result import as_json
+    from laufruhe.report.tables import show
+
+    if as_text:
+        sys.stdout.write(as_json(result))
+        sys.stdout.flush()
+    show(result, sys.stderr if as_text else sys.stdout, folder)
+    if result.status in ("infeasible", "failed"):
+        complain(f"{result.problem.name}: {result.status}: {result.message}")
+
+
+def _default_folder(problem: Problem) -> Path:
+    # a file called '...toml' would name the folder above
+    return Path("results") / (problem.name.strip(".") or "problem")
+
+
+def _with_tolerance(problem: Problem, tolerance: float | None) -> Problem:
+    if tolerance is None:
+        return problem
+    checked_tolerance(tolerance)
+    return replace(problem, tolerance=tolerance)
+
+
+def checked_tolerance(tolerance: float) -> None:
+    """Refuse a tolerance that is no number above zero."""
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        complaint = Complaint("--tolerance", f"{tolerance:g}", "must be a number above zero", "try 1e-3")
+        raise InputError("laufruhe", (complaint,))
