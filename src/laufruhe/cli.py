@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn, Optional
 import typer
 
 from laufruhe.cli_screen import DONE, FAILED, exit_statuses, hand_out, progress
-from laufruhe.cli_solve import Request, checked_tolerance, json_file, show_result, solved, written
+from laufruhe.cli_solve import Answer, Request, checked_tolerance, json_file, show_result, solved, written
 
 if TYPE_CHECKING:
     from laufruhe.problem.model import Problem
@@ -75,7 +75,7 @@ def evaluate(
     Mount forces and orders of the file's own numbers; nothing is decided.
     """
 
-    def stated(given: Problem) -> Result:
+    def stated(given: Problem, _: Callable[[str], None]) -> Result:
         from laufruhe.solvers import state
 
         return state(given)
@@ -210,7 +210,7 @@ def _leave(status: int) -> NoReturn:
     os._exit(status)
 
 
-def _run(request: Request, answer: Callable[[Problem], Result]) -> NoReturn:
+def _run(request: Request, answer: Answer) -> NoReturn:
     """Read, answer, write and show; leaves with the exit status of the result."""
     with exit_statuses(request.problem):
         with progress() as say:

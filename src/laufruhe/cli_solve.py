@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from laufruhe.problem.model import Problem
     from laufruhe.solvers.result import Result
 
+Answer = Callable[["Problem", Callable[[str], None]], "Result"]
+
 
 @dataclass(frozen=True)
 class Request:
@@ -38,7 +40,7 @@ class Request:
         return shlex.join(words if self.tolerance is None else [*words, "--tolerance", f"{self.tolerance:g}"])
 
 
-def written(request: Request, answer: Callable[[Problem], Result], say: Callable[[str], None]) -> tuple[Result, Path]:
+def written(request: Request, answer: Answer, say: Callable[[str], None]) -> tuple[Result, Path]:
     """The result, its files in place, and the folder that they are in."""
     from laufruhe.problem.reader import load
     from laufruhe.report import files
@@ -56,7 +58,7 @@ def written(request: Request, answer: Callable[[Problem], Result], say: Callable
         open_numbers = len(problem.decisions) + len(problem.mount_design.decisions)
         what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
         say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
-        result = answer(problem)
+        result = answer(problem, say)
         pictures: tuple[str, ...] = ()
         if request.pictures:
             from laufruhe.plots import draw
@@ -102,13 +104,13 @@ class _Clock:
         self.seconds[what] = time.perf_counter() - self._started
 
 
-def solved(problem: Problem) -> Result:
+def solved(problem: Problem, say: Callable[[str], None]) -> Result:
     """The solver's result, or a result that says why there is none."""
     from laufruhe.solvers import solve, state
     from laufruhe.solvers.result import Status
 
     try:
-        return solve(problem)
+        return solve(problem, say)
     except SolverError as error:
         return replace(state(problem), status=Status.FAILED, message=str(error))
 

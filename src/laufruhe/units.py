@@ -127,7 +127,12 @@ def unit_of(text: str) -> str:
     return (match.group(3) or "").strip() if match else ""
 
 
-_SHOWN = {"rad": ("deg", math.degrees(1.0)), "rad/s": ("rpm", 30.0 / math.pi), "m": ("mm", 1e3)}
+_SHOWN = {
+    "rad": ("deg", math.degrees(1.0)),
+    "rad/s": ("rpm", 30.0 / math.pi),
+    "m": ("mm", 1e3),
+    "N/m": ("N/mm", 1e-3),
+}
 
 
 def readable(unit: str) -> tuple[str, float]:
@@ -136,6 +141,6 @@ def readable(unit: str) -> tuple[str, float]:
 
 
 def shown(value: float, unit: str, digits: int = 4) -> str:
-    """Value and unit as a report prints them: angles in degrees, lengths in mm, speeds in rpm."""
+    """Value and unit as a report prints them: degrees, mm, rpm, N/mm."""
     name, factor = readable(unit)
     return f"{value * factor:.{digits}g} {name}".rstrip()

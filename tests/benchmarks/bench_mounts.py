@@ -6,6 +6,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,14 +22,19 @@ from laufruhe.physics.speed_map import speed_map, split_loads  # noqa: E402
 from laufruhe.problem.evaluation import evaluate  # noqa: E402
 from laufruhe.problem.model import Problem  # noqa: E402
 from laufruhe.problem.mount_design import mounting_in  # noqa: E402
-from laufruhe.problem.mount_values import whole_objective  # noqa: E402
+from laufruhe.problem.mount_values import excess, whole_objective  # noqa: E402
 from laufruhe.problem.reader import load  # noqa: E402
-from laufruhe.solvers.mount_nonlinear import solve_joint  # noqa: E402
+from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint  # noqa: E402
+from laufruhe.solvers.mount_program import JointProgram  # noqa: E402
+from laufruhe.solvers.mount_starts import start_points  # noqa: E402
+from laufruhe.solvers.nonlinear import NonlinearProgram, processors, solve_nonlinear  # noqa: E402
 from mounts.test_moving_block import simulated_forces  # noqa: E402
 
 PROBLEM = ROOT / "problems" / "tractor-four-elastic.toml"
 RPM = math.pi / 30.0
-SCIPY_STARTS = 3
+STARTS = 32
+SLSQP_SECONDS = 60.0
+SAMPLES = 96
 
 
 def seconds(work: Callable[[], object], least: float = 0.5) -> float:
@@ -105,55 +111,90 @@ def many_speeds(problem: Problem) -> list[str]:
 
 
 def joint(problem: Problem) -> list[str]:
-    """Balance and mounts together: this project from 32 starts, SLSQP with finite differences from a few."""
-    # the band without natural frequencies has no gradient for SLSQP: left out for both
-    design = replace(problem.mount_design, starts=32, limits=problem.mount_design.limits[:1])
-    problem = replace(problem, mount_design=design, limits=())
+    """Balance and mounts together: this project and SLSQP with finite differences, from the same 32 starts."""
+    problem = replace(problem, mount_design=replace(problem.mount_design, starts=STARTS))
     started = time.perf_counter()
     result = solve_joint(problem)
     ours = time.perf_counter() - started
     assert result.objective is not None
     assert result.certificate is not None
-    low = np.array([d.lower for d in design.decisions] + [-d.upper for d in problem.decisions for _ in range(2)])
-    high = np.array([d.upper for d in design.decisions] + [d.upper for d in problem.decisions for _ in range(2)])
-    count = len(design.decisions)
-
-    def split(y: np.ndarray) -> tuple[list[float], list[complex]]:
-        x = low + y * (high - low)
-        return x[:count].tolist(), [complex(a, b) for a, b in x[count:].reshape(-1, 2)]
-
-    def value(y: np.ndarray) -> float:
-        mounts, unbalances = split(y)
-        return whole_objective(problem, evaluate(problem, problem.design(unbalances, mounts), 96))
-
-    def sag_room(y: np.ndarray) -> float:
-        from laufruhe.problem.mount_design import sag_of
-
-        mounts, unbalances = split(y)
-        return 1.0 - sag_of(mounting_in(problem.design(unbalances, mounts))) / 6e-3
-
-    generator, best, taken = np.random.default_rng(0), math.inf, []
-    for _ in range(SCIPY_STARTS):
-        started = time.perf_counter()
-        found = minimize(
-            value, generator.random(len(low)), method="SLSQP", bounds=[(0.0, 1.0)] * len(low),
-            constraints={"type": "ineq", "fun": sag_room}, options={"maxiter": 200, "ftol": 1e-9},
-        )  # fmt: skip
-        taken.append(time.perf_counter() - started)
-        if sag_room(found.x) > -1e-6:
-            best = min(best, value(found.x))
+    started = time.perf_counter()
+    optima = solve_nonlinear(*_program(problem), max_iterations=ITERATIONS)
+    alone = time.perf_counter() - started
+    found = [_by_slsqp(problem, mounts, columns) for mounts, columns in start_points(problem)]
+    values = [value for value, _, kept in found if kept]
+    reached = sum(value <= result.objective.value * 1.01 for value in values)
+    usable = [optimum.value for optimum in optima if optimum.usable]
+    ended = sum(value <= result.objective.value * 1.01 for value in usable)
     return [
         "## Joint solve: balance and mounts",
         "",
-        "| method | starts | seconds | seconds a start | best mean force [N] |",
-        "| --- | ---: | ---: | ---: | ---: |",
-        f"| IPOPT, exact derivatives | 32 | {ours:.1f} | {ours / 32:.2f} | {result.objective.value:.4f} |",
-        f"| SLSQP, finite differences | {SCIPY_STARTS} | {sum(taken):.1f} | {np.mean(taken):.2f} | {best:.4f} |",
+        "| method | starts | seconds | within all limits | at the best to 1 % | best mean force [N] |",
+        "| --- | ---: | ---: | ---: | ---: | ---: |",
+        f"| IPOPT, exact derivatives | {STARTS} | {alone:.1f} | {len(usable)} | {ended} | {min(usable):.4f} |",
+        f"| SLSQP, finite differences | {STARTS} | {sum(t for _, t, _ in found):.1f} | {len(values)} | {reached} | "
+        f"{min(values, default=math.nan):.4f} |",
+        f"| `laufruhe solve`: as above, a second round, balance anew with proof | {STARTS} | {ours:.1f} | | | "
+        f"{result.objective.value:.4f} |",
         "",
-        f"{result.certificate.method}; KKT residual {result.certificate.kkt_residual:.1e}. The problem is "
-        "`tractor-four-elastic` with its limit on sag alone: SLSQP has no gradient for a band of natural frequencies.",
+        f"The problem is `tractor-four-elastic` with all its limits, and both take the same starts. SLSQP sees the "
+        f"exact model at {SAMPLES} angles and stops after {SLSQP_SECONDS:.0f} s a start at the latest; IPOPT shares "
+        f"its starts among {processors()} processes, SLSQP has one. {result.certificate.method}; KKT residual "
+        f"{result.certificate.kkt_residual:.1e}.",
         "",
     ]
+
+
+def _program(problem: Problem) -> tuple[NonlinearProgram, list[np.ndarray]]:
+    program = JointProgram(problem)
+    return program.program, [program.start(mounts, columns) for mounts, columns in start_points(problem)]
+
+
+class _LateError(Exception):
+    """A start has had its time."""
+
+
+def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tuple[float, float, bool]:
+    """Objective, seconds, and whether all limits are kept, from one start."""
+    design = problem.mount_design
+    low = np.array([d.lower for d in design.decisions] + [-d.upper for d in problem.decisions for _ in range(2)])
+    high = np.array([d.upper for d in design.decisions] + [d.upper for d in problem.decisions for _ in range(2)])
+    count, began = len(design.decisions), time.perf_counter()
+    known: dict[bytes, tuple[float, np.ndarray]] = {}
+    point = np.clip((np.concatenate([mounts, columns]) - low) / (high - low), 0.0, 1.0)
+
+    def judged(y: np.ndarray) -> tuple[float, np.ndarray]:
+        """Objective, and the room under every limit."""
+        x = low + y * (high - low)
+        unbalances = [complex(a, b) for a, b in x[count:].reshape(-1, 2)]
+        at = evaluate(problem, problem.design(unbalances, x[:count].tolist()), SAMPLES)
+        rooms = [-excess(limit, at) for limit in design.limits]
+        rooms += [1.0 - at.value(limit.quantity) / limit.maximum for limit in problem.limits]
+        rooms += [1.0 - abs(u) / d.upper for d, u in zip(problem.decisions, unbalances, strict=True)]
+        return whole_objective(problem, at), np.array(rooms)
+
+    def seen(y: np.ndarray) -> tuple[float, np.ndarray]:
+        """One evaluation for objective and limits."""
+        key = y.tobytes()
+        if key not in known:
+            if time.perf_counter() - began > SLSQP_SECONDS:
+                raise _LateError
+            known.clear()
+            known[key] = judged(y)
+        return known[key]
+
+    def remember(y: np.ndarray) -> None:
+        nonlocal point
+        point = y.copy()
+
+    with suppress(_LateError):
+        point = minimize(
+            lambda y: seen(y)[0], point, method="SLSQP", bounds=[(0.0, 1.0)] * len(low), callback=remember,
+            constraints={"type": "ineq", "fun": lambda y: seen(y)[1]}, options={"maxiter": 200, "ftol": 1e-9},
+        ).x  # fmt: skip
+    spent = time.perf_counter() - began
+    value, rooms = judged(np.clip(point, 0.0, 1.0))
+    return value, spent, bool(rooms.min() > -1e-5)
 
 
 def main() -> None:

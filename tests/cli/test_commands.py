@@ -107,7 +107,7 @@ def test_infeasible_names_the_conflict_and_is_written(here: Path) -> None:
 
 
 def test_a_solver_that_gives_up_is_a_failed_result(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def give_up(problem: object) -> None:
+    def give_up(*_: object) -> None:
         raise SolverError("the cone solver gave up")
 
     monkeypatch.setattr(laufruhe.solvers, "solve", give_up)
@@ -118,7 +118,7 @@ def test_a_solver_that_gives_up_is_a_failed_result(here: Path, monkeypatch: pyte
 
 
 def test_an_interrupt_leaves_nothing(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(problem: object) -> None:
+    def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(laufruhe.solvers, "solve", interrupt)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from laufruhe.errors import InputError, ModelError
+from laufruhe.errors import InputError
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_design import mounting_in
-from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN, SAG, changed, problem_of
 
 RIGID = '[mounts]\npositions = [["1 m", "0.2 m", "0 m"], ["-1 m", "-0.2 m", "0 m"]]\n'
@@ -117,12 +116,3 @@ def test_wrong_input_is_one_clear_line(case, tmp_path):
     lines = str(caught.value).splitlines()
     assert len(lines) == 1
     assert lines[0].startswith(str(tmp_path / "problem.toml"))
-
-
-def test_throws_and_mounts_open_together_are_refused_in_one_line(tmp_path):
-    engine = ENGINE.replace("[0, 180, 180, 0]", '"open"').replace(
-        "throws", 'cylinders = 4\nfiring_order = "open"\nthrows'
-    )
-    problem = problem_of(tmp_path, engine, BLOCK, MOUNTS, SAG)
-    with pytest.raises(ModelError, match="open together with mounts; fix one of the two"):
-        solve(problem)

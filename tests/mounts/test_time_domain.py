@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from laufruhe.errors import ModelError
+from laufruhe.machine import Block, Mount
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.run_up import periodic_state, run_through, time_model
@@ -115,3 +117,18 @@ def test_standstill_and_runs_without_duration_are_refused():
     with pytest.raises(ModelError, match="duration"):
         run_through(powertrain(), wrench(), None, 0.0, 1.0, 0.0)
     assert elastic_mounting(powertrain().block, [replace(m, stop_gap=0.01) for m in powertrain().mounts])
+
+
+def test_a_mode_far_too_fast_to_resolve_is_followed_in_a_run_up():
+    """A block with hardly any inertia in roll runs up like any other as long as nothing rolls it."""
+    corners = [(x, y, 0.0) for x in (0.3, -0.3) for y in (0.2, -0.2)]
+    mounts = [Mount(f"m{k}", place, (1.2e5, 1.2e5, 4e5), loss_factor=0.1) for k, place in enumerate(corners)]
+    lift = np.zeros((3, 6), dtype=complex)
+    lift[2, 2] = 0.05
+    runs = []
+    for roll, method in ((20.0, "RK45"), (1e-9, "Radau")):
+        block = Block(420.0, ((roll, 0.0, 0.0), (0.0, 50.0, 0.0), (0.0, 0.0, 50.0)))
+        mounting = elastic_mounting(block, mounts)
+        assert (mounting.modes.frequencies[-1] > 1e5) == (method == "Radau")
+        runs.append(run_through(mounting, Spectrum(Fraction(1), lift), None, 0.0, 60.0, 0.6, 12, method, 1e-5))
+    assert runs[1].force == pytest.approx(runs[0].force, rel=1e-2, abs=1e-2 * runs[0].worst_force)

@@ -236,7 +236,7 @@ def run_through(
     last: float,
     duration: float,
     stretches: int = 200,
-    method: Literal["DOP853", "RK45"] = "DOP853",
+    method: Literal["DOP853", "RK45", "Radau"] = "DOP853",
     tolerance: float = 1e-6,
 ) -> RunUp:
     """Run-up (or shut-down) at constant acceleration, from rest at `first` (E28).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -25,7 +25,7 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_design import MountMeasure, mounting_in
 from laufruhe.report.measures import changed, hardest_point
 from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of
-from laufruhe.report.wording import number
+from laufruhe.report.wording import figure, number
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
@@ -39,6 +39,9 @@ _STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 _RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
 _RPM = readable("rad/s")[1]
 RUN_SECONDS = 3.0
+MOST_SWINGS = 2e3
+# criticals beyond this many times the highest speed are left out
+REACH_OVER = 5.0
 
 
 def _designs(result: Result) -> list[Evaluation]:
@@ -244,25 +247,31 @@ def run_up(result: Result) -> Figure:
     facts = facts_of(result.final)
     order = facts.orders[0] if facts.orders else 1.0
     driven = [facts.modes.frequencies[j] for j in facts.excited] or [facts.modes.frequencies[-1]]
-    last = 1.5 * critical_speed(max(driven), order)
+    fastest = max(point.speed for point in result.problem.points)
+    slow = [speed for f in driven if (speed := critical_speed(f, order)) <= REACH_OVER * fastest]
+    last = 1.5 * max(slow, default=fastest)
     point = min(result.problem.points, key=lambda p: p.speed)
-    most = [0.0, 0.0]
+    most, worst = [0.0, 0.0], []
     for design, colour in zip(_designs(result), colours_of(result), strict=True):
         inertia, gas = split_loads(design.engine, point, design.fidelity)
+        runs = []
         for (style, _), (first, end) in zip(_RUNS, ((0.0, last), (last, 0.0)), strict=True):
             run = _run(design, inertia, gas, first, end)
+            runs.append(run)
             for k, (axes, values, factor) in enumerate(
                 zip(drawn.panels, (run.force, run.travel), (1.0, 1e3), strict=True)
             ):
                 axes.plot(run.speeds * _RPM, factor * values, color=colour, linestyle=style, linewidth=1.4)
                 most[k] = max(most[k], factor * float(values.max(initial=0.0)))
+        force, travel = max(run.worst_force for run in runs), max(run.worst_travel for run in runs)
+        worst.append(f"at most {figure(force, 'N', 3)}, {figure(travel, 'm', 3)}")
     for axes, label, top in zip(drawn.panels, ("largest force [N]", "largest travel [mm]"), most, strict=True):
         axes.set(xlim=(0.0, last * _RPM), ylim=(0.0, 1.1 * top or 1.0), ylabel=label)
     drawn.panels[0].tick_params(labelbottom=False)
     drawn.panels[1].set_xlabel("crank speed [rpm]")
     legend: list[Artist] = [
-        Line2D([], [], color=colour, linewidth=2.0, label=name)
-        for colour, name in zip(colours_of(result), names_of(result), strict=True)
+        Line2D([], [], color=colour, linewidth=2.0, label=f"{name}: {text}")
+        for colour, name, text in zip(colours_of(result), names_of(result), worst, strict=True)
     ]
     legend += [Line2D([], [], color=INK, linestyle=style, label=name) for style, name in _RUNS]
     lines = f"On any mount, in {RUN_SECONDS:g} s at constant acceleration; loads of {point.name}."
@@ -273,7 +282,11 @@ def run_up(result: Result) -> Figure:
 def _run(design: Evaluation, inertia: Spectrum, gas: Spectrum | None, first: float, last: float) -> RunUp:
     # gas torque orders beyond these shake the block by less than a line's width
     kept = None if gas is None else gas.kept(12.0)
-    return run_through(mounting_in(design.engine), inertia.kept(12.0), kept, first, last, RUN_SECONDS, 60, "RK45", 1e-4)
+    mounting = mounting_in(design.engine)
+    # a mode that swings a million times in a run is followed, not resolved
+    stiff = RUN_SECONDS * mounting.modes.frequencies[-1] > MOST_SWINGS
+    method: Literal["RK45", "Radau"] = "Radau" if stiff else "RK45"
+    return run_through(mounting, inertia.kept(12.0), kept, first, last, RUN_SECONDS, 60, method, 1e-4)
 
 
 FIGURES: Mapping[str, Callable[[Result], Figure]] = {

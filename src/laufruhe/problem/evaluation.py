@@ -125,13 +125,28 @@ def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None
         If the engine drives a direction that no mount carries.
     """
     engine = problem.engine if engine is None else engine
+    wrenches = [(point, shaking_loads(engine, point, problem.fidelity)) for point in problem.points]
+    loads = _on_mounts(engine, wrenches)
+    return Evaluation(engine, problem.fidelity, loads, samples or problem.fidelity.samples)
+
+
+def remounted(evaluation: Evaluation, engine: Engine) -> Evaluation:
+    """The loads of an evaluation on other mounts; `engine` differs in its mounts alone."""
+    loads = _on_mounts(engine, [(loads.point, loads.wrench) for loads in evaluation.loads])
+    return replace(evaluation, engine=engine, loads=loads)
+
+
+def _on_mounts(engine: Engine, wrenches: Sequence[tuple[OperatingPoint, Spectrum]]) -> tuple[PointLoads, ...]:
     mounting = mounting_of(engine)
-    loads = []
-    for point in problem.points:
-        wrench = shaking_loads(engine, point, problem.fidelity)
-        forces = mounting.forces(wrench, point.speed) if mounting else None
-        loads.append(PointLoads(point, wrench, forces, travel_of(mounting, wrench, point.speed)))
-    return Evaluation(engine, problem.fidelity, tuple(loads), samples or problem.fidelity.samples)
+    return tuple(
+        PointLoads(
+            point,
+            wrench,
+            mounting.forces(wrench, point.speed) if mounting else None,
+            travel_of(mounting, wrench, point.speed),
+        )
+        for point, wrench in wrenches
+    )
 
 
 def objective_value(problem: Problem, evaluation: Evaluation) -> float:

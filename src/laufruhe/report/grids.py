@@ -54,7 +54,7 @@ def _decision_row(before: DecisionValue | None, d: DecisionValue, unit: str) -> 
     given = _given_angle(before, d) if is_angle and before is not None else with_unit(d.initial, d.unit)
     scale = max(abs(d.lower), abs(d.upper)) * factor
     value = f"{number(d.value * factor, scale=scale)} {name}".rstrip()
-    price = f"{number(d.shadow_price / factor)} {per(unit, name)}" if d.shadow_price else DASH
+    price = priced(d.shadow_price, unit, d.unit)
     return d.name, given, value, bounds, _bound_mark(d), price
 
 
@@ -68,9 +68,13 @@ def _bound_mark(d: DecisionValue) -> str:
     return "upper" if abs(d.value - d.upper) <= abs(d.value - d.lower) else "lower"
 
 
-def per(unit: str, of: str) -> str:
-    """N per kg; N alone for a plain number."""
-    return f"{unit} per {of}" if of else unit
+def priced(price: float, unit: str, of: str) -> str:
+    """A shadow price in readable units: N per kg; N alone for a plain number."""
+    if not price:
+        return DASH
+    (name, factor), (of_name, of_factor) = readable(unit), readable(of)
+    units = f"{name or '1'} per {of_name}" if of_name else name
+    return f"{number(price * factor / of_factor)} {units}".rstrip()
 
 
 def _limits(result: Result) -> Grid:
@@ -88,7 +92,7 @@ def _limits(result: Result) -> Grid:
 def _limit_row(limit: LimitValue, unit: str) -> tuple[str, ...]:
     name, factor = readable(limit.unit)
     state = "broken" if not is_met(limit) else "active" if limit.active else "slack"
-    price = f"{number(limit.shadow_price / factor)} {per(unit, name)}" if limit.shadow_price else DASH
+    price = priced(limit.shadow_price, unit, limit.unit)
     value = f"{number(limit.value * factor, scale=limit.limit * factor)} {name}"
     side = "" if limit.side == "at most" else f"{limit.side} "
     return limit.name, value, side + with_unit(limit.limit, limit.unit), state, price

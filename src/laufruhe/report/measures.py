@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.metrics import CycleMeasures, order_amplitude
-from laufruhe.problem.evaluation import PointLoads, measured
-from laufruhe.problem.model import Limit
+from laufruhe.problem.evaluation import Evaluation, PointLoads, measured
+from laufruhe.problem.model import Limit, Problem
 from laufruhe.solvers.mount_result import mount_limits
 from laufruhe.solvers.result import LimitValue, Result
 
@@ -70,10 +70,17 @@ def padded(values: Array, length: int) -> Array:
 
 def limits_of(result: Result) -> tuple[LimitValue, ...]:
     """Limits as solved, or how an evaluated design stands to those of its problem."""
-    if result.limits:
-        return result.limits
-    stated = tuple(_stated(limit, result.final.value(limit.quantity)) for limit in result.problem.limits)
-    return (*stated, *mount_limits(result.problem, result.final))
+    return result.limits or _limits_at(result.problem, result.final)
+
+
+def breaks_a_limit(problem: Problem, evaluation: Evaluation) -> bool:
+    """Whether a design keeps not all limits of its problem."""
+    return not all(is_met(limit) for limit in _limits_at(problem, evaluation))
+
+
+def _limits_at(problem: Problem, evaluation: Evaluation) -> tuple[LimitValue, ...]:
+    stated = tuple(_stated(limit, evaluation.value(limit.quantity)) for limit in problem.limits)
+    return (*stated, *mount_limits(problem, evaluation))
 
 
 def is_met(limit: LimitValue) -> bool:

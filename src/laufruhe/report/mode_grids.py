@@ -6,7 +6,7 @@ from laufruhe.physics.modes import MOTIONS
 from laufruhe.report.grid import Grid
 from laufruhe.report.measures import changed
 from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of, is_elastic
-from laufruhe.report.wording import DASH, number, trimmed
+from laufruhe.report.wording import DASH, figure, number, trimmed
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
@@ -28,7 +28,7 @@ def _modes(facts: MountingFacts, title: str) -> Grid:
     for j, (name, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies, strict=True)):
         driven = j in facts.excited
         critical = critical_speed(frequency, order) * readable("rad/s")[1] if order and driven else 0.0
-        shares = [f"{100.0 * share:.1f}" for share in facts.modes.energy[:, j]]
+        shares = [f"{round(100.0 * share, 1) + 0.0:.1f}" for share in facts.modes.energy[:, j]]
         rows.append(
             (name, number(frequency), "yes" if driven else "no", number(critical) if critical else DASH, *shares)
         )
@@ -48,8 +48,9 @@ def _mounts(result: Result, facts: MountingFacts) -> Grid:
         rows.append((mount.name, place, stiffness, trimmed(mount.loss_factor), number(1e3 * sag)))
     axis = ", ".join(f"{c:.3f}" for c in facts.torque_roll_axis)
     note = (
-        f"The centre of gravity sags {number(1e3 * facts.sag)} mm; the mean torque moves a mount by at most "
-        f"{number(1e3 * facts.torque_travel)} mm. Torque-roll axis ({axis}), coupling {facts.torque_roll_coupling:.3f}."
+        f"The centre of gravity sags {figure(facts.sag, 'm')}; the mean torque moves a mount by at most "
+        f"{figure(facts.torque_travel, 'm', scale=facts.sag)}. "
+        f"Torque-roll axis ({axis}), coupling {facts.torque_roll_coupling:.3f}."
     )
     head = ("mount", "place [mm]", "stiffness along own axes [N/mm]", "loss factor", "sag [mm]")
     return Grid("Mounts", head, tuple(rows), left=3, note=note)

@@ -9,6 +9,7 @@ from laufruhe.report.grid import Grid
 from laufruhe.report.wording import DASH, number, trimmed
 from laufruhe.solvers.ranking import PhasingResult, RankedOrder, RankedStar
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
 ORDERS_SHOWN = 6
 
@@ -25,8 +26,8 @@ def phasing_grids(result: Result) -> list[Grid]:
 
 
 def _stars(result: Result, phasing: PhasingResult) -> Grid:
-    unit = result.objective.unit if result.objective else ""
-    scale = result.objective.initial if result.objective else 0.0
+    unit, factor = readable(result.objective.unit if result.objective else "")
+    scale = factor * (result.objective.initial if result.objective else 0.0)
     first = phasing.ranking[0]
     built = any(star.shafts for star in phasing.ranking)
     rows = []
@@ -35,12 +36,12 @@ def _stars(result: Result, phasing: PhasingResult) -> Grid:
         name = f"{k + 1}" + (" proven" if star.proven else "")
         shafts = (", ".join(star.shafts) or DASH,) if built else ()
         intervals = _span(star.firing_orders[0].intervals) if star.firing_orders else DASH
-        rows.append((name, _angles(star), *shafts, number(star.value, scale=scale), *pairs, intervals))
+        rows.append((name, _angles(star), *shafts, number(factor * star.value, scale=scale), *pairs, intervals))
     head = (
         "rank",
         "throws [deg]",
         *(("shafts",) if built else ()),
-        f"objective [{unit}]",
+        f"objective [{unit}]" if unit else "objective",
         *(f"order {h}" for h in first.orders),
         "intervals [deg]",
     )

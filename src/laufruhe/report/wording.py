@@ -6,7 +6,7 @@ import math
 
 from laufruhe.machine import Cycle
 from laufruhe.problem.model import Problem
-from laufruhe.report.measures import changed
+from laufruhe.report.measures import breaks_a_limit, changed
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.result import DecisionValue, Result, Status
 from laufruhe.units import readable
@@ -56,6 +56,12 @@ def with_unit(value: float, unit: str) -> str:
     return f"{trimmed(value * factor)} {name}".rstrip()
 
 
+def figure(value: float, unit: str, digits: int = 4, scale: float = 0.0) -> str:
+    """As `number`, in readable units and with the unit's name."""
+    name, factor = readable(unit)
+    return f"{number(value * factor, digits, scale * factor)} {name}".rstrip()
+
+
 def percent(share: float) -> str:
     """A change as a reader expects it: with its sign."""
     return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH
@@ -87,13 +93,15 @@ def headline(result: Result) -> str:
         return "The design as given, evaluated; nothing was to be minimised."
     name = o.name[:1].upper() + o.name[1:]
     if not changed(result):
-        return f"{name} of the design as given: {number(o.value)} {o.unit}."
+        return f"{name} of the design as given: {figure(o.value, o.unit)}."
     if abs(o.reduction) < UNFELT:
-        return f"{name} stays at {number(o.initial)} {o.unit}, {_proven(result.certificate)}."
+        return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
     change = percent(-o.reduction)
-    sentence = f"{name} falls from {number(o.initial)} {o.unit} to {number(o.value, scale=o.initial)} {o.unit}"
+    given, decided = figure(o.initial, o.unit), figure(o.value, o.unit, scale=o.initial)
+    sentence = f"{name} falls from {given} to {decided}"
     if o.value > o.initial:
-        sentence = f"{name} goes from {number(o.initial)} {o.unit}, which breaks a limit, to {number(o.value)} {o.unit}"
+        why = ", which breaks a limit," if breaks_a_limit(result.problem, result.initial) else ""
+        sentence = f"{name} goes from {given}{why} to {decided}"
     return f"{sentence} ({change}), {_proven(result.certificate)}."
 
 
@@ -127,16 +135,16 @@ def explained(result: Result) -> str:
         return "Nothing was decided, so there is nothing to prove."
     if c.kind is Proof.LOCAL:
         return (
-            f"The best of the local optima found ({c.method}), with {number(o.value, 6)} {o.unit}. "
+            f"The best of the local optima found ({c.method}), with {figure(o.value, o.unit, 6)}. "
             f"The optimality conditions, taken anew, hold with a residual of {c.kkt_residual:.1e}; "
-            f"that nothing better exists is proven only down to {number(c.lower_bound, 6)} {o.unit}."
+            f"that nothing better exists is proven only down to {figure(c.lower_bound, o.unit, 6)}."
         )
     origin = "was not taken from the solver but computed from the exact model"
     if "SCIP" in c.method:
         origin = "is SCIP's dual bound less its tolerances, or that of dual rows where it is better"
     return (
-        f"No design within the bounds and limits has less than {number(c.lower_bound, 6)} {o.unit}; "
-        f"this one has {number(o.value, 6)} {o.unit}, a gap of {gap_text(c)} (proof: {c.kind}). "
+        f"No design within the bounds and limits has less than {figure(c.lower_bound, o.unit, 6)}; "
+        f"this one has {figure(o.value, o.unit, 6)}, a gap of {gap_text(c)} (proof: {c.kind}). "
         f"The bound {origin} ({c.method}), "
         f"and the optimality conditions hold with a residual of {c.kkt_residual:.1e}."
     )

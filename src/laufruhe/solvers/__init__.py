@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
 
 from laufruhe.errors import ModelError
@@ -16,11 +17,15 @@ from laufruhe.solvers.unbalances import objective_name, solve_unbalances
 __all__ = ["Result", "Status", "solve", "state"]
 
 
-def solve(problem: Problem, many: bool = False) -> Result:
+def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many: bool = False) -> Result:
     """Decide what a problem leaves open.
 
     Parameters
     ----------
+    problem
+        What is open, wanted and forbidden.
+    say
+        Told what is being decided, where that takes long.
     many
         Whether this is one of many small problems: cone programs are then handed to the solver as
         arrays, and not stated in cvxpy first. The design is the same.
@@ -33,7 +38,9 @@ def solve(problem: Problem, many: bool = False) -> Result:
         If the engine as given cannot be evaluated.
     """
     if problem.phasing is not None and problem.mount_design.asked:
-        raise ModelError("throws or firing order are open together with mounts; fix one of the two and solve again")
+        from laufruhe.solvers.mount_stars import solve_star_mounts
+
+        return solve_star_mounts(problem, say)
     if problem.mount_design.asked:
         from laufruhe.solvers.mounts import solve_mounts
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,9 +14,10 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
 from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.problem.phasing import Candidate
 from laufruhe.solvers.accuracy import sampling_error
 from laufruhe.solvers.certificate import Certificate, Proof
-from laufruhe.solvers.domain import Domain, domains_of
+from laufruhe.solvers.domain import domains_of
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mount_program import JointProgram
 from laufruhe.solvers.mount_result import (
@@ -27,25 +27,30 @@ from laufruhe.solvers.mount_result import (
     mount_limits,
     objective_of,
 )
-from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear, spread_starts
+from laufruhe.solvers.mount_starts import columns_of, start_points, unbalances_of
+from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
+from laufruhe.solvers.throw_moves import ThrowMoves
+from laufruhe.solvers.transmitted_bound import transmitted_bound
 from laufruhe.solvers.unbalances import decision_values, solve_unbalances
 
 Array = NDArray[np.float64]
 
 SLACK = 1e-5
+WORTH_SAYING = 1.01
 MOST_MARGINS = 3
-# candidates for each start: their modes cost a thousandth of a search
-POOL = 40
 ITERATIONS = 150
 MOST_AROUND = 3
 SPREAD = 0.4
+# of the throws that a search starts from, about their star [rad]
+NUDGE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class _Design:
-    """Decisions and what the exact model says of them."""
+    """Decisions and what the exact model says of them; the problem has its throws where they were moved to."""
 
+    problem: Problem
     mounts: list[float]
     unbalances: list[complex]
     evaluation: Evaluation
@@ -68,107 +73,83 @@ def solve_joint(problem: Problem, workers: int | None = None) -> Result:
     SolverError
         If a process of the solver dies.
     """
+    return _solved(problem, workers, None, None)[0]
+
+
+def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tuple[Result, Candidate]:
+    """As `solve_joint`, with throws that may leave the star of the problem; and where they were moved to (E36).
+
+    Parameters
+    ----------
+    problem
+        Of the star.
+    moves
+        What may move.
+    even
+        Result of the star itself, to start from first.
+    """
+    first = None
+    if even is not None and even.decisions:
+        found = {decision.name: decision.value for decision in even.decisions}
+        domains = domains_of(problem.decisions)
+        mounts = [found[decision.name] for decision in problem.mount_design.decisions]
+        first = mounts, columns_of(domains, unbalances_of(problem, even))
+    result, turns = _solved(problem, None, moves, first)
+    return result, moves.candidate(turns)
+
+
+def _solved(
+    problem: Problem, workers: int | None, moves: ThrowMoves | None, first: tuple[list[float], Array] | None
+) -> tuple[Result, Array]:
+    """Result, and deviations of the throws."""
     started = time.perf_counter()
     initial = evaluate(problem)
-    balanced = _balanced(problem)
-    joint = JointProgram(problem)
-    points = _starts(problem, joint.model.domains, balanced)
+    points = start_points(problem)
+    points = points if first is None else [first, *points[1:]]
+    joint = JointProgram(problem, moves=moves)
     modelled = time.perf_counter()
     optima = _searched(problem, joint, points, workers)
-    best, design = _first_allowed(problem, joint, optima)
+    best, design = _first_allowed(joint, optima)
     if design is not None and design.excess > FEASIBLE:
-        best, design = _tightened(problem, best, design)
+        best, design = _tightened(problem, moves, best, design)
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
     if best is None or design is None:
-        return _none(problem, joint, initial, optima, timing)
-    proven = _rebalanced(problem, design)
+        return _none(problem, joint, initial, optima, timing), np.zeros(0 if moves is None else moves.size)
+    proven = _rebalanced(design)
     design = design if proven is None or proven[0].value >= design.value else proven[0]
-    return _result(problem, joint, initial, design, best, optima, proven, timing)
+    return _result(problem, joint, initial, design, best, optima, proven, timing), joint.turns(best.x)
 
 
 def _searched(
     problem: Problem, joint: JointProgram, points: Sequence[tuple[list[float], Array]], workers: int | None
 ) -> tuple[LocalOptimum, ...]:
     """Local optima from the points, and from others drawn around the best of them."""
-    starts = [joint.start(mounts, columns) for mounts, columns in points]
+    generator = np.random.default_rng(problem.mount_design.seed)
+    starts = [joint.start(mounts, columns, _nudged(joint, generator, k)) for k, (mounts, columns) in enumerate(points)]
     optima = solve_nonlinear(joint.program, starts, workers, ITERATIONS)
     around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
     if not around or len(points) < 2:
         return optima
-    generator = np.random.default_rng(problem.mount_design.seed)
     decisions = problem.mount_design.decisions
     low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
     again = []
     for k in range(max(len(points) // 2, 1)):
         x = around[k % len(around)].x
-        mounts = x[: len(low)] + SPREAD * generator.normal(size=len(low)) * np.minimum(
-            high - low, np.abs(x[: len(low)])
-        )
+        found = np.array(joint.split(x)[0])
+        mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
         columns = x[len(low) : len(low) + joint.columns]
-        again.append(joint.start(np.clip(mounts, low, high).tolist(), columns))
+        again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
     more = solve_nonlinear(joint.program, again, workers, ITERATIONS)
     moved = [replace(optimum, start=optimum.start + len(points)) for optimum in more]
     return tuple(sorted((*optima, *moved), key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
 
 
-def _balanced(problem: Problem) -> list[complex] | None:
-    """Unbalances that are best on the mounts as given, where that is convex."""
-    if not problem.decisions or not problem.objective:
-        return None
-    result = solve_unbalances(replace(problem, mount_design=NOTHING_ASKED))
-    return _unbalances_of(problem, result) if result.decisions else None
-
-
-def _starts(
-    problem: Problem, domains: Sequence[Domain], balanced: list[complex] | None
-) -> list[tuple[list[float], Array]]:
-    """The design as given, then points spread over all bounds: stiffness by ratio, unbalances in their sets."""
-    design = problem.mount_design
-    decisions = design.decisions
-    ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
-    low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
-    given = np.array([d.start for d in decisions])
-    low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
-    wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
-    spread = spread_starts(
-        np.concatenate([low_log, -wide]), np.concatenate([high_log, wide]), POOL * design.starts, design.seed
-    )
-    best = _columns(domains, problem.start if balanced is None else balanced)
-    found = [(given.tolist(), best)]
-    spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
-    spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
-    for k, row in enumerate(_promising(problem, spread, len(low), design.starts - 1)):
-        mounts = row[: len(low)]
-        own = row[len(low) :].copy()
-        for domain in domains:
-            own[domain.columns] = domain.project(own)
-        found.append((mounts.tolist(), own if k % 2 else best))
-    return found
-
-
-def _promising(problem: Problem, pool: Array, count: int, wanted: int) -> Array:
-    """Points of the pool that break the limits on modes and sag least; half of them taken as they come."""
-    limits = [m for m in problem.mount_design.limits if m.quantity.measure is not MountMeasure.TRANSMISSIBILITY]
-    if not limits:
-        return pool[:wanted]
-    bare = replace(evaluate(replace(problem, points=())), loads=())
-    misses = []
-    for row in pool:
-        engine = problem.mount_design.applied(problem.engine, row[:count].tolist())
-        design = replace(bare, engine=engine)
-        misses.append(sum(max(excess(limit, design), 0.0) for limit in limits))
-    best = np.argsort(misses, kind="stable")
-    chosen = list(best[: wanted - wanted // 3])
-    chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
-    return pool[chosen]
-
-
-def _columns(domains: Sequence[Domain], values: Sequence[complex]) -> Array:
-    out = np.zeros(sum(domain.width for domain in domains))
-    for domain, value in zip(domains, values, strict=True):
-        out[domain.columns] = domain.columns_of(value)
-        out[domain.columns] = domain.project(out)
-    return out
+def _nudged(joint: JointProgram, generator: np.random.Generator, k: int) -> Array:
+    """Throws to start from: on their star first, then beside it, for a star that is its own image may be a saddle."""
+    if joint.moves is None or k == 0:
+        return joint.turns(np.zeros(joint.program.x.numel()))
+    nudge = NUDGE * generator.normal(size=joint.moves.size)
+    return np.clip(nudge, joint.moves.lower, joint.moves.upper)
 
 
 def _judged(problem: Problem, mounts: list[float], unbalances: list[complex]) -> _Design | None:
@@ -180,17 +161,15 @@ def _judged(problem: Problem, mounts: list[float], unbalances: list[complex]) ->
     worst = max((excess(limit, evaluation) for limit in problem.mount_design.limits), default=0.0)
     loads = [(evaluation.value(limit.quantity), limit.maximum) for limit in problem.limits]
     worst = max([worst, *((value - most) / (most or 1.0) for value, most in loads)])
-    return _Design(mounts, unbalances, evaluation, whole_objective(problem, evaluation), worst)
+    return _Design(problem, mounts, unbalances, evaluation, whole_objective(problem, evaluation), worst)
 
 
-def _first_allowed(
-    problem: Problem, joint: JointProgram, optima: Sequence[LocalOptimum]
-) -> tuple[LocalOptimum | None, _Design | None]:
+def _first_allowed(joint: JointProgram, optima: Sequence[LocalOptimum]) -> tuple[LocalOptimum | None, _Design | None]:
     """The best optimum by the exact model: within limits first, then by value."""
     found = []
     for optimum in optima:
         if optimum.usable:
-            design = _judged(problem, *joint.split(optimum.x))
+            design = _judged(joint.designed(optimum.x), *joint.split(optimum.x))
             if design is not None:
                 found.append((optimum, design))
     if not found:
@@ -199,7 +178,7 @@ def _first_allowed(
 
 
 def _tightened(
-    problem: Problem, best: LocalOptimum | None, design: _Design
+    problem: Problem, moves: ThrowMoves | None, best: LocalOptimum | None, design: _Design
 ) -> tuple[LocalOptimum | None, _Design | None]:
     """Again with limits a little tighter: a peak between the samples breaks its limit by a little."""
     margin = 0.0
@@ -207,17 +186,18 @@ def _tightened(
         if best is None or design.excess <= FEASIBLE or design.excess > 0.05:
             break
         margin += 1.05 * design.excess
-        joint = JointProgram(problem, margin)
+        joint = JointProgram(problem, margin, moves)
         again = solve_nonlinear(joint.program, [best.x], workers=1)
-        better, allowed = _first_allowed(problem, joint, again)
+        better, allowed = _first_allowed(joint, again)
         if better is None or allowed is None:
             break
         best, design = better, allowed
     return best, design
 
 
-def _rebalanced(problem: Problem, design: _Design) -> tuple[_Design, float] | None:
+def _rebalanced(design: _Design) -> tuple[_Design, float] | None:
     """Unbalances decided anew on the mounts found, with proof; None where that is not convex."""
+    problem = design.problem
     if not problem.decisions or not problem.objective or problem.mount_design.terms:
         return None
     if any(limit.quantity.unit == "" for limit in problem.mount_design.limits):
@@ -227,19 +207,9 @@ def _rebalanced(problem: Problem, design: _Design) -> tuple[_Design, float] | No
     result = solve_unbalances(replace(problem, engine=held, mount_design=NOTHING_ASKED))
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return None
-    values = _unbalances_of(problem, result)
+    values = unbalances_of(problem, result)
     judged = _judged(problem, design.mounts, values)
     return None if judged is None or judged.excess > 10.0 * FEASIBLE else (judged, result.certificate.gap)
-
-
-def _unbalances_of(problem: Problem, result: Result) -> list[complex]:
-    """Complex decisions from the sizes and angles of a result."""
-    found = {decision.name: decision.value for decision in result.decisions}
-    values = []
-    for decision in problem.decisions:
-        angle = found.get(decision.name.rsplit(".", 1)[0] + ".angle", decision.angle[0])
-        values.append(cmath.rect(found[decision.name], angle))
-    return values
 
 
 def _convex_part(problem: Problem) -> Problem | None:
@@ -266,17 +236,17 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
 
 
 def _bound(problem: Problem) -> float:
-    """What the convex part alone proves of the objective; zero where it says nothing."""
+    """What no design goes under: by least transmitted forces (E34), or by the convex part alone; zero for neither."""
     convex = _convex_part(problem)
     if convex is None or problem.objective or convex.mount_design.terms != problem.mount_design.terms:
-        return 0.0
+        return transmitted_bound(problem)
     certificate = solve_convex_mounts(convex).certificate
     return certificate.lower_bound if certificate is not None else 0.0
 
 
 def _unbalance_values(problem: Problem, values: Sequence[complex]) -> tuple[DecisionValue, ...]:
     domains = domains_of(problem.decisions)
-    x = _columns(domains, values)
+    x = columns_of(domains, values)
     return tuple(entry for domain in domains for entry in decision_values(domain, x, np.zeros_like(x)))
 
 
@@ -292,7 +262,8 @@ def _result(
 ) -> Result:
     objective = objective_of(problem, initial, design.evaluation)
     scale = max(abs(design.value), 1e-3 * abs(objective.initial)) if objective else 1.0
-    bound = _bound(problem)
+    # throws that move are not in the bound
+    bound = _bound(problem) if joint.moves is None else 0.0
     gap = max(design.value - bound, 0.0) / (scale or 1.0)
     certificate = Certificate(
         Proof.GLOBAL if gap <= problem.tolerance else Proof.LOCAL, bound, gap, best.kkt_residual,
@@ -302,7 +273,7 @@ def _result(
     prices = [joint.price(limit.name, best.multipliers) for limit in problem.mount_design.limits]
     status = Status.FAILED if not met else Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     return Result(
-        problem=problem,
+        problem=design.problem,
         status=status,
         objective=objective,
         certificate=certificate,
@@ -321,7 +292,7 @@ def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design,
     apart = distinct(optima, scale)
     text = f"IPOPT from {len(optima)} starts, {len(usable)} of which ended at "
     text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
-    if len(apart) > 1 and apart[0].value > 0.0:
+    if len(apart) > 1 and apart[-1].value > WORTH_SAYING * apart[0].value > 0.0:
         text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
     if proven is not None:
         text += f"; balance on these mounts proven within {proven[1]:.0e}"

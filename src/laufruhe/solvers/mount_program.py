@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -24,7 +24,6 @@ from scipy.optimize import linear_sum_assignment
 
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.numerics.spectrum import common_base
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem.evaluation import evaluate
@@ -39,15 +38,23 @@ from laufruhe.problem.mount_design import (
 from laufruhe.problem.mount_values import whole_objective
 from laufruhe.problem.quantity import ON_MOUNTS, Quantity, Subject
 from laufruhe.solvers.affine import AffineModel
+from laufruhe.solvers.gathered import Gathered
+from laufruhe.solvers.mount_loads import FixedThrows, Loads, MovedThrows
 from laufruhe.solvers.mount_symbols import SymbolicResponse, elimination, response, symbolic_mounts, waves
 from laufruhe.solvers.nonlinear import NonlinearProgram, softened_lengths
+from laufruhe.solvers.throw_moves import ThrowMoves
+from laufruhe.solvers.uneven_model import UnevenModel
+from laufruhe.solvers.uneven_program import rides_of
 
 Array = NDArray[np.float64]
 
-KEPT_SHARE = 1e-4
 LEAST_SAMPLES = 32
 SAMPLES_PER_ORDER = 4
 SOFTNESS = (1e-2, 1e-4, 1e-7)
+# bounds of a stiffness that are further apart leave a start no place between them
+WIDE = 100.0
+# a typical deviation of a throw [rad]
+TURN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,26 +68,6 @@ class _Point:
     response: SymbolicResponse
 
 
-@dataclass
-class _Gathered:
-    """Constraints as they are collected, every one of size one."""
-
-    expressions: list[Any] = field(default_factory=list)
-    lower: list[float] = field(default_factory=list)
-    upper: list[float] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    slopes: list[float] = field(default_factory=list)
-
-    def add(self, expression: Any, lower: float, upper: float, name: str, slope: float = 0.0) -> None:
-        """One constraint, or a column of them; `slope` is that of its side over the limit it comes from."""
-        count = expression.numel()
-        self.expressions.append(ca.reshape(expression, count, 1))
-        self.lower += [lower] * count
-        self.upper += [upper] * count
-        self.names += [name] * count
-        self.slopes += [slope] * count
-
-
 class JointProgram:
     """The program of a problem, and the way between its variables and the problem's decisions.
 
@@ -90,21 +77,28 @@ class JointProgram:
         On elastic mounts.
     margin
         Share by which limits on largest values are tightened, for they are kept at samples.
+    moves
+        Throws that may leave the star of the problem; none when left out.
     """
 
-    def __init__(self, problem: Problem, margin: float = 0.0) -> None:
-        self.problem, self._margin = problem, margin
+    def __init__(self, problem: Problem, margin: float = 0.0, moves: ThrowMoves | None = None) -> None:
+        self.problem, self._margin, self.moves = problem, margin, moves
         self.model = AffineModel(problem)
         self._mounting = mounting_in(problem.engine)
         design = problem.mount_design
         self._count = len(design.decisions)
         self.columns = sum(domain.width for domain in self.model.domains)
-        self._d, self._u = ca.MX.sym("mounts", self._count), ca.MX.sym("unbalances", self.columns)
+        self._by_ratio = np.array([d.is_stiffness and d.upper > WIDE * d.lower > 0.0 for d in design.decisions], bool)
+        self._v, self._u = ca.MX.sym("mounts", self._count), ca.MX.sym("unbalances", self.columns)
+        numbers = [ca.exp(self._v[k]) if wide else self._v[k] for k, wide in enumerate(self._by_ratio)]
+        self._d = ca.vertcat(*numbers) if numbers else self._v
+        self._t = ca.MX.sym("throws", 0 if moves is None else moves.size)
+        self._loads = self._loads_of(moves)
         self._e = ca.MX.sym("softness")
         self._along, self._root = torque_roll_rows(self._mounting)
         self._mounts = symbolic_mounts(design, self._mounting.block, self._d)
         self._points = self._responses()
-        self._held = _Gathered()
+        self._held = Gathered()
         self._tops: list[tuple[Any, Any]] = []
         self._modal = any(
             limit.quantity.measure in (MountMeasure.FREQUENCIES, MountMeasure.DECOUPLING) for limit in design.limits
@@ -113,6 +107,13 @@ class JointProgram:
         self._square_unit = float(np.trace(self._root @ self._mounting.stiffness @ self._root.T)) / 6.0
         self._unit = abs(whole_objective(problem, evaluate(problem))) or 1.0
         self.program = self._built()
+
+    def _loads_of(self, moves: ThrowMoves | None) -> Loads:
+        fixed = FixedThrows(self.problem, self.model, self._u)
+        if moves is None:
+            return fixed
+        model = UnevenModel(self.problem, moves.layout, rides_of(moves.phasing, moves.start))
+        return MovedThrows(self.problem, fixed, moves, model, self._t, self._u)
 
     def _built(self) -> NonlinearProgram:
         problem, design = self.problem, self.problem.mount_design
@@ -126,11 +127,15 @@ class JointProgram:
         for mount_limit in design.limits:
             self._limit_mounts(mount_limit)
         self._hold_unbalances()
+        if self.moves is not None:
+            rows, names = self.moves.firing(self._t)
+            for row, name in zip(rows, names, strict=True):
+                self._held.add(row, self.moves.intervals.least, self.moves.intervals.most, name)
         tops = ca.vertcat(*(top for top, _ in self._tops)) if self._tops else ca.MX(0, 1)
         lower, upper = self._bounds()
         constraints = ca.vertcat(*self._held.expressions) if self._held.expressions else None
         return NonlinearProgram(
-            ca.vertcat(self._d, self._u, self._vectors, self._squares, tops),
+            ca.vertcat(self._v, self._u, self._t, self._vectors, self._squares, tops),
             least,
             lower,
             upper,
@@ -148,12 +153,15 @@ class JointProgram:
 
     def _bounds(self) -> tuple[Array, Array]:
         decisions, domains = self.problem.mount_design.decisions, self.model.domains
-        low = [d.lower for d in decisions]
-        high = [d.upper for d in decisions]
+        low = self._inner([d.lower for d in decisions]).tolist()
+        high = self._inner([d.upper for d in decisions]).tolist()
         for domain in domains:
             most = domain.decision.upper
             low += [domain.decision.lower] if domain.width == 1 else [-most, -most]
             high += [most] * domain.width
+        if self.moves is not None:
+            low += self.moves.lower.tolist()
+            high += self.moves.upper.tolist()
         modes = 42 * self._modal
         free = np.full(modes + len(self._tops), np.inf)
         below = -free
@@ -162,41 +170,25 @@ class JointProgram:
 
     def _scales(self, lower: Array, upper: Array) -> Array:
         width = upper - lower
-        return np.where(np.isfinite(width) & (width > 0.0), width, 1.0)
+        scales = np.where(np.isfinite(width) & (width > 0.0), width, 1.0)
+        scales[self._turned] = TURN
+        return scales
+
+    @property
+    def _turned(self) -> slice:
+        first = self._count + self.columns
+        return slice(first, first + self._t.numel())
 
     # loads
 
     def _responses(self) -> list[_Point]:
-        """Response to the orders that matter, bare design and every column (E4)."""
-        found = []
+        """Response to the orders that matter (E4)."""
         moved = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
-        scales = np.concatenate([np.full(d.width, d.scale) for d in self.model.domains] or [np.zeros(0)])
-        for point, (bare, slopes) in zip(self.problem.points, self.model.wrenches(), strict=True):
-            base = common_base([bare.base, *(slope.base for slope in slopes)])
-            spectra = [spectrum.rebased(base).coefficients for spectrum in (bare, *slopes)]
-            longest = max(len(c) for c in spectra)
-            loads = np.array([np.pad(c, ((0, longest - len(c)), (0, 0))) for c in spectra]) @ moved.T
-            size = np.abs(loads[0]).max(axis=1, initial=0.0)
-            size += (np.abs(loads[1:]).max(axis=2, initial=0.0) * scales[:, None]).sum(axis=0)
-            # above resonance an order counts by its load over the square of its frequency
-            felt = size / np.maximum(np.arange(longest), 1.0) ** 2
-            kept = np.flatnonzero((size > KEPT_SHARE * size.max(initial=0.0)) & (felt > KEPT_SHARE * felt.max()))
-            orders: Array = np.asarray(kept, dtype=float) * float(base)
-            real, imaginary = (self._load_columns(part[:, kept]) for part in (loads.real, loads.imag))
-            answer = response(self._mounts, orders * point.speed, real, imaginary)
-            # one period of what is left is enough
-            period = float(common_base([int(k) * base for k in kept if k > 0] or [base]))
-            found.append(_Point(point.name, point.weight, period, orders, answer))
-        return found
-
-    def _load_columns(self, loads: Array) -> Any:
-        """Loads (1 + columns, n, 6) as an expression of the unbalances, shape (6, n)."""
-        count = loads.shape[1]
-        total = ca.MX(ca.DM(loads[0].T.copy()))
-        if self.columns:
-            flat = loads[1:].transpose(1, 2, 0).reshape(6 * count, -1)
-            total += ca.reshape(ca.DM(flat) @ self._u, 6, count)
-        return total
+        return [
+            _Point(point.name, point.weight, w.period, w.orders,
+                   response(self._mounts, w.orders * point.speed, w.real, w.imaginary))
+            for point, w in zip(self.problem.points, self._loads.wrenches(moved), strict=True)
+        ]  # fmt: skip
 
     def _rows(self, quantity: Quantity) -> tuple[Any, Array]:
         """Vectors at samples and their weights, as `load_rows` has them (P1)."""
@@ -225,14 +217,8 @@ class JointProgram:
 
     def _vectors_of(self, quantity: Quantity) -> tuple[Any, Array, Norm]:
         if quantity.subject in ON_MOUNTS:
-            rows, weights = self._rows(quantity)
-            return rows, weights, quantity.norm
-        affine = self.model.norm(quantity, self.model.full_samples)
-        k, d = affine.constant.shape
-        rows = ca.MX(ca.DM(affine.constant))
-        if self.columns:
-            rows += ca.reshape(ca.DM(affine.slope.transpose(1, 0, 2).reshape(k * d, -1)) @ self._u, k, d)
-        return rows, affine.weights, affine.norm
+            return *self._rows(quantity), quantity.norm
+        return *self._loads.rows(quantity), quantity.norm
 
     def _load(self, quantity: Quantity) -> Any:
         """A load quantity to be minimised, softened by a share of the objective (N3)."""
@@ -368,23 +354,46 @@ class JointProgram:
         pairs = zip(self._held.names, self._held.slopes, multipliers, strict=True)
         return abs(float(sum(slope * m for other, slope, m in pairs if other == name)))
 
+    def _inner(self, mounts: Sequence[float]) -> Array:
+        """Decisions about mounts as the program has them: by ratio where bounds lie far apart."""
+        values = np.asarray(mounts, dtype=float)
+        return np.where(self._by_ratio, np.log(np.where(self._by_ratio, values, 1.0)), values)
+
     def split(self, x: Array) -> tuple[list[float], list[complex]]:
         """Decisions about mounts and about unbalances."""
         design = self.problem.mount_design
-        mounts = [float(np.clip(v, d.lower, d.upper)) for v, d in zip(x[: self._count], design.decisions, strict=True)]
+        inner = x[: self._count]
+        outer = np.where(self._by_ratio, np.exp(np.where(self._by_ratio, inner, 0.0)), inner)
+        mounts = [float(np.clip(v, d.lower, d.upper)) for v, d in zip(outer, design.decisions, strict=True)]
         columns = x[self._count : self._count + self.columns].copy()
         for domain in self.model.domains:
             columns[domain.columns] = domain.project(columns)
         return mounts, [domain.complex_value(columns) for domain in self.model.domains]
 
-    def start(self, mounts: Sequence[float], columns: Array) -> Array:
+    def turns(self, x: Array) -> Array:
+        """Deviations of the throws from their star [rad]."""
+        return np.asarray(x[self._turned])
+
+    def designed(self, x: Array) -> Problem:
+        """The problem with its throws where they were moved to."""
+        if self.moves is None:
+            return self.problem
+        given = self.problem
+        own = self.moves.phasing.realise(self.moves.candidate(self.turns(x)))
+        return replace(
+            own, phasing=None, tolerance=given.tolerance, fidelity=given.fidelity, mount_design=given.mount_design
+        )
+
+    def start(self, mounts: Sequence[float], columns: Array, turns: Array | None = None) -> Array:
         """Variables at given decisions: modes and largest values follow from them."""
-        parts = [np.asarray(mounts, dtype=float), columns]
+        turns = np.zeros(self._t.numel()) if turns is None else turns
+        parts = [self._inner(mounts), columns, turns]
         if self._modal:
             parts += self._modes_at(mounts)
         if self._tops:
-            values = ca.Function("tops", [self._d, self._u], [ca.vertcat(*(value for _, value in self._tops))])
-            parts.append(1.05 * np.asarray(values(list(mounts), columns), dtype=float).reshape(-1))
+            given = [self._v, self._u, self._t]
+            values = ca.Function("tops", given, [ca.vertcat(*(value for _, value in self._tops))])
+            parts.append(1.05 * np.asarray(values(self._inner(mounts), columns, turns), dtype=float).reshape(-1))
         return np.concatenate(parts)
 
     def _modes_at(self, mounts: Sequence[float]) -> list[Array]:

@@ -6,8 +6,15 @@ from laufruhe.problem.model import Problem
 from laufruhe.solvers.result import Result
 
 
-def solve_mounts(problem: Problem) -> Result:
+def solve_mounts(problem: Problem, workers: int | None = None) -> Result:
     """Decide what a problem on elastic mounts leaves open.
+
+    Parameters
+    ----------
+    problem
+        On elastic mounts.
+    workers
+        Processes that starts are shared among; as many as processors when left out.
 
     Raises
     ------
@@ -20,4 +27,4 @@ def solve_mounts(problem: Problem) -> Result:
         return solve_convex_mounts(problem)
     from laufruhe.solvers.mount_nonlinear import solve_joint
 
-    return solve_joint(problem)
+    return solve_joint(problem, workers)

@@ -242,7 +242,7 @@ def solve_nonlinear(
     """
     task = _task(program, max_iterations, max_seconds)
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
-    count = min(len(points), workers if workers is not None else _processors())
+    count = min(len(points), workers if workers is not None else processors())
     found = _run(task, points) if count <= 1 else _run_apart(task, points, count)
     return tuple(sorted(found, key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
 
@@ -256,7 +256,8 @@ def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = 1e
     return tuple(kept)
 
 
-def _processors() -> int:
+def processors() -> int:
+    """As many processes as may run side by side."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

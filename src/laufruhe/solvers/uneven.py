@@ -89,7 +89,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     SolverError
         If no start leads anywhere.
     """
-    starts = _starts(phasing, even)
+    starts = starts_of(phasing, even)
     if not starts:
         return no_result(problem, "no star and firing order to start from keeps the firing intervals allowed")
     found = [answer for start in starts[:STARTS] if (answer := local_optimum(phasing, start, phasing.intervals))]
@@ -103,7 +103,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
 def local_optimum(phasing: Phasing, start: Start, intervals: Intervals) -> Uneven | None:
     """The local optimum that one star leads to; the star itself where nothing is better (S20)."""
     best = _evaluated(phasing, start.candidate, 0.0, moved=False)
-    if best is not None and not intervals.holds(_intervals(phasing, start.candidate), 1e-7):
+    if best is not None and not intervals.holds(firing_intervals(phasing, start.candidate), 1e-7):
         best = None
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
@@ -118,7 +118,7 @@ def local_optimum(phasing: Phasing, start: Start, intervals: Intervals) -> Uneve
             continue
         candidate = program.candidate(optimum.x)
         answer = _evaluated(phasing, candidate, optimum.kkt_residual, moved=True)
-        if answer is None or not intervals.holds(_intervals(phasing, candidate), 1e-7):
+        if answer is None or not intervals.holds(firing_intervals(phasing, candidate), 1e-7):
             continue
         if best is None or answer.value < best.value * (1.0 - 1e-9):
             best = answer
@@ -139,13 +139,14 @@ def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: b
     return Uneven(candidate, result, residual, moved)
 
 
-def _intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...]:
+def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...]:
+    """Crank angles from firing to firing of a design [rad]."""
     layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
     turns = firing_turns(layout, candidate.throws, candidate.firing_order or ())
     return intervals_of(phasing.cycle, turns)
 
 
-def _starts(phasing: Phasing, even: Result | None) -> list[Start]:
+def starts_of(phasing: Phasing, even: Result | None) -> list[Start]:
     """Designs to start from: the ranked even stars, or the middle of the throws' own bounds."""
     if even is not None and even.phasing is not None:
         return [
@@ -218,7 +219,7 @@ def _trade(
         if out and out[-1].value < best.value:
             out.append(replace(out[-1], allowed=share * allowed, lower_bound=bound))
             continue
-        intervals = _intervals(phasing, best.candidate)
+        intervals = firing_intervals(phasing, best.candidate)
         deviation = max(abs(i - even) for i in intervals)
         deviation = deviation if deviation > 1e-9 else 0.0
         out.append(TradePoint(share * allowed, deviation, best.value, best.candidate.throws, best.kkt_residual, bound))

@@ -117,10 +117,18 @@ class UnevenModel:
         top = ca.mmax(stacked)
         return top + softness * ca.log(ca.sum1(ca.exp((stacked - top) / softness)))
 
+    def rows(self, quantity: Quantity, at: Symbols) -> tuple[Any, Array]:
+        """Vectors at angles over two turns whose norm a load on the block is, and their weights (P1)."""
+        chosen = self._points(quantity)
+        whole = sum(point.weight for point in chosen)
+        blocks = [_rows([(h, parts[0]) for h, parts in self._signal(quantity, p.speed, at)]) for p in chosen]
+        weights = [np.full(b.shape[0], p.weight / whole / b.shape[0]) for p, b in zip(chosen, blocks, strict=True)]
+        return ca.vertcat(*blocks), np.concatenate(weights)
+
     def _signal(self, quantity: Quantity, speed: float, at: Symbols) -> list[tuple[float, list[Any]]]:
         """Per order, the vectors (re, im), shape (d, 2), of each mount or of the block."""
         out = []
-        for h, wrench in sorted(self._wrench(speed, at).items()):
+        for h, wrench in sorted(self.wrench(speed, at).items()):
             if quantity.orders is not None and h not in quantity.orders:
                 continue
             if quantity.subject is not Subject.MOUNT_FORCE:
@@ -138,7 +146,7 @@ class UnevenModel:
             out.append((h, [ca.DM(m.real) @ wrench + ca.DM(m.imag) @ turned for m in maps]))
         return out or [(1.0, [ca.DM.zeros(1, 2)])]
 
-    def _wrench(self, speed: float, at: Symbols) -> dict[float, Any]:
+    def wrench(self, speed: float, at: Symbols) -> dict[float, Any]:
         """Wrench coefficients (re, im) by order, shape (6, 2)."""
         total: dict[float, Any] = {}
         for k, part in enumerate(self.problem.engine.slider_cranks):

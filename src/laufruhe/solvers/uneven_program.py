@@ -10,7 +10,6 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine.firing import firing_turns
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Intervals, Phasing
@@ -18,12 +17,12 @@ from laufruhe.problem.quantity import Quantity
 from laufruhe.solvers.domain import Domain
 from laufruhe.solvers.nonlinear import NonlinearProgram
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.throw_moves import ThrowMoves
 from laufruhe.solvers.uneven_model import Symbols, UnevenModel
 
 Array = NDArray[np.float64]
 
 SOFTNESS = (1e-2, 1e-4, 1e-6)
-REACH = math.radians(60.0)
 FLOOR = 1e-3
 SOFT_LIMIT = 1e-6
 
@@ -34,16 +33,13 @@ class UnevenProgram:
     def __init__(
         self, phasing: Phasing, model: UnevenModel, start: Candidate, intervals: Intervals, even: Result | None
     ) -> None:
-        self._phasing, self._start, self._model = phasing, start, model
-        self._throws = range(0 if phasing.throw_bounds else 1, len(start.throws))
-        self._open_bank = _is_open(phasing.bank)
-        self._open_split = _is_open(phasing.split)
+        self._moves, self._model = ThrowMoves(phasing, model.layout, start, intervals), model
         columns = sum(domain.width for domain in model.domains)
-        size = len(self._throws) + self._open_bank + self._open_split + columns
+        size = self._moves.size + columns
         self._x = ca.SX.sym("x", size)
         lower, upper, x0 = self._bounds(columns, even)
-        bank, split, throws, unbalances = self._unpacked(self._x)
-        symbols = Symbols(throws, bank, split, unbalances)
+        unbalances = self._x[self._moves.size :]
+        symbols = Symbols(*self._moves.angles(self._x), unbalances)
         softness = ca.SX.sym("e")
         problem = model.problem
         given = [max(term.weight * _size(term.quantity, even, problem), 1e-300) for term in problem.objective]
@@ -51,7 +47,8 @@ class UnevenProgram:
             term.weight * model.norm(term.quantity, symbols, softness * size_of / term.weight)
             for term, size_of in zip(problem.objective, given, strict=True)
         )
-        rows, low, high, names = self._firing(symbols, intervals)
+        rows, names = self._moves.firing(self._x)
+        low, high = [intervals.least] * len(rows), [intervals.most] * len(rows)
         for limit in problem.limits:
             unit = limit.maximum or 1.0
             squares = model.squares(limit.quantity, symbols)
@@ -92,49 +89,14 @@ class UnevenProgram:
     @property
     def is_fixed(self) -> bool:
         """Whether nothing but unbalances can move."""
-        return len(self._throws) + self._open_bank + self._open_split == 0
+        return self._moves.size == 0
 
     def candidate(self, x: Array) -> Candidate:
         """The design of a decision vector."""
-        bank, split, throws, _ = self._unpacked(ca.DM(x))
-        angles = tuple(float(angle) % math.tau for angle in throws)
-        number = None if bank is None else float(bank), None if split is None else float(split)
-        return replace(self._start, throws=angles, bank_angle=number[0], split_pin=number[1])
-
-    def _unpacked(self, x: Any) -> tuple[Any, Any, list[Any], Any]:
-        count, start = len(self._throws), self._start
-        bank, split = start.bank_angle, start.split_pin
-        position = count
-        if self._open_bank:
-            bank = bank + x[position]
-            position += 1
-        if self._open_split:
-            split = split + x[position]
-            position += 1
-        first = start.throws[0]
-        if bank is not None and start.bank_angle is not None:
-            # cylinder 1 stays at its dead centre when phi = 0
-            first = first + 0.5 * (bank - start.bank_angle)
-        if split is not None and start.split_pin is not None:
-            first = first + 0.5 * (split - start.split_pin)
-        throws = [first] if not self._phasing.throw_bounds else []
-        throws += [start.throws[k] + x[j] for j, k in enumerate(self._throws)]
-        return bank, split, throws, x[position:]
+        return self._moves.candidate(x)
 
     def _bounds(self, columns: int, even: Result | None) -> tuple[Array, Array, Array]:
-        low, high = [], []
-        start, phasing = self._start, self._phasing
-        for k in self._throws:
-            pair = phasing.throw_bounds[k] if phasing.throw_bounds else None
-            low.append(-REACH if pair is None else pair[0] - start.throws[k])
-            high.append(REACH if pair is None else pair[1] - start.throws[k])
-        for is_open, bounds, given in (
-            (self._open_bank, phasing.bank, start.bank_angle),
-            (self._open_split, phasing.split, start.split_pin),
-        ):
-            if is_open and bounds is not None and given is not None:
-                low.append(bounds[0] - given)
-                high.append(bounds[1] - given)
+        low, high = self._moves.lower.tolist(), self._moves.upper.tolist()
         x0 = np.zeros(len(low) + columns)
         for domain in self._model.domains:
             low += [domain.decision.lower] if domain.width == 1 else [-domain.scale] * 2
@@ -143,26 +105,6 @@ class UnevenProgram:
             x0[len(x0) - columns :] = _columns_of(self._model, even)
         lower, upper = np.array(low), np.array(high)
         return lower, upper, np.clip(x0, lower, upper)
-
-    def _firing(self, at: Symbols, intervals: Intervals) -> tuple[list[Any], list[float], list[float], list[str]]:
-        """Firing intervals, linear in throws, bank and split pin (S20)."""
-        layout, start, cycle = self._model.layout, self._start, self._phasing.cycle
-        order = start.firing_order or ()
-        turns = firing_turns(layout, start.throws, order)
-        moments = []
-        for turn, number in zip(turns, order, strict=True):
-            k = number - 1
-            side = 0.5 if 2 * k < len(layout.pins) else -0.5
-            moved = start.throws[layout.pins[k]] - at.throws[layout.pins[k]]
-            if at.bank is not None and start.bank_angle is not None:
-                moved = moved + side * (at.bank - start.bank_angle)
-            if at.split is not None and start.split_pin is not None:
-                moved = moved + side * (at.split - start.split_pin)
-            moments.append(math.tau * turn + moved)
-        following = [*moments[1:], moments[0] + cycle.angle]
-        rows = [b - a for a, b in zip(moments, following, strict=True)]
-        names = [f"firing interval after cylinder {number}" for number in order]
-        return rows, [intervals.least] * len(rows), [intervals.most] * len(rows), names
 
 
 def _membership(domain: Domain, columns: Any) -> list[tuple[Any, float]]:
@@ -175,10 +117,6 @@ def _membership(domain: Domain, columns: Any) -> list[tuple[Any, float]]:
         rows.append(((ay * columns[0] - ax * columns[1]) / domain.scale, 0.0))
         rows.append(((bx * columns[1] - by * columns[0]) / domain.scale, 0.0))
     return rows
-
-
-def _is_open(bounds: tuple[float, float] | None) -> bool:
-    return bounds is not None and bounds[0] < bounds[1]
 
 
 def _size(quantity: Quantity, even: Result | None, problem: Problem) -> float:

@@ -1,0 +1,105 @@
+"""Where a search of mounts starts: points spread over all bounds, those that promise most first."""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.problem.evaluation import evaluate, remounted
+from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_design import NOTHING_ASKED
+from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.solvers.domain import Domain, domains_of
+from laufruhe.solvers.nonlinear import spread_starts
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.unbalances import solve_unbalances
+
+Array = NDArray[np.float64]
+
+# candidates for each start: their modes cost a thousandth of a search
+POOL = 40
+LEAST_POOL = 640
+POOL_SAMPLES = 72
+
+
+def _balanced(problem: Problem) -> list[complex] | None:
+    """Unbalances that are best on the mounts as given, where that is convex."""
+    if not problem.decisions or not problem.objective:
+        return None
+    result = solve_unbalances(replace(problem, mount_design=NOTHING_ASKED))
+    return unbalances_of(problem, result) if result.decisions else None
+
+
+def start_points(problem: Problem) -> list[tuple[list[float], Array]]:
+    """Mounts and columns of unbalances that a search starts from.
+
+    The design as given, then points spread over all bounds: stiffness by ratio,
+    unbalances in their sets.
+    """
+    design, domains, balanced = problem.mount_design, domains_of(problem.decisions), _balanced(problem)
+    decisions = design.decisions
+    ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
+    low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+    given = np.array([d.start for d in decisions])
+    low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
+    wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
+    spread = spread_starts(
+        np.concatenate([low_log, -wide]),
+        np.concatenate([high_log, wide]),
+        max(POOL * design.starts, LEAST_POOL),
+        design.seed,
+    )
+    best = columns_of(domains, problem.start if balanced is None else balanced)
+    found = [(given.tolist(), best)]
+    spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
+    spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
+    for k, row in enumerate(_promising(problem, spread, len(low), design.starts - 1)):
+        mounts = row[: len(low)]
+        own = row[len(low) :].copy()
+        for domain in domains:
+            own[domain.columns] = domain.project(own)
+        found.append((mounts.tolist(), own if k % 2 else best))
+    return found
+
+
+def _promising(problem: Problem, pool: Array, count: int, wanted: int) -> Array:
+    """Points of the pool that break limits on mounts least and are worth most; a third taken as they come."""
+    given = replace(evaluate(problem), samples=POOL_SAMPLES)
+    whole = abs(whole_objective(problem, given)) or 1.0
+    scores = []
+    for row in pool:
+        try:
+            design = remounted(given, problem.mount_design.applied(problem.engine, row[:count].tolist()))
+        except ModelError:
+            scores.append(np.inf)
+            continue
+        misses = sum(max(excess(limit, design), 0.0) for limit in problem.mount_design.limits)
+        scores.append(misses + whole_objective(problem, design) / whole)
+    best = np.argsort(scores, kind="stable")
+    chosen = list(best[: wanted - wanted // 3])
+    chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
+    return pool[chosen]
+
+
+def columns_of(domains: Sequence[Domain], values: Sequence[complex]) -> Array:
+    """Decision vector of complex unbalances, each brought into its set."""
+    out = np.zeros(sum(domain.width for domain in domains))
+    for domain, value in zip(domains, values, strict=True):
+        out[domain.columns] = domain.columns_of(value)
+        out[domain.columns] = domain.project(out)
+    return out
+
+
+def unbalances_of(problem: Problem, result: Result) -> list[complex]:
+    """Complex decisions from the sizes and angles of a result."""
+    found = {decision.name: decision.value for decision in result.decisions}
+    values = []
+    for decision in problem.decisions:
+        angle = found.get(decision.name.rsplit(".", 1)[0] + ".angle", decision.angle[0])
+        values.append(cmath.rect(found[decision.name], angle))
+    return values

@@ -1,0 +1,64 @@
+"""Ready problems on elastic mounts from ten seeds each. Writes results/mounts/seeds.md."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from laufruhe.problem.model import Problem
+from laufruhe.problem.reader import load
+from laufruhe.solvers import solve
+from laufruhe.solvers.mount_convex import is_convex
+
+ROOT = Path(__file__).parents[2]
+SEEDS = range(10)
+# of an open star; all of them are looked at by the ready problem itself
+STARS = 12
+
+
+def elastic_problems() -> list[Problem]:
+    """Ready problems that leave mounts open."""
+    # a study file is no problem, and the others are not read for nothing
+    files = [p for p in sorted((ROOT / "problems").glob("*.toml")) if 'kind = "elastic"' in p.read_text("utf-8")]
+    return [problem for problem in map(load, files) if problem.mount_design.decisions]
+
+
+def row_of(problem: Problem) -> str:
+    """One line of the table."""
+    values, seconds = [], []
+    if problem.phasing is not None:
+        problem = replace(problem, phasing=replace(problem.phasing, best=STARS))
+    for seed in SEEDS:
+        design = replace(problem.mount_design, seed=seed)
+        started = time.perf_counter()
+        result = solve(replace(problem, mount_design=design))
+        seconds.append(time.perf_counter() - started)
+        assert result.objective is not None
+        values.append(result.objective.value)
+        print(problem.name, seed, values[-1], f"{seconds[-1]:.1f} s", file=sys.stderr, flush=True)
+    spread = max(values) / min(values) - 1.0
+    starts = "cone program, no starts" if is_convex(problem) else f"{problem.mount_design.starts}"
+    return (
+        f"| `{problem.name}` | {starts} | {min(values):.8g} | {max(values):.8g} | {spread:.0e} | {max(seconds):.1f} |"
+    )
+
+
+def main() -> None:
+    lines = [
+        "# Ready problems on elastic mounts from ten seeds",
+        "",
+        "Objective in SI units; the spread is that of the worst seed above the best.",
+        "",
+        "| problem | starts | best | worst | spread | longest [s] |",
+        "| --- | --- | ---: | ---: | ---: | ---: |",
+        *(row_of(problem) for problem in elastic_problems()),
+    ]
+    target = ROOT / "results" / "mounts" / "seeds.md"
+    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print(target.read_text("utf-8"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,183 @@
+"""Stars and throws decided together with elastic mounts: against every star by its own solve (E35, E36)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.problem.phasing import Candidate
+from laufruhe.solvers import solve
+from laufruhe.solvers.certificate import Proof
+from laufruhe.solvers.mount_program import JointProgram
+from laufruhe.solvers.result import Status
+from laufruhe.solvers.throw_moves import ThrowMoves
+from mounts.files import BLOCK, MOUNTS, SAG, changed, problem_of
+
+ENGINE = """
+title = "four"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+cylinders = 4
+stroke = "90 mm"
+rod_ratio = 0.28
+reciprocating_mass = "0.6 kg"
+rotating_mass = "0.4 kg"
+cylinder_spacing = "90 mm"
+throws = "open"
+[[operating_points]]
+speed = "1500 rpm"
+[[counterweights]]
+name = "web"
+balance_fraction = { between = [0, 1] }
+"""
+HEAVY_END = ('["0 mm", "0 mm", "120 mm"]', '["60 mm", "0 mm", "120 mm"]')
+FORCE = '[objective]\nminimise = "mean mount force"\n[[constraints]]\nlimit = "static sag"\nmax = "4 mm"\n'
+SEARCH = "[search]\nstarts = 2\n"
+UNEVEN = '[phasing]\nintervals = { largest_deviation = "8 deg" }\nbest = 2\n'
+STARS = ([0, 180, 180, 0], [0, 180, 0, 180], [0, 0, 180, 180])
+
+
+def parts(throws: str = '"open"', objective: str = FORCE) -> tuple[str, ...]:
+    return changed(ENGINE, ('"open"', throws)), changed(BLOCK, HEAVY_END), MOUNTS, objective, SEARCH
+
+
+@pytest.fixture(scope="module")
+def decided(tmp_path_factory):
+    return solve(problem_of(tmp_path_factory.mktemp("open"), *parts()))
+
+
+def test_the_best_star_is_the_best_of_all_solved_one_by_one(decided, tmp_path):
+    one_by_one = {}
+    for star in STARS:
+        result = solve(problem_of(tmp_path, *parts(str(star))))
+        one_by_one[tuple(star)] = result.objective.value
+    ranked = {tuple(round(math.degrees(a)) for a in entry.throws): entry.value for entry in decided.phasing.ranking}
+    assert set(ranked) == set(one_by_one)
+    for star, value in one_by_one.items():
+        assert ranked[star] == pytest.approx(value, rel=1e-4)
+    assert decided.objective.value == pytest.approx(min(one_by_one.values()), rel=1e-4)
+    assert decided.phasing.ranking[0].value == min(entry.value for entry in decided.phasing.ranking)
+
+
+def test_a_search_of_all_stars_is_bounded_but_not_called_proven(decided):
+    certificate = decided.certificate
+    assert decided.status is Status.FEASIBLE
+    assert certificate.kind is Proof.LOCAL
+    assert 0.0 < certificate.lower_bound <= decided.objective.value
+    assert "each of 3 star(s)" in certificate.method
+    assert certificate.lower_bound == min(entry.lower_bound for entry in decided.phasing.ranking)
+    assert [d.name for d in decided.decisions][:4] == [f"throw {k}" for k in (1, 2, 3, 4)]
+
+
+def test_stars_left_out_leave_no_bound(tmp_path):
+    result = solve(problem_of(tmp_path, *parts(), "[phasing]\nbest = 1\n"))
+    assert result.certificate.lower_bound == 0.0
+    assert "the best of 3 on the mounts as given" in result.certificate.method
+
+
+def test_where_no_star_matters_the_proof_of_the_mounts_holds(tmp_path):
+    """Sag and natural frequencies know no throws: every star has the same proven optimum."""
+    engine = changed(ENGINE, ('"open"', '"open"'), ('[[counterweights]]\nname = "web"\n', ""),
+                     ("balance_fraction = { between = [0, 1] }\n", ""))  # fmt: skip
+    result = solve(problem_of(tmp_path, engine, BLOCK, MOUNTS, SAG))
+    assert result.status is Status.OPTIMAL
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value == pytest.approx(1.3973e-3, rel=1e-4)
+    assert len(result.phasing.ranking) == 3
+
+
+def test_limits_that_contradict_on_every_star_are_named(tmp_path):
+    hopeless = changed(FORCE, ("4 mm", "2 mm")) + '[[constraints]]\nlimit = "natural frequencies"\nmax = "9 Hz"\n'
+    result = solve(problem_of(tmp_path, *parts(objective=hopeless)))
+    assert result.status is Status.INFEASIBLE
+    assert set(result.conflict) == {"static sag", "natural frequencies"}
+
+
+@pytest.fixture(scope="module")
+def uneven(tmp_path_factory):
+    return solve(problem_of(tmp_path_factory.mktemp("uneven"), *parts(), UNEVEN))
+
+
+def test_throws_that_may_move_are_never_worse_and_keep_their_intervals(decided, uneven):
+    assert uneven.objective.value < decided.objective.value * (1 - 1e-4)
+    assert uneven.problem.phasing.intervals.holds(uneven.final.engine.firing_intervals, 1e-7)
+    assert max(uneven.final.engine.firing_intervals) - math.pi > math.radians(1.0)
+    assert uneven.certificate.kind is Proof.LOCAL
+    assert uneven.certificate.lower_bound == 0.0
+    assert uneven.certificate.kkt_residual < 1e-6
+    throws = [d.value for d in uneven.decisions[:4]]
+    assert [part.throw for part in uneven.final.engine.slider_cranks] == pytest.approx(throws)
+
+
+def test_no_star_near_an_uneven_one_is_better(uneven):
+    phasing = uneven.problem.phasing
+    candidate = _candidate(uneven)
+    values = {d.name: d.value for d in uneven.decisions}
+    generator, tried = np.random.default_rng(1), 0
+    for _ in range(400):
+        size = 10.0 ** generator.uniform(-4, -1.5)
+        throws = tuple(t + (size * generator.normal() if k else 0.0) for k, t in enumerate(candidate.throws))
+        own = replace(phasing.realise(replace(candidate, throws=throws)), phasing=None)
+        mounts = [
+            float(np.clip(values[d.name] * (1 + size * generator.normal()), d.lower, d.upper))
+            for d in own.mount_design.decisions
+        ]
+        fraction = float(np.clip(values["web.balance_fraction"] + size * generator.normal(), 0.0, 1.0))
+        near = evaluate(own, own.design([fraction], mounts), 96)
+        if not phasing.intervals.holds(near.engine.firing_intervals, 1e-9):
+            continue
+        if max(excess(limit, near) for limit in own.mount_design.limits) > 0.0:
+            continue
+        tried += 1
+        assert whole_objective(own, near) > uneven.objective.value * (1 - 1e-5)
+    assert tried > 20
+
+
+def _candidate(result):
+    """The star of a result."""
+    best = result.phasing.ranking[0]
+    return Candidate(best.throws, best.firing_orders[0].order)
+
+
+@pytest.mark.parametrize("quantity", ["mean mount force", "rms mount force", "rms rocking couple"])
+def test_the_program_of_moved_throws_says_what_the_exact_model_says(quantity, tmp_path):
+    objective = changed(FORCE, ("mean mount force", quantity))
+    problem = problem_of(tmp_path, *parts(objective=objective), UNEVEN)
+    phasing = problem.phasing
+    star = Candidate((0.0, math.pi, math.pi, 0.0), (1, 3, 4, 2))
+    own = replace(phasing.realise(star), phasing=None)
+    moves = ThrowMoves(phasing, phasing.layout(None, None), star, phasing.intervals)
+    joint = JointProgram(own, moves=moves)
+    value = ca.Function("f", [joint.program.x, joint.program.parameters], [joint.program.objective])
+    generator = np.random.default_rng(5)
+    for _ in range(3):
+        turns = generator.uniform(-0.07, 0.07, moves.size)
+        mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_design.decisions]
+        x = joint.start(mounts, generator.uniform(0.0, 1.0, 1), turns)
+        moved = joint.designed(x)
+        given, unbalances = joint.split(x)
+        # at as many angles as the program has: 32 a turn
+        exact = evaluate(moved, moved.design(unbalances, given), 64)
+        assert float(value(x, 1e-9)) == pytest.approx(whole_objective(moved, exact), rel=1e-3)
+        rows, _ = moves.firing(turns)
+        assert sorted(rows) == pytest.approx(sorted(exact.engine.firing_intervals), abs=1e-9)
+
+
+def test_throws_between_bounds_of_their_own_are_decided_with_the_mounts(tmp_path):
+    throws = "[0, { between = [160, 200] }, { between = [160, 200] }, { between = [-15, 15] }]"
+    phasing = '[phasing]\nintervals = { largest_deviation = "25 deg" }\n'
+    result = solve(problem_of(tmp_path, *parts(throws), phasing))
+    assert result.status is Status.FEASIBLE
+    assert result.problem.phasing.intervals.holds(result.final.engine.firing_intervals, 1e-7)
+    assert result.objective.value < result.objective.initial
+    for decision in result.decisions[1:4]:
+        low, high = decision.lower, decision.upper
+        turned = low + (decision.value - low + 1e-9) % math.tau
+        assert turned <= high + 1e-7
