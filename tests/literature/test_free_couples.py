@@ -9,16 +9,20 @@ cancels is zero and not a small number.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from laufruhe import load
+from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.layouts import Layout, Mechanism, build, even_throws, inline, vee
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import EXACT, Fidelity, rotating_loads, shaking_loads
+from laufruhe.studies.free_forces import FreeLoad, firing_intervals, free_load
 
 TWO_ORDER = Fidelity(kinematics="two-order")
 HALF_DIGIT = 0.00005
@@ -202,3 +206,78 @@ def test_higher_orders_and_offset_tell() -> None:
     assert _loads(row, 4, TWO_ORDER)[4] == 0.0
     assert _loads(row, 3)[2] == 0.0
     assert abs(_loads(row, 3, offset=0.012)[2]) > 1e-3 * UNIT_FORCE
+
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+ROOT = math.sqrt
+# ready problem: forces and couples of orders 1 and 2, and the longest firing interval [deg]
+READY = {
+    "tractor-single": (1.0, 0.0, 1.0, 0.0, 720),
+    "tractor-two": (0.0, 1.0, 2.0, 0.0, 540),
+    "tractor-three": (0.0, ROOT(3), 0.0, ROOT(3), 240),
+    "tractor-four-lanchester": (0.0, 0.0, 4.0, 0.0, 180),
+    "inline-five": (0.0, 0.4490, 0.0, 4.9798, 144),
+    "tractor-six": (0.0, 0.0, 0.0, 0.0, 120),
+    "inline-seven": (0.0, 0.2673, 0.0, 1.0056, 720 / 7),
+    "inline-eight": (0.0, 0.0, 0.0, 0.0, 90),
+    "inline-ten": (0.0, 0.0, 0.0, 0.0, 72),
+    "inline-twelve": (0.0, 0.0, 0.0, 0.0, 60),
+    "two-stroke-two": (0.0, 1.0, 2.0, 0.0, 180),
+    "two-stroke-three": (0.0, ROOT(3), 0.0, ROOT(3), 120),
+    "tractor-two-stroke-four-root-two": (0.0, ROOT(2), 0.0, 4.0, 90),
+    "tractor-two-stroke-four-root-ten": (0.0, ROOT(10), 0.0, 0.0, 90),
+    "two-stroke-five": (0.0, 0.4490, 0.0, 4.9798, 72),
+    "two-stroke-six": (0.0, 0.0, 0.0, 2 * ROOT(3), 60),
+    "two-stroke-seven": (0.0, 0.2673, 0.0, 1.0056, 360 / 7),
+    "vee-two-90": (1.0, 0.0, ROOT(2), 0.0, 450),
+    "vee-six-60": (0.0, 1.5, 0.0, 1.5, 120),
+    "vee-six-90": (0.0, ROOT(3), 0.0, ROOT(6), 150),
+    "vee-eight-cross": (0.0, ROOT(10), 0.0, 0.0, 90),
+    "vee-eight-flat": (0.0, 0.0, 4 * ROOT(2), 0.0, 90),
+    # two pairs of opposed cylinders, 50 mm apart along a crank of 125 mm spacing
+    "boxer-four": (0.0, 0.0, 0.0, 2 * 0.050 / 0.125, 180),
+    # both pistons of a pin move the same way: first order adds up, second cancels (Hasselgruber 1964, Fig. 29)
+    "flat-four": (0.0, 2.0, 0.0, 0.0, 180),
+    "flat-twelve": (0.0, 0.0, 0.0, 0.0, 60),
+}
+
+
+def _ready(name: str, order: int) -> FreeLoad:
+    return free_load(load(PROBLEMS / f"{name}.toml").engine, order, SPACING)
+
+
+@pytest.mark.parametrize("name", READY)
+def test_ready_problems_have_the_free_forces_of_their_layout(name: str) -> None:
+    force, couple, second_force, second_couple, longest = READY[name]
+    first, second = _ready(name, 1), _ready(name, 2)
+    found = (first.force, first.couple, second.force, second.couple)
+    assert found == pytest.approx((force, couple, second_force, second_couple), abs=HALF_DIGIT)
+    assert math.degrees(firing_intervals(load(PROBLEMS / f"{name}.toml").engine)[1]) == pytest.approx(longest)
+
+
+@pytest.mark.parametrize("name", ["inline-five", "inline-seven", "inline-nine", "inline-eleven", "two-stroke-five"])
+@pytest.mark.parametrize("order", [1, 2])
+def test_couples_of_odd_engines_follow_from_their_firing_order(name: str, order: int) -> None:
+    """The sum of places times directions, cylinder by cylinder as they fire."""
+    problem = load(PROBLEMS / f"{name}.toml").engine
+    by_firing = sorted(problem.slider_cranks, key=lambda part: part.firing_angle)
+    count = len(by_firing)
+    step = 2.0 * math.pi * problem.cycle.turns / count
+    total = sum(part.x / SPACING * np.exp(1j * order * k * step) for k, part in enumerate(by_firing))
+    assert _ready(name, order).couple == pytest.approx(abs(total), rel=1e-9)
+    assert _ready(name, order).force == pytest.approx(0.0, abs=1e-12)
+
+
+def test_what_turns_against_the_crank() -> None:
+    """Hasselgruber 1964, eq. 33: no first order at 90 degrees, half of it upright; the V8's couple turns with the crank."""
+    assert _ready("vee-two-90", 1).force_against == pytest.approx(0.0, abs=1e-12)
+    assert _ready("tractor-single", 1).force_against == pytest.approx(0.5)
+    assert _ready("vee-eight-cross", 1).couple_against == pytest.approx(0.0, abs=1e-12)
+    assert _ready("inline-five", 1).couple_against == pytest.approx(0.5 * 0.4490, abs=HALF_DIGIT)
+
+
+def test_cylinders_that_differ_have_no_unit() -> None:
+    engine = load(PROBLEMS / "tractor-two.toml").engine
+    heavy = replace(engine.slider_cranks[0], reciprocating_mass=2.0)
+    with pytest.raises(ModelError, match="have no unit"):
+        free_load(replace(engine, slider_cranks=(heavy, engine.slider_cranks[1])), 1, SPACING)

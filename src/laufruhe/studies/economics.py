@@ -1,31 +1,72 @@
-"""The economics of balancing: least mount force against the mass that shafts may have, with proofs.
+"""The economics of balancing: least mount force against number and mass of shafts, with proofs.
 
-One program is built for a set of shafts; along the front only the mass limit changes, so
-every point is a re-solve (P1). Each is bounded from below on a grid twice as fine (P6).
+Every point is a whole solve: a mass limit costs no more than an unlimited design, each comes
+with its own certificate on the exact model, and the price of the limit says what the next
+kilogram is worth. The engine with one more cylinder stands beside, rebuilt at equal power
+(Hasselgruber 1964, eqs. 14-23).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.machine import Role
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.model import Limit, Problem
-from laufruhe.problem.quantity import Quantity, Subject
-from laufruhe.solvers.affine import AffineModel, AffineProblem
-from laufruhe.solvers.certificate import best_bound
-from laufruhe.solvers.conic import ConicProgram
+from laufruhe.problem.quantity import MASSES, Quantity, Subject
+from laufruhe.solvers import solve
+from laufruhe.solvers.unbalances import objective_name
 
-Array = NDArray[np.float64]
+MASS_ON_SHAFTS = Quantity(Subject.BALANCER_MASS, Norm.SUM)
+LIMIT_NAME = "mass on shafts"
+SAME = 1e-4
+"""Relative difference of forces below which proofs cannot tell designs apart."""
 
-SAMPLES = 360
-_MASS = Limit("mass on shafts", Quantity(Subject.BALANCER_MASS, Norm.SUM), np.inf)
+
+class Standing(StrEnum):
+    """What an engine is in a comparison."""
+
+    PLAIN = "plain"
+    SHAFTS = "with shafts"
+    NEXT = "more cylinders"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What a source says of a build.
+
+    Attributes
+    ----------
+    says
+        The judgement, by the names of `laufruhe.studies.worth`; empty where only a number is given.
+    falls_by
+        Share by which the force is said to fall; NaN where only a judgement is given.
+    against
+        Name of the build that it is compared with.
+    where
+        Figure or passage.
+    """
+
+    says: str = ""
+    falls_by: float = float("nan")
+    against: str = "plain"
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class Build:
+    """One engine of a comparison: a problem that has the shafts to be built and no others."""
+
+    name: str
+    problem: Problem
+    standing: Standing = Standing.SHAFTS
+    claim: Claim = Claim()
 
 
 @dataclass(frozen=True)
@@ -35,17 +76,20 @@ class FrontPoint:
     Attributes
     ----------
     mass_limit, mass
-        Allowed and used on balancer shafts [kg].
+        Allowed and used on balancer shafts [kg]; infinite where nothing is asked of the mass.
     force
-        Least objective at this limit, by the exact rows on the finer grid [SI].
+        Least objective at this limit, by the exact model [SI].
     lower_bound
         What no design within the limit falls below [SI].
+    price
+        Fall of the least objective per kilogram more [SI / kg].
     """
 
     mass_limit: float
     mass: float
     force: float
     lower_bound: float
+    price: float
 
     @property
     def gap(self) -> float:
@@ -70,67 +114,122 @@ def with_shafts(problem: Problem, kept: Sequence[str]) -> Problem:
     return replace(problem, engine=replace(problem.engine, rotors=rotors), decisions=decisions)
 
 
-def front(problem: Problem, mass_limits: Sequence[float], samples: int = SAMPLES) -> tuple[FrontPoint, ...]:
-    """Least objective under each limit on the mass of the shafts [kg], in the order given.
+def best(problem: Problem, mass_limit: float = np.inf) -> FrontPoint:
+    """The proven optimum under a limit on the mass of the balancer shafts [kg].
 
     Raises
     ------
     SolverError
-        If a limit cannot be met.
+        If no design keeps the limits of the problem and this one.
     """
-    if not problem.decisions:
-        value = AffineModel(problem).at(2 * samples).objective(np.zeros(0))
-        return tuple(FrontPoint(limit, 0.0, value, value) for limit in mass_limits)
+    asked = shafts_of(problem) and np.isfinite(mass_limit)
+    limits = (*problem.limits, Limit(LIMIT_NAME, MASS_ON_SHAFTS, mass_limit)) if asked else problem.limits
+    result = solve(replace(problem, limits=limits))
+    if result.objective is None or result.status not in ("optimal", "feasible"):
+        within = f" with {mass_limit:g} kg on the shafts" if asked else ""
+        raise SolverError(f"'{problem.name}' has no design{within}: {result.message or result.status}")
+    bound = result.certificate.lower_bound if result.certificate else result.objective.value
+    mass = result.final.value(MASS_ON_SHAFTS) if shafts_of(problem) else 0.0
+    price = next((limit.shadow_price for limit in result.limits if limit.name == LIMIT_NAME), 0.0)
+    return FrontPoint(mass_limit, mass, result.objective.value, bound, price)
+
+
+def front(problem: Problem, mass_limits: Sequence[float]) -> tuple[FrontPoint, ...]:
+    """Least objective under each limit on the mass of the shafts [kg], in the order given.
+
+    A problem without shafts is a level line, solved once.
+    """
     if not shafts_of(problem):
-        # counterweights alone: no mass counts, so one solve is the whole front
-        model = AffineModel(problem)
-        coarse, fine = model.at(samples), model.at(2 * samples)
-        force, bound = _solved(ConicProgram(coarse, reusable=True), coarse, fine)[1:]
-        return tuple(FrontPoint(limit, 0.0, force, bound) for limit in mass_limits)
-    limited = replace(problem, limits=(*problem.limits, replace(_MASS, maximum=max(mass_limits))))
-    model = AffineModel(limited)
-    coarse, fine = model.at(samples), model.at(2 * samples)
-    program = ConicProgram(coarse, reusable=True)
-    return tuple(_point(program, _limited(coarse, most), _limited(fine, most), most) for most in mass_limits)
+        only = best(problem)
+        return tuple(replace(only, mass_limit=limit) for limit in mass_limits)
+    return tuple(best(problem, limit) for limit in mass_limits)
 
 
-def _limited(affine: AffineProblem, most: float) -> AffineProblem:
-    *others, (_, mass) = affine.limits
-    return replace(affine, limits=(*others, (most, mass)))
+def fronts(
+    builds: Sequence[Build], mass_limits: Sequence[float], say: Callable[[int, int], None] = lambda _done, _all: None
+) -> xr.Dataset:
+    """Fronts of several builds, and the optimum of each whatever its shafts weigh, as one labelled dataset.
 
+    Parameters
+    ----------
+    mass_limits
+        Ascending [kg].
+    say
+        Told how many builds are done, of how many.
 
-def _point(program: ConicProgram, coarse: AffineProblem, fine: AffineProblem, most: float) -> FrontPoint:
-    x, force, bound = _solved(program, coarse, fine)
-    return FrontPoint(most, fine.limits[-1][1].value(x), force, bound)
+    Raises
+    ------
+    ModelError
+        If the builds do not minimise one and the same load.
+    """
+    unit = _common_unit([build.problem for build in builds])
+    lines, optima = [], []
+    for k, build in enumerate(builds):
+        say(k, len(builds))
+        lines.append(front(build.problem, mass_limits))
+        optima.append(best(build.problem) if shafts_of(build.problem) else lines[-1][0])
+    say(len(builds), len(builds))
+    shafts = np.array([len(shafts_of(build.problem)) for build in builds])
 
+    def along(name: str, unit: str, words: str) -> tuple[tuple[str, str], list[list[float]], dict[str, str]]:
+        table = [[getattr(point, name) for point in line] for line in lines]
+        return ("build", "mass_limit"), table, {"units": unit, "long_name": words}
 
-def _solved(program: ConicProgram, coarse: AffineProblem, fine: AffineProblem) -> tuple[Array, float, float]:
-    """Decisions, objective and bound on the finer grid."""
-    solution = program.solve(coarse)
-    if solution.x is None:
-        raise SolverError("no design keeps the limits, that on the mass of the shafts among them")
-    return solution.x, fine.objective(solution.x), best_bound(fine, coarse, solution.x, solution.multipliers).value
+    def each(name: str, unit: str, words: str) -> tuple[str, list[float], dict[str, str]]:
+        return "build", [getattr(point, name) for point in optima], {"units": unit, "long_name": words}
 
-
-def fronts(builds: dict[str, Problem], mass_limits: Sequence[float], samples: int = SAMPLES) -> xr.Dataset:
-    """Fronts of several builds as one labelled dataset; a build without shafts is a level line."""
-    found = [front(problem, mass_limits, samples) for problem in builds.values()]
-    dims = ("build", "mass_limit")
-
-    def table(name: str, unit: str, words: str) -> tuple[tuple[str, str], list[list[float]], dict[str, str]]:
-        return dims, [[getattr(p, name) for p in row] for row in found], {"units": unit, "long_name": words}
-
-    return xr.Dataset(
+    data = xr.Dataset(
         {
-            "force": table("force", "N", "least objective"),
-            "lower_bound": table("lower_bound", "N", "what no design falls below"),
-            "mass": table("mass", "kg", "mass on the shafts"),
-            "gap": table("gap", "1", "relative gap of the proof"),
+            "force": along("force", unit, "least objective"),
+            "lower_bound": along("lower_bound", unit, "what no design falls below"),
+            "mass": along("mass", "kg", "mass on the shafts"),
+            "gap": along("gap", "1", "relative gap of the proof"),
+            "price": along("price", f"{unit} / kg", "fall of the least objective per kilogram more"),
+            "optimum": each("force", unit, "least objective whatever the shafts weigh"),
+            "optimum_bound": each("lower_bound", unit, "what no design falls below, whatever the shafts weigh"),
+            "optimum_mass": each("mass", "kg", "mass on the shafts at the least objective"),
         },
-        coords={
-            "build": list(builds),
-            "mass_limit": ("mass_limit", list(mass_limits), {"units": "kg", "long_name": "mass allowed on shafts"}),
-            "shafts": ("build", [len(shafts_of(p)) for p in builds.values()], {"units": "1"}),
-        },
-        attrs={"title": "Economics of balancing", "kind": "economics"},
+        coords=_coordinates(builds, mass_limits, shafts),
+        attrs={"title": "Economics of balancing", "kind": "economics", "objective": objective_name(builds[0].problem)},
     )
+    return data.assign(efficient=_efficient(data))
+
+
+def _coordinates(builds: Sequence[Build], mass_limits: Sequence[float], shafts: np.ndarray) -> dict[str, object]:
+    claims = [build.claim for build in builds]
+    return {
+        "build": [build.name for build in builds],
+        "mass_limit": ("mass_limit", list(mass_limits), {"units": "kg", "long_name": "mass allowed on shafts"}),
+        "shafts": ("build", shafts, {"units": "1", "long_name": "balancer shafts"}),
+        "cylinders": ("build", [len(b.problem.engine.slider_cranks) for b in builds], {"units": "1"}),
+        "standing": ("build", [str(build.standing) for build in builds]),
+        "claim": ("build", [claim.says for claim in claims], {"long_name": "what the source says"}),
+        "claimed_fall": ("build", [claim.falls_by for claim in claims], {"units": "1"}),
+        "claimed_against": ("build", [claim.against for claim in claims]),
+        "claimed_where": ("build", [claim.where for claim in claims]),
+    }
+
+
+def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str, str]]:
+    """Points of the front over all builds: none has less force for no more shafts and no more mass."""
+    force, shafts = data["force"].values, data["shafts"].values
+    same = data["standing"].values != Standing.NEXT
+    on_front = np.zeros(force.shape, dtype=bool)
+    for b in np.flatnonzero(same):
+        rivals = force[same & (shafts <= shafts[b])]
+        for k in range(force.shape[1]):
+            lighter = rivals[:, :k].min(initial=np.inf)
+            fewer = force[same & (shafts < shafts[b]), k].min(initial=np.inf)
+            own = rivals[:, k].min()
+            on_front[b, k] = force[b, k] <= own and force[b, k] < (1.0 - SAME) * min(lighter, fewer)
+    return ("build", "mass_limit"), on_front, {"long_name": "whether no other design is better in every respect"}
+
+
+def _common_unit(problems: Sequence[Problem]) -> str:
+    asked = {objective_name(problem) for problem in problems}
+    if len(asked) > 1:
+        raise ModelError(f"engines minimise different things ({'; '.join(sorted(asked))}); give all one objective")
+    terms = problems[0].objective
+    if not terms or any(term.quantity.subject in MASSES for term in terms):
+        raise ModelError("shafts are weighed against a load, and none is minimised; minimise mean mount force")
+    return terms[0].quantity.unit

@@ -1,11 +1,13 @@
 """Free forces that manufacturing tolerances leave, at their worst and at random.
 
 Hasselgruber 1964, on errors of balancing: all tolerances at their limits, summed
-algebraically, make about 100 kp where the second order of a four-cylinder makes 1000 kp.
+algebraically, make about 100 kp where the second order of a four-cylinder makes 1000 kp;
+so finer balancing promises nothing for engines of fewer than six cylinders.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +23,10 @@ Array = NDArray[np.float64]
 
 ANGLES = 360
 DIRECTIONS = 720
+PIECE = 500
+SHARES = np.arange(201) / 200.0
+SEVERAL = 3.0
+"""A force this many times another decides alone: the rest moves it by less than a third, were they in phase."""
 
 
 @dataclass(frozen=True)
@@ -71,22 +77,47 @@ def _sampled(wrench: Array) -> Array:
     return np.asarray(wrench[:, 1:3])
 
 
-def worst_force(engine: Engine, speed: float, tolerances: Tolerances) -> float:
-    """Largest free force [N] that any combination within the tolerances makes.
+def worst_parts(engine: Engine, speed: float, tolerances: Tolerances) -> dict[str, float]:
+    """Largest free force [N] of each kind of tolerance, all of that kind at their limits.
 
-    What is added up is a sum of segments and discs; its farthest point is sought by
-    support functions on directions half a degree apart, so it is 1e-5 low at most.
+    What masses add up to is a sum of segments; its farthest point is sought by support
+    functions on directions half a degree apart, so it is 1e-5 low at most.
     """
     angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
     directions = np.stack([np.sin(angles), np.cos(angles)])
     segments = np.abs(_unit_forces(engine, speed) @ directions).sum(axis=0) * tolerances.reciprocating_mass
-    return float(segments.max()) + sum(tolerances.unbalances) * speed**2
+    return {
+        "reciprocating masses": float(segments.max()),
+        "unbalance": tolerances.planes * tolerances.unbalance * speed**2,
+        "alignment": sum(tolerances.aligned_masses) * tolerances.alignment * speed**2,
+    }
 
 
-def random_forces(engine: Engine, speed: float, tolerances: Tolerances, builds: int, seed: int) -> Array:
+def worst_force(engine: Engine, speed: float, tolerances: Tolerances) -> float:
+    """Largest free force [N] that any combination within the tolerances makes.
+
+    Unbalances may point anywhere, so their discs add their radii to the farthest point of
+    the segments: the parts add up.
+    """
+    return sum(worst_parts(engine, speed, tolerances).values())
+
+
+def random_forces(
+    engine: Engine,
+    speed: float,
+    tolerances: Tolerances,
+    builds: int,
+    seed: int,
+    say: Callable[[int, int], None] = lambda _done, _all: None,
+) -> Array:
     """Largest free force over the cycle [N] of each of many engines, the nominal force left out.
 
     Masses are even over their tolerance, unbalances even over their disc.
+
+    Parameters
+    ----------
+    say
+        Told how many engines are built, of how many.
     """
     random = np.random.default_rng(seed)
     unit = _unit_forces(engine, speed)
@@ -99,30 +130,78 @@ def random_forces(engine: Engine, speed: float, tolerances: Tolerances, builds: 
     crank = np.exp(2j * np.pi * engine.cycle.turns * np.arange(samples) / samples)
     peaks = np.empty(builds)
     # in pieces: all engines at once would take gigabytes
-    for start in range(0, builds, 500):
-        piece = slice(start, start + 500)
+    for start in range(0, builds, PIECE):
+        say(start, builds)
+        piece = slice(start, start + PIECE)
         moved = np.tensordot(masses[piece], unit, axes=1)
         zeta = rotating[piece, None] * crank
         peaks[piece] = np.hypot(moved[..., 0] + zeta.imag, moved[..., 1] + zeta.real).max(axis=1)
+    say(builds, builds)
     return peaks
 
 
-def tolerance_study(problem: Problem, tolerances: Tolerances, builds: int = 10_000, seed: int = 1964) -> xr.Dataset:
-    """Nominal free force, the worst that tolerances add, and what they add at random."""
-    names, speeds = [p.name for p in problem.points], [p.speed for p in problem.points]
-    engine = problem.engine
-    steps = ANGLES * engine.cycle.turns
-    loads = [_sampled(shaking_loads(engine, p, problem.fidelity).sample(steps)) for p in problem.points]
-    nominal = [float(np.hypot(force[:, 0], force[:, 1]).max()) for force in loads]
-    worst = [worst_force(engine, speed, tolerances) for speed in speeds]
-    drawn = np.array([random_forces(engine, speed, tolerances, builds, seed) for speed in speeds])
-    newton = {"units": "N"}
+def nominal_force(problem: Problem) -> float:
+    """Largest free force over the cycle [N] of the engine as drawn, at its operating point."""
+    point = problem.points[0]
+    steps = ANGLES * problem.engine.cycle.turns
+    force = _sampled(shaking_loads(problem.engine, point, problem.fidelity).sample(steps))
+    return float(np.hypot(force[:, 0], force[:, 1]).max())
+
+
+def _after(before: int, of: int, say: Callable[[int, int], None]) -> Callable[[int, int], None]:
+    return lambda done, _all: say(before + done, of)
+
+
+def tolerance_study(
+    problems: Mapping[str, Problem],
+    tolerances: Tolerances,
+    builds: int = 10_000,
+    seed: int = 1964,
+    say: Callable[[int, int], None] = lambda _done, _all: None,
+) -> xr.Dataset:
+    """Nominal free force, the worst that tolerances add, and how it is distributed over random engines.
+
+    Parameters
+    ----------
+    problems
+        Engines by name, each with one operating point.
+    say
+        Told how many engines are built, of how many.
+
+    Raises
+    ------
+    ModelError
+        If an engine has several operating points.
+    """
+    several = [name for name, problem in problems.items() if len(problem.points) != 1]
+    if several:
+        raise ModelError(f"'{several[0]}' needs one operating point where tolerances are studied; give it one")
+    nominal, parts, drawn = [], [], []
+    for k, problem in enumerate(problems.values()):
+        engine, speed = problem.engine, problem.points[0].speed
+        nominal.append(nominal_force(problem))
+        parts.append(worst_parts(engine, speed, tolerances))
+        peaks = random_forces(engine, speed, tolerances, builds, seed, _after(k * builds, len(problems) * builds, say))
+        drawn.append([peaks.mean(), *np.quantile(peaks, SHARES)])
+    table = np.array(drawn)
+
+    def newton(words: str) -> dict[str, str]:
+        return {"units": "N", "long_name": words}
+
+    worst = np.array([list(own.values()) for own in parts])
     return xr.Dataset(
         {
-            "nominal": ("point", nominal, {**newton, "long_name": "largest free force of the drawing"}),
-            "worst": ("point", worst, {**newton, "long_name": "largest free force that tolerances add"}),
-            "random": (("point", "build"), drawn, {**newton, "long_name": "free force that tolerances add at random"}),
+            "nominal": ("case", nominal, newton("largest free force of the drawing")),
+            "worst": ("case", worst.sum(axis=1), newton("largest free force that tolerances add")),
+            "worst_part": (("case", "cause"), worst, newton("the same from one cause alone")),
+            "mean": ("case", table[:, 0], newton("mean of what tolerances add at random")),
+            "random": (("case", "share"), table[:, 1:], newton("largest free force of this share of random engines")),
         },
-        coords={"point": names, "speed": ("point", speeds, {"units": "rad/s"})},
-        attrs={"title": "Tolerances against free forces", "kind": "tolerance", "seed": seed},
+        coords={
+            "case": list(problems),
+            "cause": list(parts[0]),
+            "share": ("share", SHARES, {"units": "1", "long_name": "share of random engines that stay below"}),
+            "speed": ("case", [p.points[0].speed for p in problems.values()], {"units": "rad/s"}),
+        },
+        attrs={"title": "Tolerances against free forces", "kind": "tolerance", "seed": seed, "builds": builds},
     )

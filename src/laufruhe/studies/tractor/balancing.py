@@ -11,11 +11,10 @@ from laufruhe.physics.shaking_loads import reciprocating_loads, rotating_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
 from laufruhe.studies.tractor.designs import Design, bars, fall, free_shaft, free_webs, given, opened, optimum
-from laufruhe.studies.tractor.verdict import UNSTATED, Verdict
+from laufruhe.studies.tractor.verdict import NEGLIGIBLE, NOTICEABLE, UNSTATED, Verdict
 
 WEBS, SHAFT = "webs for half the couple", "with the shaft of the study"
 BEST_WEBS, BEST = "webs at the optimum", "shaft and webs at the optimum"
-NEGLIGIBLE, NOTICEABLE = 0.07, 0.15
 STARS = {"Fig. 26": study.STAR_OF_FIG_26, "Fig. 27": study.STAR_OF_FIG_27}
 
 

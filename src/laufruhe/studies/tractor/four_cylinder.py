@@ -9,7 +9,7 @@ from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
 from laufruhe.studies.tractor.designs import bars, fall, given, mean_of, open_rotor, optimum
 from laufruhe.studies.tractor.statements import Unprinted, moment_sweep
-from laufruhe.studies.tractor.verdict import UNSTATED, Verdict
+from laufruhe.studies.tractor.verdict import PRINTED_FALL, UNSTATED, Verdict
 
 BARE, FORCE, BOTH = "no shafts", "force pair (eq. 26)", "and moment pair, Φ = 50 % (eq. 28)"
 BEST_FORCE, BEST_BOTH = "force pair at the optimum", "both pairs at the optimum"
@@ -59,7 +59,7 @@ def pairs_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             "-70 %",
             -100.0 * force,
             "%",
-            abs(force - 0.70) <= 0.05,
+            abs(force - 0.70) <= PRINTED_FALL,
             "five points allowed: a rod ratio of 0.22 instead of 0.26 takes off four, gas at full load five",
         ),
         Verdict(
@@ -67,7 +67,7 @@ def pairs_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             "-53 %",
             -100.0 * both,
             "%",
-            abs(both - 0.53) <= 0.05,
+            abs(both - 0.53) <= PRINTED_FALL,
             f"without load it is {-100.0 * idle_fall:.0f} %: at 5.5 kp/cm² the gas torque of order 2 eats four "
             "fifths of the inertia's, and its orders 4, 6, ... stay whatever the pair does",
         ),

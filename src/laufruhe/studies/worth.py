@@ -1,0 +1,184 @@
+"""Which shafts are worth building: the rules, argued once, and what a source says held against them.
+
+The economics are the study's own (Hasselgruber 1964, Massenausgleich): shafts are justified
+by comparison with the engine of one more cylinder, and by what they change at the mounts.
+
+W1  What cannot be told apart. Two forces closer than `NEGLIGIBLE` look alike in the bars by
+    which the study judges.
+W2  What is noticed. A fall of twice that, `NOTICEABLE`, stands out in the same bars.
+W3  A set of shafts is worth building if it takes off a noticeable share of the least force
+    that any smaller number of shafts leaves, and if the engine then runs smoother than the
+    plain engine with one more cylinder at equal power, by more than W1. Otherwise the
+    smaller number of shafts, or the cylinder, is the better purchase.
+
+All forces are proven optima of sizes and angles, so no other sizes of the same shafts change a
+verdict, but where a share is closer to its threshold than the gap of the proof.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from laufruhe.errors import ModelError
+from laufruhe.studies.economics import Standing
+from laufruhe.studies.tractor.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
+
+JUDGEMENTS = ("negligible", "noticeable", "better", "worth building", "not worth building")
+
+
+@dataclass(frozen=True)
+class Worth:
+    """What one set of shafts does, and whether it is worth building (W3).
+
+    Attributes
+    ----------
+    build
+        Name.
+    fall
+        Share of the plain engine's force that it takes off.
+    further_fall
+        Share that it takes off the least force of any smaller number of shafts.
+    beside_next
+        Its force over that of the plain engine with one more cylinder at equal power; the
+        first where several are given.
+    worth
+        By W3.
+    why
+        The rule that decides, in words.
+    """
+
+    build: str
+    fall: float
+    further_fall: float
+    beside_next: float
+    worth: bool
+    why: str
+
+
+def worths(data: xr.Dataset) -> tuple[Worth, ...]:
+    """Every set of shafts of an economics dataset, judged by W3."""
+    return tuple(_worth(data, str(name)) for name in _named(data, Standing.SHAFTS) if _shafts(data, str(name)))
+
+
+def _worth(data: xr.Dataset, build: str) -> Worth:
+    own, plain = _optimum(data, build), _optimum(data, _named(data, Standing.PLAIN)[0])
+    fewer = min(_optimum(data, rival) for rival in _fewer(data, build))
+    following = _named(data, Standing.NEXT)[0]
+    further, beside = 1.0 - own / fewer, own / _optimum(data, following)
+    if further < NOTICEABLE:
+        size = "negligible" if further < NEGLIGIBLE else "slight"
+        why = f"{size}: {_percent(-further)} beside the best with fewer shafts"
+    elif beside > 1.0 + NEGLIGIBLE:
+        why = f"{following} without shafts run smoother: {_percent(1.0 / beside - 1.0)}"
+    elif beside >= 1.0 - NEGLIGIBLE:
+        why = f"{following} without shafts run as smoothly: {_percent(1.0 / beside - 1.0)}"
+    else:
+        why = f"{_percent(-further)}, and {_percent(beside - 1.0)} beside {following} without shafts"
+    worth = further >= NOTICEABLE and beside < 1.0 - NEGLIGIBLE
+    return Worth(build, 1.0 - own / plain, further, beside, worth, why)
+
+
+def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
+    """What the source says of each build, confirmed or not, by the name of the build."""
+    found: dict[str, tuple[Verdict, ...]] = {}
+    for name in data["build"].values:
+        row = data.sel(build=name)
+        says, falls = str(row["claim"].item()), float(row["claimed_fall"])
+        own: tuple[Verdict, ...] = (_judged(data, str(name), says),) if says else ()
+        own += () if np.isnan(falls) else (_fallen(data, str(name), falls),)
+        if own:
+            found[str(name)] = own
+    return found
+
+
+def _judged(data: xr.Dataset, build: str, says: str) -> Verdict:
+    against = str(data["claimed_against"].sel(build=build).item())
+    rule = _RULES[says]
+    agrees, ours, why = rule(data, build, against)
+    return Verdict(_statement(data, build, against), says, ours, "% of the force", agrees, why)
+
+
+def _fallen(data: xr.Dataset, build: str, falls: float) -> Verdict:
+    against = str(data["claimed_against"].sel(build=build).item())
+    ours = _fall(data, build, against)
+    points = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted rod ratio and gas trace move it by"
+    return Verdict(
+        _statement(data, build, against), f"{-100.0 * falls:.0f} %", -100.0 * ours, "% of the force",
+        abs(ours - falls) <= PRINTED_FALL, points,
+    )  # fmt: skip
+
+
+def _statement(data: xr.Dataset, build: str, against: str) -> str:
+    where = str(data["claimed_where"].sel(build=build).item())
+    return f"{build}: beside {against}" + (f" ({where})" if where else "")
+
+
+Rule = Callable[[xr.Dataset, str, str], tuple[bool, float, str]]
+
+
+def _negligible(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
+    most = 1.0 - _bound(data, build) / _optimum(data, against)
+    ours = -100.0 * _fall(data, build, against)
+    return most < NEGLIGIBLE, ours, f"W1: under {_percent(NEGLIGIBLE)}; proven, none of these shafts does more"
+
+
+def _noticeable(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
+    fall = _fall(data, build, against)
+    return fall >= NOTICEABLE, -100.0 * fall, f"W2: {_percent(NOTICEABLE)} or more"
+
+
+def _better(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
+    better = _optimum(data, build) < _bound(data, against)
+    return better, -100.0 * _fall(data, build, against), "its force lies under the other's lower bound"
+
+
+def _worth_building(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
+    found = _worth(data, build)
+    return found.worth, -100.0 * _fall(data, build, against), f"W3: {found.why}"
+
+
+def _not_worth_building(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
+    worth, ours, why = _worth_building(data, build, against)
+    return not worth, ours, why
+
+
+_RULES: dict[str, Rule] = dict(
+    zip(JUDGEMENTS, (_negligible, _noticeable, _better, _worth_building, _not_worth_building), strict=True)
+)
+
+
+def _fewer(data: xr.Dataset, build: str) -> list[str]:
+    """Builds of the same engine with fewer shafts."""
+    same = data["standing"].values != Standing.NEXT
+    return [str(b) for b in data["build"].values[same & (data["shafts"].values < _shafts(data, build))]]
+
+
+def _named(data: xr.Dataset, standing: Standing) -> list[str]:
+    found = [str(b) for b in data["build"].values[data["standing"].values == standing]]
+    if not found:
+        raise ModelError(f"a comparison of shafts needs an engine that is {standing}; name one")
+    return found
+
+
+def _shafts(data: xr.Dataset, build: str) -> int:
+    return int(data["shafts"].sel(build=build))
+
+
+def _optimum(data: xr.Dataset, build: str) -> float:
+    return float(data["optimum"].sel(build=build))
+
+
+def _bound(data: xr.Dataset, build: str) -> float:
+    return float(data["optimum_bound"].sel(build=build))
+
+
+def _fall(data: xr.Dataset, build: str, against: str) -> float:
+    return 1.0 - _optimum(data, build) / _optimum(data, against)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:+.1f} %" if share < 0 else f"{100.0 * share:.1f} %"
