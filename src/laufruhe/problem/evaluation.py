@@ -119,12 +119,12 @@ def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None
         If the engine drives a direction that no mount carries.
     """
     engine = problem.engine if engine is None else engine
-    mounting = mounting_of(engine)
+    mounting = mounting_of(engine, problem.fidelity)
     loads = []
     for point in problem.points:
         wrench = shaking_loads(engine, point, problem.fidelity)
         forces = mounting.forces(wrench, point.speed) if mounting else None
-        loads.append(PointLoads(point, wrench, forces, travel_of(mounting, wrench, point.speed)))
+        loads.append(PointLoads(point, wrench, forces, travel_of(engine, mounting, wrench, point.speed)))
     return Evaluation(engine, problem.fidelity, tuple(loads), samples or problem.fidelity.samples)
 
 

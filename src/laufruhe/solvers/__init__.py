@@ -26,6 +26,8 @@ def solve(problem: Problem) -> Result:
     """
     if problem.phasing is not None and problem.mount_design.asked:
         raise ModelError("throws or firing order are open together with mounts; fix one of the two and solve again")
+    if problem.mount_design.decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
+        raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
     if problem.mount_design.asked:
         from laufruhe.solvers.mounts import solve_mounts
 

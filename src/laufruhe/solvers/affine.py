@@ -9,12 +9,13 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.mounting import Mounting, mounting_of, travel_of
+from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_rotor_loads
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
@@ -106,7 +107,9 @@ class AffineModel:
         self._keep_all = keep_all
         self.domains = domains_of(problem.decisions)
         bare = evaluate(problem, problem.design([0.0] * len(problem.decisions)))
-        mounting = mounting_of(problem.engine)
+        if problem.fidelity.mounts == "time" and problem.engine.block is not None:
+            raise ModelError(NO_MAP)
+        mounting = mounting_of(problem.engine, problem.fidelity)
         changes = [_change(problem, k, direction) for k, d in enumerate(self.domains) for direction in d.directions]
         self._bare, self._changes = bare, changes
         orders = [Fraction(abs(r.shaft.ratio)).limit_denominator(1000) for rotors in changes for r in rotors]
@@ -198,7 +201,7 @@ def _slope(
     wrench = added_rotor_loads(rotors, engine, point, fidelity)
     if subject is Subject.MOUNT_FORCE and mounting is not None:
         return mounting.forces(wrench, point.speed)
-    travel = travel_of(mounting, wrench, point.speed) if subject is Subject.MOUNT_TRAVEL else None
+    travel = travel_of(engine, mounting, wrench, point.speed) if subject is Subject.MOUNT_TRAVEL else None
     return wrench if travel is None else travel
 
 
