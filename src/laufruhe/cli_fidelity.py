@@ -71,12 +71,11 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     for problem, path in zip(problems, paths, strict=True):
         one = trade(problem, lambda text, name=problem.name: say(f"{name}: {text}"))  # type: ignore[misc]
         found.append(one)
-        names = (f"{problem.name}.md", f"{problem.name}.png", f"{problem.name}.json")
+        names = (f"{problem.name}.md", f"{problem.name}.png")
         with files.staged(folder, "--out", names) as stage:
             save(figure(one), stage / names[1])
             command = shlex.join(["laufruhe", "trade", str(path)])
             files.write(stage / names[0], report.as_page(one, names[1], command))
-            files.write(stage / names[2], report.as_json(one))
         data.append(report.as_json(one).strip())
     index = report.index(found)
     if len(found) > 1:

@@ -156,7 +156,7 @@ def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
     forward = shaft.ratio > 0.0
     vertical = rotor.unbalance if forward else rotor.unbalance.conjugate()
     lateral = vertical * (-1j if forward else 1j)
-    return np.asarray((shaft.ratio * speed) ** 2 * _wrench_of(lateral, vertical, rotor.x, shaft))
+    return np.asarray((shaft.ratio * speed) ** 2 * plane_wrench(lateral, vertical, rotor.x, shaft))
 
 
 def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -192,7 +192,7 @@ def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> 
 _ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 
 
-def _wrench_of(lateral: complex, vertical: complex, x: float, shaft: Shaft) -> NDArray[np.complex128]:
+def plane_wrench(lateral: complex, vertical: complex, x: float, shaft: Shaft) -> NDArray[np.complex128]:
     """Wrench of a force in the plane at x through a shaft's axis (C2)."""
     roll = shaft.y * vertical - shaft.z * lateral
     return np.array([0.0, lateral, vertical, roll, -x * vertical, x * lateral])
@@ -201,7 +201,7 @@ def _wrench_of(lateral: complex, vertical: complex, x: float, shaft: Shaft) -> N
 def _axial(part: SliderCrank) -> NDArray[np.float64]:
     """Wrench of a unit force along the cylinder axis through the crank axis."""
     axis = cis(as_turn(part.bank))
-    return _wrench_of(axis.imag, axis.real, part.x, part.shaft).real
+    return plane_wrench(axis.imag, axis.real, part.x, part.shaft).real
 
 
 def _square(part: SliderCrank, speed: float) -> float:

@@ -97,8 +97,8 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
 def automatic(problem: Problem, tolerance: float, engine: Engine | None = None) -> Problem:
     """The problem at the fidelity chosen for it."""
     if not problem.objective:
-        return replace(problem, fidelity=replace(problem.fidelity, tolerance=tolerance))
-    return replace(problem, fidelity=choose(problem, tolerance, engine).fidelity)
+        return problem.at(replace(problem.fidelity, tolerance=tolerance))
+    return problem.at(choose(problem, tolerance, engine).fidelity)
 
 
 def _first(fidelity: Fidelity, name: str, ladder: Sequence[int | None], enough: Callable[[Fidelity], bool]) -> Fidelity:
@@ -134,19 +134,14 @@ def _fewest_modes(scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
         return rigid
     excited = scale.excited_modes
     open_modes = {mode + 1 for mode in scale.decided_modes}
-    alone = {m: scale.loses(_modes(fidelity, excited, m)) for m in excited if m not in open_modes}
     chosen, kept = fidelity, excited
-    for mode in sorted(alone, key=alone.__getitem__):
+    for mode in sorted(set(excited) - open_modes, key=lambda mode: scale.strengths[mode]):
         fewer = tuple(m for m in kept if m != mode)
         candidate = replace(fidelity, modes=fewer)
         if scale.loses(candidate) > allowed:
             break
         chosen, kept = candidate, fewer
     return chosen
-
-
-def _modes(fidelity: Fidelity, modes: Sequence[int], without: int) -> Fidelity:
-    return replace(fidelity, modes=tuple(mode for mode in modes if mode != without))
 
 
 def _is_carried(scale: Scale, rigid: Fidelity) -> bool:

@@ -94,6 +94,13 @@ class Scale:
         wrenches = np.array([rotor_wrench(rotor, 1.0) for rotor in rotors])
         return self.mounting.excited(Spectrum(self.problem.engine.cycle.base_order, wrenches))
 
+    @cached_property
+    def strengths(self) -> dict[int, float]:
+        """What every excited mode adds at most to the objective, relative (F6)."""
+        excited, whole = self.excited_modes, self.best.fidelity
+        others = {mode: tuple(m for m in excited if m != mode) for mode in excited}
+        return {mode: self.loses(replace(whole, modes=rest)) for mode, rest in others.items()}
+
     def misses(self, fidelity: Fidelity) -> float:
         """What its samples miss at most, relative (F7, F8)."""
         ours = self.evaluation(fidelity)

@@ -5,13 +5,20 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from laufruhe.report.markdown import escaped
 from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade
+from laufruhe.studies.trade_optima import is_local
 
 DASH = "-"
 ALIKE = 1.3
+LOCAL = (
+    " Mounts are decided here: every fidelity searches from the design as given alone, and finds an optimum nearby. "
+    "Choices about modes and time would change with the mounts, so they decide nothing. "
+    "A small regret may be below zero."
+)
 HEAD = (
     "| fidelity | error | said to be at most | another design | gradient | solve | from nothing | memory | regret |\n"
     "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
@@ -21,24 +28,51 @@ HEAD = (
 def as_page(found: Trade, picture: str, command: str) -> str:
     """Table, picture and the choice for one problem."""
     problem = found.problem
-    inertia, change = found.flywheel
     optimum = "" if math.isnan(found.optimum) else f", of its optimum {found.optimum:.6g}"
     sections = [
         f"# Speed against accuracy: {escaped(problem.title)}",
         f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
-        f"(SI). Its order coefficients agree with 50-digit arithmetic to {max(found.rigid_part_error, 1e-17):.0e}.",
+        f"(SI). {_digits(found)}",
         f"**Take** {advice(found)}",
         f"![Time against error of every fidelity; colour is regret]({picture})",
         "\n".join([HEAD, *(_line(row) for row in found.rows)]),
         "*Another design*: objective with the scene prepared. *Gradient*: with its derivatives by all decisions. "
         "*Solve*: optimum from nothing, at this fidelity's own angles. *From nothing*: engine to objective. "
-        "*Regret*: by how much the reference objective of the optimum found is above that of the best.",
-        f"Constant crank speed: with a flywheel of {inertia:.3g} kg m2 for all that turns, at which the speed "
-        f"varies by some 2 %, the objective changes by {100.0 * change:+.2f} %. "
-        "No fidelity at constant speed sees that.",
+        "*Regret*: by how much the reference objective of the optimum found is above that of the best."
+        + (LOCAL if is_local(problem) else ""),
+        *_beyond(found),
         f"```sh\n{command}\n```",
     ]
     return "\n\n".join(sections) + "\n"
+
+
+def _digits(found: Trade) -> str:
+    """What double precision costs, and of which measures that was found."""
+    part = found.rigid_part
+    return (
+        "Double precision against 50 digits, from the kinematics of every cylinder to the "
+        f"{' and '.join(part.covered)}: relative error {max(part.error, 1e-17):.0e}."
+    )
+
+
+def _beyond(found: Trade) -> list[str]:
+    """What no fidelity at constant speed, or none in the frequency domain, sees."""
+    lines = []
+    if found.flywheel is not None:
+        inertia, change = found.flywheel
+        lines.append(
+            f"Constant crank speed: with a flywheel of {inertia:.3g} kg m2 for all that turns, at which the speed "
+            f"varies by some 2 %, the objective changes by {100.0 * change:+.2f} %. "
+            "No fidelity at constant speed sees that."
+        )
+    if found.time_domain is not None:
+        own = found.time_domain
+        lines.append(
+            f"Time domain ({own.point}): mount forces integrated in time agree with the same equations in the "
+            f"frequency domain to {own.integration:.0e} of their peak. Hysteretic loss has no law in time; the viscous "
+            f"damping in its place changes them by up to {100.0 * own.loss:.2g} % of the peak."
+        )
+    return lines
 
 
 def advice(found: Trade) -> str:
@@ -64,8 +98,11 @@ def as_json(found: Trade) -> str:
     content = {
         "problem": found.problem.name,
         "reference": {"objective": found.value, "optimum": _finite(found.optimum)},
-        "rigid_part_error": found.rigid_part_error,
-        "uneven_speed": {"crank_inertia": found.flywheel[0], "change": found.flywheel[1]},
+        "rigid_part": asdict(found.rigid_part),
+        "uneven_speed": None
+        if found.flywheel is None
+        else dict(zip(("crank_inertia", "change"), found.flywheel, strict=True)),
+        "time_domain": None if found.time_domain is None else asdict(found.time_domain),
         "rows": [_entry(row) for row in found.rows],
     }
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
@@ -97,9 +134,12 @@ def index(trades: Sequence[Trade]) -> str:
         name = found.problem.name
         lines.append(
             f"| [{name}]({name}.md) | {advice(found)} | {_error(two)} | {_error(gas)} | {_error(auto)} "
-            f"| {_regret(two)} | {_regret(auto)} | {100.0 * found.flywheel[1]:+.2f} % |"
+            f"| {_regret(two)} | {_regret(auto)} | {_uneven(found)} |"
         )
-    lines += ["", "A dash under regret: only the crank star is open, no unbalance."]
+    lines += [
+        "",
+        "A dash: the problem has no such part, leaves nothing open, or asks of mounts alone what no load enters.",
+    ]
     lines += ["", "*Uneven speed*: what a flywheel that leaves 2 % of unevenness changes of the objective."]
     return "\n".join(lines) + "\n"
 
@@ -111,10 +151,20 @@ def _line(row: Row) -> str:
     )
 
 
+def _uneven(found: Trade) -> str:
+    return DASH if found.flywheel is None else f"{100.0 * found.flywheel[1]:+.2f} %"
+
+
 def _time(seconds: float) -> str:
     if math.isnan(seconds):
         return DASH
-    return f"{1e6 * seconds:.0f} us" if seconds < 1e-3 else f"{1e3 * seconds:.3g} ms"
+    return (
+        f"{1e6 * seconds:.0f} us"
+        if seconds < 1e-3
+        else f"{1e3 * seconds:.3g} ms"
+        if seconds < 1.0
+        else f"{seconds:.3g} s"
+    )
 
 
 def _error(row: Row | None) -> str:
