@@ -52,10 +52,22 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
         from laufruhe.physics.uneven_speed import uneven_loads
 
         return uneven_loads(engine, point, fidelity)
-    total = reciprocating_loads(engine, point.speed, fidelity) + rod_inertia_loads(engine, point.speed, fidelity)
-    if point.gas is not None and fidelity.gas:
-        total = total + gas_loads(engine, point.gas, fidelity)
-    return _kept(total, fidelity) + rotating_loads(engine, point.speed)
+    moving = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, point.gas, fidelity)
+    return moving + rotating_loads(engine, point.speed)
+
+
+@lru_cache(maxsize=64)
+def _slider_crank_loads(
+    cycle: Cycle, parts: tuple[SliderCrank, ...], speed: float, gas: GasModel | None, fidelity: Fidelity
+) -> Spectrum:
+    """Pistons, rods and gas: the same for every design that differs in its rotors alone."""
+    engine = Engine("pistons, rods and gas", cycle, parts)
+    total = reciprocating_loads(engine, speed, fidelity) + rod_inertia_loads(engine, speed, fidelity)
+    if gas is not None and fidelity.gas:
+        total = total + gas_loads(engine, gas, fidelity)
+    kept = _kept(total, fidelity)
+    kept.coefficients.setflags(write=False)
+    return kept
 
 
 def _kept(loads: Spectrum, fidelity: Fidelity) -> Spectrum:

@@ -24,6 +24,7 @@ from laufruhe.solvers.domain import Domain
 Array = NDArray[np.float64]
 
 # flat optima need a small gap before their decisions are digits one can build
+NEEDED = 1e3
 _TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
 
 
@@ -81,11 +82,13 @@ class ConicProgram:
     def __init__(self, problem: AffineProblem, reusable: bool = False) -> None:
         self._problem = problem
         self._reusable = reusable
-        # decisions in units of their bounds, rows in units of what they can reach
+        # decisions in units of what they may need, rows in units of what these can reach
         self._y = cp.Variable(problem.size)
-        self._unit = _reach(problem, [norm for _, norm in problem.terms])
+        self._sizes = _sizes(problem)
+        self._scales = np.repeat(self._sizes, [domain.width for domain in problem.domains])
+        self._unit = self._reach([norm for _, norm in problem.terms])
         self._terms = [self._cone(norm, self._unit) for _, norm in problem.terms]
-        self._limits = [self._cone(norm, _reach(problem, [norm])) for _, norm in problem.limits]
+        self._limits = [self._cone(norm, self._reach([norm])) for _, norm in problem.limits]
         self._maxima = [
             self._number(np.array(maximum / cone.unit))
             for (maximum, _), cone in zip(problem.limits, self._limits, strict=True)
@@ -96,14 +99,18 @@ class ConicProgram:
             _value(norm, cone) <= most
             for (_, norm), cone, most in zip(problem.limits, self._limits, self._maxima, strict=True)
         ]
-        constraints += [c for domain in problem.domains for c in _membership(domain, self._y[domain.columns])]
+        constraints += [
+            c
+            for domain, size in zip(problem.domains, self._sizes, strict=True)
+            for c in _membership(domain, self._y[domain.columns], size)
+        ]
         self._program = cp.Problem(cp.Minimize(sum(least)), constraints)
 
     def _cone(self, norm: AffineNorm, unit: float) -> _Cone:
         """V0 + B x in a second-order cone a row, or in one cone for a root mean square."""
         k, d = norm.constant.shape
         constant = self._number(norm.constant / unit)
-        slope = (norm.slope * (self._problem.scales / unit)).reshape(k * d, -1)
+        slope = (norm.slope * (self._scales / unit)).reshape(k * d, -1)
         rows = cp.reshape(slope @ self._y, (k, d), order="C") + constant
         if norm.norm is Norm.RMS:
             factors = np.sqrt(norm.weights)
@@ -113,6 +120,12 @@ class ConicProgram:
         heads = cp.Variable(k) if norm.norm is Norm.SUM else cp.Variable()
         tops = heads if norm.norm is Norm.SUM else heads * np.ones(k)
         return _Cone(constant, heads, cp.SOC(tops, rows, axis=1), unit, (k, d), np.ones(k))
+
+    def _reach(self, norms: Sequence[AffineNorm]) -> float:
+        """A size of these norms that is not zero: at no decisions, or at large ones."""
+        sizes = [norm.value(np.zeros(self._problem.size)) for norm in norms]
+        sizes += [float(np.abs(norm.slope * self._scales).max(initial=0.0)) for norm in norms]
+        return max(sizes, default=0.0) or 1.0
 
     def _number(self, value: Array) -> Any:
         return cp.Parameter(value.shape, value=value) if self._reusable else cp.Constant(value)
@@ -152,7 +165,7 @@ class ConicProgram:
             return ConicSolution(None, Multipliers((), ()), seconds, iterations)
         if self._y.value is None:
             raise SolverError(f"the cone solver stopped with status '{status}'")
-        x = np.asarray(self._y.value) * problem.scales
+        x = np.asarray(self._y.value) * self._scales
         for domain in problem.domains:
             x[domain.columns] = domain.project(x)
         terms = tuple(
@@ -166,18 +179,31 @@ def _value(norm: AffineNorm, cone: _Cone) -> Any:
     return norm.weights @ cone.heads if norm.norm is Norm.SUM else cone.heads
 
 
-def _reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
-    """A size of these norms that is not zero: at no decisions, or at their largest."""
-    sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
-    sizes += [float(np.abs(norm.slope * problem.scales).max(initial=0.0)) for norm in norms]
-    return max(sizes, default=0.0) or 1.0
+def _sizes(problem: AffineProblem) -> list[float]:
+    """A size for every decision: its bound, or a thousand times what all loads need where that is less.
+
+    Bounds that are far apart would else leave nothing of the small ones.
+    """
+    norms = [norm for _, norm in (*problem.terms, *problem.limits)]
+    found = []
+    for domain in problem.domains:
+        needs = [
+            _length(norm.constant) / alone for norm in norms if (alone := _length(norm.slope[:, :, domain.columns]))
+        ]
+        needed = NEEDED * max(needs, default=0.0)
+        found.append(min(domain.scale, needed) if needed > 0.0 else domain.scale)
+    return found
 
 
-def _membership(domain: Domain, y: Any) -> list[Any]:
-    """The decision's own set, in units of its largest size (P4)."""
+def _length(values: Array) -> float:
+    return float(np.linalg.norm(values))
+
+
+def _membership(domain: Domain, y: Any, unit: float) -> list[Any]:
+    """The decision's own set, in units of a size (P4)."""
     if domain.width == 1:
-        return [y >= domain.decision.lower / domain.scale, y <= domain.decision.upper / domain.scale]
-    inside: list[Any] = [cp.SOC(cp.Constant(domain.decision.upper / domain.scale), y)]
+        return [y >= domain.decision.lower / unit, y <= domain.decision.upper / unit]
+    inside: list[Any] = [cp.SOC(cp.Constant(domain.decision.upper / unit), y)]
     if len(domain.edges):
         (ax, ay), (bx, by) = domain.edges
         inside += [ax * y[1] - ay * y[0] >= 0.0, bx * y[1] - by * y[0] <= 0.0]
@@ -198,25 +224,37 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
     weights
         Of every decision's size.
     """
+    total = sum(w * float(np.hypot.reduce(x[d.columns])) for w, d in zip(weights, problem.domains, strict=True))
+    # nothing lighter is larger than all of this together, whatever the bounds
+    units = [
+        min(d.scale, total / w) if w * total > 0.0 else d.scale for w, d in zip(weights, problem.domains, strict=True)
+    ]
+    scales = np.repeat(units, [d.width for d in problem.domains])
     z = cp.Variable(still.shape[1])
-    scales = problem.scales
-    y = x / scales + (still / scales[:, None]) @ z
-    sizes = [w * d.scale * cp.norm(y[d.columns]) for w, d in zip(weights, problem.domains, strict=True)]
-    held = [c for d in problem.domains for c in _membership(d, y[d.columns])]
+    step = still * (np.abs(x).max() or 1.0)
+    y = x / scales + (step / scales[:, None]) @ z
+    sizes = [
+        w * unit / max(units) * cp.norm(y[d.columns])
+        for w, unit, d in zip(weights, units, problem.domains, strict=True)
+    ]
+    held = [c for d, unit in zip(problem.domains, units, strict=True) for c in _membership(d, y[d.columns], unit)]
     for maximum, norm in problem.limits:
-        moves = np.einsum("kdn,nm->kdm", norm.slope, still)
+        moves = np.einsum("kdn,nm->kdm", norm.slope, step)
         if np.any(moves != 0.0) and norm.norm is Norm.SUM:
             k, d = norm.constant.shape
             rows = norm.rows(x) + cp.reshape(moves.reshape(k * d, -1) @ z, (k, d), order="C")
             held.append(norm.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
     program = cp.Problem(cp.Minimize(cp.sum(cp.hstack(sizes))), held)
-    try:
-        program.solve(solver=cp.CLARABEL)
-    except cp.error.SolverError:
-        return x
+    with warnings.catch_warnings():
+        # the loads stay what they are however accurate this is
+        warnings.simplefilter("ignore")
+        try:
+            program.solve(solver=cp.CLARABEL)
+        except cp.error.SolverError:
+            return x
     if z.value is None:
         return x
-    lighter = x + still @ np.asarray(z.value)
+    lighter = x + step @ np.asarray(z.value)
     for domain in problem.domains:
         lighter[domain.columns] = domain.project(lighter)
     return np.asarray(lighter)
