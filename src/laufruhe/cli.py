@@ -42,6 +42,10 @@ JsonOption = Annotated[
     Optional[str],  # noqa: UP045  (typer reads it at run time)
     typer.Option("--json", metavar="FILE", help="Write result.json to FILE too; - prints it, and the table to stderr."),
 ]
+StudyJsonOption = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--json", metavar="FILE", help="Write all parts as JSON to FILE too; - prints them."),
+]
 OutOption = Annotated[
     Optional[Path],  # noqa: UP045
     typer.Option("--out", metavar="DIR", help="Folder of the results.  [default: results/<problem name>]"),
@@ -105,36 +109,22 @@ def evaluate(
 @app.command()
 def study(
     problem: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)],
+    json: StudyJsonOption = None,
     out: OutOption = None,
+    jobs: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--jobs", metavar="N", help="Processes that may be used.  [default: one a core]"),
+    ] = None,
 ) -> None:
     """Run the sweeps and comparisons of a study file.
 
     Finished points are kept; a study that was interrupted goes on where it stopped.
     """
-    with _exit_statuses(problem):
-        import shutil
+    with _exit_statuses(problem, "interrupted; finished points are kept, the same command goes on"), _progress() as say:
+        from laufruhe.cli_study import studied
 
-        from laufruhe.plots.study import draw_study
-        from laufruhe.problem.study_reader import load_study
-        from laufruhe.report import files
-        from laufruhe.report.study_report import file_names, write_study
-        from laufruhe.studies import run
-        from laufruhe.studies.runner import UNFINISHED
-
-        given = load_study(problem)
-        folder = out if out is not None else Path("results") / problem.stem
-        kept = folder / UNFINISHED
-        with _progress() as say:
-            try:
-                datasets = run(given, problem.parent, kept, lambda k, n: say(f"{k} of {n} points"))
-            except KeyboardInterrupt:
-                _complain("laufruhe: interrupted; finished points are kept, the same command goes on")
-                raise typer.Exit(INTERRUPTED) from None
-            with files.staged(folder, "--out" if out is not None else "results", file_names(given)) as stage:
-                draw_study(datasets, stage)
-                write_study(given, datasets, stage, shlex.join(["laufruhe", "study", str(problem)]), say)
-        shutil.rmtree(kept)
-        typer.echo(f"done: {folder / files.REPORT}")
+        text, data = studied(problem, out, jobs, say)
+        _hand_out(text, data, json)
 
 
 @app.command()
@@ -368,7 +358,7 @@ def _complain(lines: str) -> None:
 
 
 @contextmanager
-def _exit_statuses(path: Path) -> Iterator[None]:
+def _exit_statuses(path: Path, interrupted: str = "interrupted, nothing was written") -> Iterator[None]:
     """What went wrong as one line a complaint, and as an exit status."""
     try:
         yield
@@ -379,7 +369,7 @@ def _exit_statuses(path: Path) -> Iterator[None]:
         _complain(f"{path}: {error}")
         raise typer.Exit(BAD_INPUT) from None
     except KeyboardInterrupt:
-        _complain("laufruhe: interrupted, nothing was written")
+        _complain(f"laufruhe: {interrupted}")
         raise typer.Exit(INTERRUPTED) from None
     except BrokenPipeError:
         # whoever read the output has gone; click ends quietly

@@ -36,6 +36,10 @@ class InputError(LaufruheError, ValueError):
         self.complaints = complaints
         super().__init__("\n".join(f"{source}: {complaint}" for complaint in complaints))
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, tuple[Complaint, ...]]]:
+        # raised in a worker process, it has to reach the one that speaks to the user
+        return InputError, (self.source, self.complaints)
+
 
 class UncarriedLoadError(ModelError):
     """The engine excites a direction that no mount carries."""

@@ -121,6 +121,12 @@ def parse(text: str, unit: str) -> float:
     return value
 
 
+def unit_of(text: str) -> str:
+    """The unit that a number is written in; empty where there is none."""
+    match = _QUANTITY.match(text)
+    return (match.group(3) or "").strip() if match else ""
+
+
 _SHOWN = {"rad": ("deg", math.degrees(1.0)), "rad/s": ("rpm", 30.0 / math.pi), "m": ("mm", 1e3)}
 
 

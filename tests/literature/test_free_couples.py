@@ -269,7 +269,7 @@ def test_couples_of_odd_engines_follow_from_their_firing_order(name: str, order:
 
 
 def test_what_turns_against_the_crank() -> None:
-    """Hasselgruber 1964, eq. 33: no first order at 90 degrees, half of it upright; the V8's couple turns with the crank."""
+    """Hasselgruber 1964, eq. 33: none at 90 degrees, half of it upright; the V8's couple turns with the crank."""
     assert _ready("vee-two-90", 1).force_against == pytest.approx(0.0, abs=1e-12)
     assert _ready("tractor-single", 1).force_against == pytest.approx(0.5)
     assert _ready("vee-eight-cross", 1).couple_against == pytest.approx(0.0, abs=1e-12)

@@ -92,7 +92,8 @@ def test_cross_plane_eight():
     assert best.order_count == 8
     flat = [star for star in result.phasing.ranking if len(set(degrees(star))) == 2]
     assert flat
-    assert min(star.value for star in flat) > 10.0 * best.value
+    # gas torque is the same for both; the second order comes on top of it
+    assert min(star.value for star in flat) > 3.0 * best.value
 
 
 def test_split_pins_of_a_six():

@@ -18,7 +18,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Limit, Problem
 from laufruhe.problem.quantity import Quantity, Subject
 from laufruhe.solvers import solve
-from laufruhe.studies.economics import Build, Claim, Standing, best, front, fronts, shafts_of, with_shafts
+from laufruhe.studies.economics import Build, Claim, Standing, best, compared, front, shafts_of, with_shafts
 from laufruhe.studies.equal_power import at_equal_power, check_comparable
 from laufruhe.studies.worth import JUDGEMENTS, verdicts, worths
 
@@ -64,7 +64,7 @@ def test_engines_of_unlike_cylinders_are_not_compared(other: str, what: str) -> 
 
 def test_front_falls_is_proven_and_convex() -> None:
     """Least force is a convex function of the mass allowed, and the price is its slope."""
-    points = front(load(FOUR), LIMITS)
+    points = front(load(FOUR), LIMITS).points
     for point in points:
         assert point.mass <= point.mass_limit * (1.0 + 1e-6) + 1e-9
         assert -1e-6 <= point.gap < 1e-4
@@ -83,22 +83,27 @@ def test_points_of_a_front_are_designs_of_the_exact_model() -> None:
     limit = Limit("all shafts", Quantity(Subject.BALANCER_MASS, Norm.SUM), 0.5)
     result = solve(replace(problem, limits=(*problem.limits, limit)))
     built = evaluate(problem, result.final.engine, 4 * result.final.samples)
-    assert front(problem, (0.5,))[0].force == pytest.approx(objective_value(problem, built), rel=1e-6)
+    assert front(problem, (0.5,)).points[0].force == pytest.approx(objective_value(problem, built), rel=1e-6)
 
 
 def test_no_mass_is_the_plain_engine_and_much_mass_the_free_optimum() -> None:
     problem = load(FOUR)
-    none, much = front(problem, (0.0, 50.0))
+    none, much = front(problem, (0.0, 50.0)).points
     plain = with_shafts(problem, ())
     assert none.force == pytest.approx(objective_value(plain, evaluate(plain)), rel=1e-4)
-    assert much.force == pytest.approx(best(problem).force, rel=1e-4)
+    free = solve(problem)
+    assert free.objective is not None
+    assert much.force == pytest.approx(free.objective.value, rel=1e-6)
+    # a limit over what the optimum weighs, and one that it just keeps
+    assert best(problem, 50.0).force == pytest.approx(much.force, rel=1e-4)
+    assert best(problem, 1.001 * much.mass).force == pytest.approx(much.force, rel=1e-4)
 
 
 def test_front_without_shafts_still_sizes_the_counterweights() -> None:
     problem = replace(load(PROBLEMS / "tractor-three.toml"), limits=())
     plain = with_shafts(problem, ())
     assert plain.decisions
-    first, second = front(plain, (0.0, 1.0))
+    first, second = front(plain, (0.0, 1.0)).points
     assert first.force == second.force == best(plain).force
     assert first.force < objective_value(plain, evaluate(plain))
     assert first.mass == 0.0
@@ -107,8 +112,10 @@ def test_front_without_shafts_still_sizes_the_counterweights() -> None:
 def test_limits_that_cannot_be_met_are_named() -> None:
     problem = load(FOUR)
     quiet = Limit("quiet", Quantity(Subject.MOUNT_FORCE, Norm.MAXIMUM), 1.0)
-    with pytest.raises(SolverError, match=r"no design with 0\.5 kg on the shafts"):
+    with pytest.raises(SolverError, match="has no design: "):
         front(replace(problem, limits=(quiet,)), (0.5,))
+    with pytest.raises(SolverError, match=r"no design with 0\.5 kg on the shafts"):
+        best(replace(problem, limits=(quiet,)), 0.5)
 
 
 @pytest.fixture(scope="module")
@@ -117,14 +124,14 @@ def four() -> xr.Dataset:
     part_load = replace(five, points=tuple(replace(p, gas=problem.points[0].gas) for p in five.points))
     names = shafts_of(problem)
     assert names == ("force left", "force right", "moment left", "moment right")
-    builds = [
-        Build("plain", with_shafts(problem, ()), Standing.PLAIN),
-        Build("force pair", with_shafts(problem, names[:2]), claim=Claim("worth building", 0.70)),
-        Build("moment pair", with_shafts(problem, names[2:]), claim=Claim("negligible")),
-        Build("both", problem, claim=Claim("better", 0.53, "force pair", "Fig. 22")),
-        Build("five", at_equal_power(part_load, 4), Standing.NEXT),
-    ]
-    return fronts(builds, (0.0, 0.5, 2.0))
+    engines = {
+        Build("plain", Standing.PLAIN): with_shafts(problem, ()),
+        Build("force pair", claim=Claim("worth building", 0.70)): with_shafts(problem, names[:2]),
+        Build("moment pair", claim=Claim("negligible")): with_shafts(problem, names[2:]),
+        Build("both", claim=Claim("better", 0.53, "force pair", "Fig. 22")): problem,
+        Build("five", Standing.NEXT): at_equal_power(part_load, 4),
+    }
+    return compared(list(engines), [front(engine, (0.0, 0.5, 2.0)) for engine in engines.values()])
 
 
 def test_fronts_label_builds_and_units(four: xr.Dataset) -> None:
@@ -221,7 +228,7 @@ def test_unlike_objectives_and_unknown_shafts_are_refused() -> None:
     peak = replace(problem.objective[0], quantity=Quantity(Subject.MOUNT_FORCE, Norm.MAXIMUM))
     other: Problem = replace(problem, objective=(peak,))
     with pytest.raises(ModelError, match="minimise different things"):
-        fronts([Build("a", problem), Build("b", other)], (1.0,))
+        compared([Build("a"), Build("b")], [front(problem, (1.0,)), front(other, (1.0,))])
     mass = replace(problem.objective[0], quantity=Quantity(Subject.BALANCER_MASS, Norm.SUM))
     with pytest.raises(ModelError, match="against a load"):
-        fronts([Build("a", replace(problem, objective=(mass,)))], (1.0,))
+        front(replace(problem, objective=(mass,)), (1.0,))

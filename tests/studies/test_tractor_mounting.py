@@ -94,7 +94,6 @@ class TestGasTrace:
 # statements of the study that are not confirmed here; docs/tractor-study.md says why
 NOT_CONFIRMED = {
     "fig-02-05-07": ["Mount forces of the reciprocating mass over those of the gas (Fig. 5)"],
-    "fig-12": ["Six cylinders are best, long mounting, mean force (Fig. 12)"],
     "fig-22": [
         "The moment pair at Φ = 50 % lowers what is left (Fig. 22)",
         "Best share of the moment pair at 10 m/s (Fig. 22)",

@@ -26,8 +26,22 @@ class Norm(StrEnum):
     """sqrt(sum_k w_k |v_k|^2)."""
 
 
+# squares of numbers between these neither overflow nor lose digits
+_LEAST, _MOST = 1e-140, 1e150
+
+
 def lengths(rows: Array) -> Array:
     """|v_k| of each row, shape (k, d) to (k,), safe from overflow and underflow."""
+    if not np.abs(rows).max(initial=0.0) < _MOST:
+        return _scaled_lengths(rows)
+    size = np.sqrt(np.einsum("...d,...d->...", rows, rows))
+    small = size < _LEAST
+    if small.any():
+        size[small] = _scaled_lengths(rows[small])
+    return np.asarray(size)
+
+
+def _scaled_lengths(rows: Array) -> Array:
     size = np.abs(rows).max(axis=-1, initial=0.0)
     safe = np.where(size > 0.0, size, 1.0)
     return np.asarray(size * np.sqrt(np.square(rows / safe[..., None]).sum(axis=-1)))

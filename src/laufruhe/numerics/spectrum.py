@@ -46,21 +46,19 @@ class Spectrum:
         Orders above half the number of samples are folded, not dropped: every
         value is that of the whole series at its angle.
         """
-        c = self.coefficients
-        if len(c) > (samples + 1) // 2:
-            folded = np.zeros((samples, *c.shape[1:]), dtype=complex)
-            for start in range(0, len(c), samples):
-                block = c[start : start + samples]
-                folded[: len(block)] += block
-            # of a real signal half of the folded orders say all
-            half = samples // 2 + 1
-            mirrored = folded[-np.arange(half) % samples]
-            c = folded[:half] + mirrored.conj()
-            c[0] = folded[0]
-            c[0] *= 2.0
-        else:
-            c = np.concatenate([2.0 * c[:1], c[1:]])
-        return np.asarray(np.fft.irfft(c, samples, axis=0) * (0.5 * samples))
+        if len(self.coefficients) <= (samples + 1) // 2:
+            # no order reaches half the number of samples, so none is folded
+            half = 0.5 * samples * self.coefficients
+            half[:1] *= 2.0
+            return np.asarray(np.fft.irfft(half, samples, axis=0))
+        folded = np.zeros((samples, *self.coefficients.shape[1:]), dtype=complex)
+        for start in range(0, len(self.coefficients), samples):
+            block = self.coefficients[start : start + samples]
+            folded[: len(block)] += block
+        # of a real signal half of the folded orders say all
+        first = samples // 2 + 1
+        real = 0.5 * samples * (folded[:first] + folded[-np.arange(first) % samples].conj())
+        return np.asarray(np.fft.irfft(real, samples, axis=0))
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at any crank angles [rad], shape (len(angles), ...)."""

@@ -10,8 +10,8 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from laufruhe.plots.style import FAINT, colours_of, fitted, heading, names_of, page, source_line, thin
-from laufruhe.problem.evaluation import Evaluation
-from laufruhe.report.measures import changed, hardest_point, measured
+from laufruhe.problem.evaluation import Evaluation, measured
+from laufruhe.report.measures import changed, hardest_point
 from laufruhe.report.wording import number
 from laufruhe.solvers.result import Result
 

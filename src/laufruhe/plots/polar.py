@@ -26,7 +26,8 @@ from laufruhe.plots.style import (
     source_line,
     thin,
 )
-from laufruhe.report.measures import changed, hardest_point, mount_samples
+from laufruhe.problem.evaluation import mount_samples
+from laufruhe.report.measures import changed, hardest_point
 from laufruhe.report.wording import trimmed
 from laufruhe.solvers.result import Result
 

@@ -1,58 +1,195 @@
-"""One picture for each part of a study: lines over what is swept, bars where engines are compared."""
+"""Pictures of study parts: lines over what is swept, bars where engines are compared."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import xarray as xr
+from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from laufruhe.plots.style import AFTER, BEFORE, heading, page, save
+from laufruhe.plots.style import AFTER, BEFORE, heading, page
+from laufruhe.report.study_tables import swept_names, with_unit
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8a8a8a")
-
-
-def draw_study(datasets: dict[str, xr.Dataset], folder: Path) -> None:
-    """A PNG named as its part."""
-    for name, data in datasets.items():
-        swept = [str(c) for c in data.coords if c not in ("mount", "case", "status")]
-        drawn = page(1, 1, (max(6.4, 1.3 * data.sizes["point"] if not swept else 6.4), 3.6))
-        legend = _lines(drawn.panels[0], data, swept) if swept else _bars(drawn.panels[0], data)
-        drawn.panels[0].set_ylabel("mean mount force [N]")
-        drawn.panels[0].set_ylim(bottom=0.0)
-        words = "Mean over the working cycle and all mounts."
-        heading(drawn.figure, data.attrs["title"], words, legend, f"{data.attrs['source']}. Computed with Laufruhe.")
-        save(drawn.figure, folder / f"{name}.png")
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#332288", "#999933")
+PANEL = (6.4, 3.6)
 
 
-def _bars(axes: Axes, data: xr.Dataset) -> list[Artist]:
-    places = np.arange(data.sizes["point"])
-    for shift, name, colour in ((-0.2, "objective_given", BEFORE), (0.2, "objective", AFTER)):
-        bars = axes.bar(places + shift, data[name].values, 0.36, color=colour, linewidth=0)
-        axes.bar_label(bars, fmt="%.0f", size=7.5)
-    axes.set_xticks(places, [str(c) for c in data["case"].values], size=8)
-    axes.grid(axis="x", visible=False)
-    return [Patch(color=BEFORE, label="as given"), Patch(color=AFTER, label="proven optimum")]
-
-
-def _lines(axes: Axes, data: xr.Dataset, swept: list[str]) -> list[Artist]:
-    along = data[swept[-1]].values
-    if along.dtype.kind not in "fi":
-        along = np.array([float(str(v).split()[0]) for v in along])
-    groups = data[swept[0]].values if len(swept) > 1 else data["case"].values
+def counterweight_fraction(data: xr.Dataset) -> Figure:
+    """The metric over the fraction, the proven optimum of every line marked; or the best fraction over speed."""
+    if "optimum" not in data.coords:
+        return _best_fraction(data)
+    names = swept_names(data)
+    along = next(name for name in names if name.endswith("balance_fraction"))
+    figure, (axes,) = _page(1)
     legend: list[Artist] = []
-    for group, colour in zip(dict.fromkeys(groups.tolist()), COLOURS, strict=False):
-        chosen = groups == group
-        x, y = along[chosen], data["objective"].values[chosen]
-        axes.plot(x, y, color=colour)
-        axes.plot(x[y.argmin()], y.min(), "o", color=colour)
-        legend.append(Line2D([], [], color=colour, marker="o", label=str(group)))
-    axes.set_xlabel(f"{swept[-1].split('.')[-1].replace('_', ' ')} (dot: least of the values swept)")
+    best = data["optimum"].values
+    for label, chosen, colour in _groups(data, [name for name in names if name != along]):
+        x, y = data[along].values, data["objective"].values
+        # the optimum is a point of its line too
+        line, dot = np.flatnonzero(chosen), chosen & best
+        line = line[np.argsort(x[line])]
+        axes.plot(x[line], y[line], color=colour)
+        axes.plot(x[dot], y[dot], "o", color=colour)
+        legend.append(Line2D([], [], color=colour, marker="o", label=label))
+    axes.set_xlabel("balance fraction")
+    _metric_axis(axes, data)
+    return _headed(figure, data, legend, f"Dot: {_claimed(data)}, the fraction left open.")
+
+
+def _best_fraction(data: xr.Dataset) -> Figure:
+    names = swept_names(data)
+    if not names:
+        return _bars(data, data["case"].values, "The balance fraction is decided.")
+    figure, (upper, lower) = _page(2)
+    fractions = [k for k, name in enumerate(data["decision"].values) if str(name).endswith("balance_fraction")]
+    legend = _lines(upper, data, names, "objective")
+    for _, chosen, colour in _groups(data, names[:-1]):
+        place = _places(data, names[-1])[chosen]
+        for k in fractions:
+            lower.plot(place, data["decided"].values[chosen, k], color=colour)
+    lower.set_ylabel("best balance fraction")
+    lower.set_xlabel(with_unit(data[names[-1]]))
+    return _headed(figure, data, legend, f"Every point: {_claimed(data)}.")
+
+
+def balancer_sizing(data: xr.Dataset) -> Figure:
+    """Bars of every set of shafts, the plain engine drawn once; lines where something is swept."""
+    if swept_names(data):
+        return _over_sweep(data, ["shafts"], "Every set of shafts at its own optimum.")
+    cases, sets = data["case"].values.tolist(), data["shafts"].values.tolist()
+    alone = len(set(cases)) == 1
+    labels = [_wrapped(one) if alone else f"{case}\n{_wrapped(one)}" for case, one in zip(cases, sets, strict=True)]
+    return _bars(data, np.array(labels), "Every set of shafts at its own optimum.", data["shafts"].values == "none")
+
+
+def layout_comparison(data: xr.Dataset) -> Figure:
+    """Bars of every engine as given and at its optimum; lines where something is swept."""
+    words = f"Engines of {data.attrs['at']}." if data.attrs["at"] == "equal cylinders" else f"At {data.attrs['at']}."
+    if swept_names(data):
+        return _over_sweep(data, [], words)
+    return _bars(data, data["case"].values, words)
+
+
+def _over_sweep(data: xr.Dataset, told_apart: Sequence[str], words: str) -> Figure:
+    figure, (axes,) = _page(1)
+    names = swept_names(data)
+    legend = _lines(axes, data, [*told_apart, *names], "objective")
+    axes.set_xlabel(with_unit(data[names[-1]]))
+    return _headed(figure, data, legend, words)
+
+
+def _lines(axes: Axes, data: xr.Dataset, names: Sequence[str], variable: str) -> list[Artist]:
+    """One line for every case and combination of all named but the last, over the last."""
+    legend: list[Artist] = []
+    places = _places(data, names[-1])
+    for label, chosen, colour in _groups(data, names[:-1]):
+        axes.plot(places[chosen], data[variable].values[chosen], color=colour, marker=".", markersize=4)
+        legend.append(Line2D([], [], color=colour, label=label))
+    values = data[names[-1]].values
+    if values.dtype.kind not in "fi":
+        labels = list(dict.fromkeys(values.tolist()))
+        axes.set_xticks(range(len(labels)), [str(label) for label in labels], size=8)
+    _metric_axis(axes, data)
     return legend
+
+
+def _places(data: xr.Dataset, name: str) -> Any:
+    """Numbers along an axis; labels stand side by side."""
+    values = data[name].values
+    if values.dtype.kind in "fi":
+        return values
+    labels = list(dict.fromkeys(values.tolist()))
+    return np.array([labels.index(value) for value in values.tolist()])
+
+
+def _groups(data: xr.Dataset, names: Sequence[str]) -> list[tuple[str, Any, str]]:
+    """Label, points and colour of every line: cases, where there are several, and what else is named."""
+    told = [*(["case"] if len(set(data["case"].values.tolist())) > 1 else []), *names]
+    keys = (
+        list(zip(*(data[name].values.tolist() for name in told), strict=True)) if told else [()] * data.sizes["point"]
+    )
+    groups = []
+    for k, key in enumerate(dict.fromkeys(keys)):
+        words = [_said(data[name], value) for name, value in zip(told, key, strict=True)]
+        chosen = np.array([one == key for one in keys])
+        groups.append((", ".join(words) or str(data["case"].values[0]), chosen, k))
+    return [(label, chosen, _colour(k, len(groups))) for label, chosen, k in groups]
+
+
+def _colour(k: int, count: int) -> str:
+    """Of the k-th line: told apart by hue, or ordered from dark to light where there are too many."""
+    return COLOURS[k] if count <= len(COLOURS) else to_hex(colormaps["viridis"](k / (count - 1)))
+
+
+def _legend(entries: Sequence[Artist]) -> Sequence[Artist]:
+    """All entries, or a few of very many: first, last, and some between."""
+    if len(entries) <= len(COLOURS):
+        return entries
+    return [entries[k] for k in np.linspace(0, len(entries) - 1, 5).round().astype(int)]
+
+
+def _said(values: xr.DataArray, value: Any) -> str:
+    unit = values.attrs.get("units", "")
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text if unit in ("", "1") else f"{text} {unit}"
+
+
+def _bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> Figure:
+    """As given in grey beside the optimum in blue; one grey bar where nothing is open, or `once` says so."""
+    count = data.sizes["point"]
+    figure, (axes,) = _page(1, max(PANEL[0], 1.15 * count))
+    alone = data["proof"].values == "as given"
+    single = alone if once is None else np.ones(count, dtype=bool)
+    plain = alone | (np.zeros(count, dtype=bool) if once is None else once)
+    given, best = data["objective_given"].values, data["objective"].values
+    for k in range(count):
+        if single[k]:
+            bars = axes.bar([k], [best[k]], 0.5, color=BEFORE if plain[k] else AFTER, linewidth=0)
+            axes.bar_label(bars, fmt="%.4g", size=7.5)
+            continue
+        for shift, value, colour in ((-0.2, given[k], BEFORE), (0.2, best[k], AFTER)):
+            axes.bar_label(axes.bar([k + shift], [value], 0.36, color=colour, linewidth=0), fmt="%.4g", size=7.5)
+    axes.set_xticks(range(count), [str(label) for label in labels], size=7.5)
+    axes.grid(axis="x", visible=False)
+    _metric_axis(axes, data)
+    grey = "no shafts" if once is not None else "as given"
+    legend: list[Artist] = [Patch(color=BEFORE, label=grey)] if plain.any() or not single.all() else []
+    legend += [Patch(color=AFTER, label=_claimed(data))] if not plain.all() else []
+    return _headed(figure, data, legend, words)
+
+
+def _claimed(data: xr.Dataset) -> str:
+    """What may be said of all that was decided."""
+    decided = data["proof"].values != "as given"
+    return "proven optimum" if np.all(data["proof"].values[decided] == "global") else "best found"
+
+
+def _wrapped(shafts: str) -> str:
+    """Names of shafts, two a line."""
+    names = shafts.split(" + ")
+    lines = [" + ".join(names[k : k + 2]) for k in range(0, len(names), 2)]
+    return "no shafts" if shafts == "none" else "\n".join(lines)
+
+
+def _page(panels: int, wide: float = PANEL[0]) -> tuple[Figure, tuple[Axes, ...]]:
+    drawn = page(panels, 1, (wide, PANEL[1] if panels == 1 else 2.4))
+    return drawn.figure, drawn.panels
+
+
+def _metric_axis(axes: Axes, data: xr.Dataset) -> None:
+    axes.set_ylabel(f"{data.attrs['metric']} [{data['objective'].attrs['units']}]")
+    axes.set_ylim(bottom=0.0)
+
+
+def _headed(figure: Figure, data: xr.Dataset, legend: Sequence[Artist], words: str) -> Figure:
+    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
+    heading(figure, data.attrs["title"], words, _legend(legend), f"{source}Computed with Laufruhe.")
+    return figure

@@ -14,6 +14,8 @@ from pydantic import BaseModel, ValidationError
 from laufruhe.errors import Complaint, LaufruheError, ModelError
 
 _CLOSE = 0.6
+# tables of several sorts, and the key that says of which
+_TAGS = {"gas": "model", "parts": "kind"}
 _RULES = {
     "missing": "is missing",
     "int_type": "must be a whole number",
@@ -74,15 +76,16 @@ def nearest(word: str, words: Sequence[str]) -> str:
 def _complaint(detail: Any, loc: tuple[str | int, ...], model: type[BaseModel]) -> Complaint:
     kind, where = detail["type"], key_path(loc)
     if kind == "extra_forbidden":
-        table = _model_at(loc[:-1], model)
+        table = _model_at(detail["loc"][:-1], model)
         return Complaint(where, short(detail["input"]), "is not a key here", nearest(str(loc[-1]), _keys(table)))
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")
+    if kind.startswith("union_tag_"):
+        where = f"{where}.{detail['ctx']['discriminator'].strip(chr(39))}"
     if kind == "union_tag_not_found":
-        return Complaint(f"{where}.model", "", "is missing", "use one of: seiliger, wiebe, trace")
+        return Complaint(where, "", "is missing", "use one of: " + ", ".join(_tags(detail["loc"], model)))
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = str(detail["ctx"].get("expected") or detail["ctx"].get("expected_tags"))
-        where = f"{where}.model" if kind == "union_tag_invalid" else where
         value = detail["ctx"].get("tag", detail["input"])
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
         return Complaint(where, short(value), "is not allowed", nearest(str(value), words))
@@ -117,13 +120,25 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     return []
 
 
+def _tags(loc: Sequence[str | int], model: type[BaseModel]) -> list[str]:
+    """What may stand where a table says of which sort it is."""
+    *above, name = [part for part in loc if not isinstance(part, int)]
+    table = _model_at(above, model)
+    field = table.model_fields[str(name)] if table else None
+    choices = _models_in(field.annotation) if field else []
+    return [str(tag) for one in choices for tag in get_args(one.model_fields[_TAGS[str(name)]].annotation)]
+
+
 def _without_tags(loc: tuple[str | int, ...]) -> tuple[str | int, ...]:
     """Drops what pydantic adds to a path for tagged tables: gas.seiliger.imep is gas.imep."""
-    return tuple(
-        part
-        for k, part in enumerate(loc)
-        if not (k == 1 and loc[0] == "gas" and part in ("seiliger", "wiebe", "trace"))
-    )
+    named = [k for k, part in enumerate(loc) if part in _TAGS]
+    return tuple(part for k, part in enumerate(loc) if not any(_is_tag(loc, at, k) for at in named))
+
+
+def _is_tag(loc: tuple[str | int, ...], table: int, k: int) -> bool:
+    """Whether part k follows a tagged table's name, or its place in a list of them."""
+    in_list = table + 1 < len(loc) and isinstance(loc[table + 1], int)
+    return k == table + (2 if in_list else 1) and k < len(loc) and isinstance(loc[k], str)
 
 
 class Refused(LaufruheError):

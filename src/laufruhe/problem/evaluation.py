@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from laufruhe.machine import Engine, OperatingPoint
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.mixed_norms import Norm, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
 from laufruhe.physics.shaking_loads import Fidelity, shaking_loads
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
+
+Array = NDArray[np.float64]
 
 PEAK_REFINEMENT = 8
 
@@ -131,3 +137,19 @@ def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None
 def objective_value(problem: Problem, evaluation: Evaluation) -> float:
     """The weighted sum that the problem minimises."""
     return sum(term.weight * evaluation.value(term.quantity) for term in problem.objective)
+
+
+def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
+    """Mount forces at operating point k over the whole cycle, shape (samples, mounts, 3) [N]."""
+    forces = evaluation.loads[k].mount_forces
+    if forces is None:
+        raise ValueError("an engine without mounts has no mount forces")
+    return over(evaluation.engine.cycle.base_order, [forces])[0].sample(finer * evaluation.samples)
+
+
+def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
+    """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
+    fine = mount_samples(evaluation, k, PEAK_REFINEMENT)
+    coarse = fine[::PEAK_REFINEMENT]
+    most = lengths(fine).max(axis=0)
+    return [replace(cycle_measures(coarse[:, m]), max=float(most[m])) for m in range(fine.shape[1])]

@@ -1,46 +1,44 @@
-"""The study file, key by key: scenes, what of them is swept, and what is compared."""
+"""The study file, key by key: scenes, what of them is swept, and what is compared (docs/studies.md)."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from laufruhe.problem.file_models import Name, Table
-
-Value = bool | int | float | str
-
-
-class SweepTable(Table):
-    """One quantity of the scene and the values that it takes."""
-
-    quantity: str = Field(
-        description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_fraction."
-    )
-    values: list[Value]
+from laufruhe.problem.file_models import Table
+from laufruhe.problem.study_costs import EconomicsTable, FreeForcesTable, ToleranceTable
+from laufruhe.problem.study_parts import SweptPartTable
 
 
-class CaseTable(Table):
-    """One scene: a problem file, and what is changed of it."""
+class CounterweightFractionTable(SweptPartTable):
+    """A metric over the balance fraction, its proven optimum marked."""
 
-    name: Name
-    problem: str
-    set: dict[str, Value] = Field(default_factory=dict, description="Paths of the problem file and their new values.")
-    without: list[str] = Field(default_factory=list, description="Tables left out, as balancer_shafts or gas.")
-    equal_power_to: Annotated[int, Field(ge=1)] | None = Field(
-        default=None, description="Forces scaled to the power of an engine of this many cylinders."
-    )
+    kind: Literal["counterweight fraction"]
 
 
-class PartTable(Table):
-    """One dataset of the study: cases, at every combination of the swept values."""
+class BalancerSizingTable(SweptPartTable):
+    """Engines with and without each of their balancer shafts, each at its proven optimum."""
 
-    name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]*$")]
-    kind: Literal["counterweight fraction", "balancer sizing", "layout comparison"]
-    title: str
-    source: str = ""
-    cases: list[CaseTable] = Field(min_length=1)
-    sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
+    kind: Literal["balancer sizing"]
+
+
+class LayoutComparisonTable(SweptPartTable):
+    """Engines side by side, of equal cylinders or of equal power."""
+
+    kind: Literal["layout comparison"]
+
+
+# a new kind is one more table here, and one more line in studies.kinds and in report.study_kinds
+AnyPart: TypeAlias = Annotated[
+    CounterweightFractionTable
+    | BalancerSizingTable
+    | LayoutComparisonTable
+    | EconomicsTable
+    | ToleranceTable
+    | FreeForcesTable,
+    Field(discriminator="kind"),
+]
 
 
 class StudyTable(Table):
@@ -49,7 +47,7 @@ class StudyTable(Table):
     figures: Literal["tractor"] | None = Field(
         default=None, description="Every figure of Hasselgruber's study, beside what it says."
     )
-    parts: list[PartTable] = Field(default_factory=list)
+    parts: list[AnyPart] = Field(default_factory=list)
 
 
 class StudyFile(Table):

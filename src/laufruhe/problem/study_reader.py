@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,10 +9,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from laufruhe.errors import Complaint, InputError
-from laufruhe.problem.complaints import complaints_of, nearest
-from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load_tables, tables_of
-from laufruhe.problem.study_models import CaseTable, StudyFile, Value
+from laufruhe.problem.complaints import Refused, complaints_of, nearest
+from laufruhe.problem.reader import tables_of
+from laufruhe.problem.study_models import AnyPart, StudyFile
+from laufruhe.problem.study_parts import CaseTable, SweptPartTable
+from laufruhe.problem.study_paths import changed
+from laufruhe.problem.study_sweeps import axis_of
 
 
 def load_study(path: Path) -> StudyFile:
@@ -31,73 +32,65 @@ def load_study(path: Path) -> StudyFile:
         file = StudyFile.model_validate(tables)
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, StudyFile)) from None
-    _check(file, path)
-    return file
-
-
-def _check(file: StudyFile, path: Path) -> None:
-    names = [part.name for part in file.study.parts]
-    if not names and file.study.figures is None:
+    if not file.study.parts and file.study.figures is None:
         raise _refused(path, "study.parts", "", "is missing", 'add [[study.parts]], or figures = "tractor"')
+    names = [part.name for part in file.study.parts]
     for k, part in enumerate(file.study.parts):
         where = f"study.parts[{k + 1}]"
         if names.count(part.name) > 1:
             raise _refused(path, f"{where}.name", part.name, "is given twice", "give each part its own name")
-        for j, sweep in enumerate(part.sweep):
-            at = f"{where}.sweep[{j + 1}].values"
-            if len(sweep.values) < 2:
-                rule = "holds one value, which is no sweep" if sweep.values else "is empty"
-                raise _refused(path, at, str(sweep.values), rule, "give two values or more, or leave the sweep out")
-            if len(set(sweep.values)) < len(sweep.values):
-                raise _refused(path, at, str(sweep.values), "names a value twice", "name each once")
-        cases = [case.name for case in part.cases]
-        if len(set(cases)) < len(cases):
-            raise _refused(path, f"{where}.cases", "", "has two cases of one name", "give each its own")
+        _check_cases(part, path, where)
+        if isinstance(part, SweptPartTable):
+            _check_sweeps(part, path, where)
+    return file
 
 
-def scene(case: CaseTable, changes: Mapping[str, Value], folder: Path) -> Problem:
-    """The problem of a case, with its own changes and those of a sweep.
+def _check_cases(part: AnyPart, path: Path, where: str) -> None:
+    cases = [case.name for case in part.cases]
+    if len(set(cases)) < len(cases):
+        raise _refused(path, f"{where}.cases", "", "has two cases of one name", "give each its own")
+
+
+def _check_sweeps(part: SweptPartTable, path: Path, where: str) -> None:
+    paths = [sweep.quantity for sweep in part.sweep]
+    for k, sweep in enumerate(part.sweep):
+        at = f"{where}.sweep[{k + 1}]"
+        if paths.count(sweep.quantity) > 1:
+            raise _refused(path, f"{at}.quantity", sweep.quantity, "is swept twice", "sweep it once")
+        for j, case in enumerate(part.cases):
+            if sweep.quantity in case.set:
+                rule = f"is swept, and set by cases[{j + 1}] too"
+                raise _refused(path, f"{at}.quantity", sweep.quantity, rule, "leave out one of the two")
+        try:
+            axis_of(sweep)
+        except Refused as refused:
+            found = refused.complaint
+            raise _refused(path, f"{at}.{found.where}", found.value, found.rule, found.remedy) from None
+
+
+def scene_tables(
+    given: Mapping[str, Any], case: CaseTable, changes: Mapping[str, Any], path: Path, metric: str | None = None
+) -> dict[str, Any]:
+    """Tables of the problem of a case, with its own changes and those of a sweep.
 
     Raises
     ------
     InputError
-        If the problem file is bad, has no such quantity, or what is made of it is bad.
+        If the problem file has no such table or quantity.
     """
-    path = folder / case.problem
-    tables = copy.deepcopy(tables_of(path))
+    tables = dict(given)
     for name in case.without:
         if name not in tables:
             raise _refused(path, name, "", "is left out by the study and is not there", nearest(name, list(tables)))
         del tables[name]
-    for where, value in {**case.set, **changes}.items():
-        _assign(tables, where, value, path)
-    return load_tables(tables, path)
-
-
-def _assign(tables: dict[str, Any], where: str, value: Value, path: Path) -> None:
-    here: Any = tables
-    parts = where.split(".")
-    for k, part in enumerate(parts):
-        options = _options(here)
-        if part not in options:
-            seen = ".".join(parts[: k + 1])
-            remedy = nearest(part, list(options)) if options else "name a quantity of the problem file"
-            raise _refused(path, seen, "", "is no quantity of this scene", remedy)
-        key = options[part]
-        if k == len(parts) - 1:
-            here[key] = value
-            return
-        here = here[key]
-
-
-def _options(here: Any) -> dict[str, Any]:
-    """Names of what a table or a list holds; a list's entries by their names, or counted from one."""
-    if isinstance(here, dict):
-        return {key: key for key in here}
-    if isinstance(here, list):
-        named = {entry["name"]: k for k, entry in enumerate(here) if isinstance(entry, dict) and "name" in entry}
-        return {**{str(k + 1): k for k in range(len(here))}, **named}
-    return {}
+    try:
+        for where, value in {**case.set, **changes}.items():
+            tables = changed(tables, where, value)
+    except Refused as refused:
+        raise InputError(str(path), (refused.complaint,)) from None
+    if metric is not None:
+        tables["objective"] = {"minimise": metric}
+    return tables
 
 
 def _refused(path: Path, where: str, value: str, rule: str, remedy: str) -> InputError:

@@ -14,11 +14,11 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures
 from laufruhe.physics.shaking_loads import WRENCH
+from laufruhe.problem.evaluation import measured
 from laufruhe.report.measures import (
     PRESENT,
     is_met,
     limits_of,
-    measured,
     mount_orders,
     shaking_orders,
 )

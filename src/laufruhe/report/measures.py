@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.metrics import CycleMeasures, cycle_measures, order_amplitude
-from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, PointLoads, over
+from laufruhe.physics.metrics import CycleMeasures, order_amplitude
+from laufruhe.problem.evaluation import PointLoads, measured
 from laufruhe.problem.model import Limit
 from laufruhe.solvers.mount_result import mount_limits
 from laufruhe.solvers.result import LimitValue, Result
@@ -28,20 +28,6 @@ class MountMeasures:
     mount: str
     initial: CycleMeasures
     final: CycleMeasures
-
-
-def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
-    """Mount forces at operating point k over the whole cycle, shape (samples, mounts, 3) [N]."""
-    forces = evaluation.loads[k].mount_forces
-    if forces is None:
-        raise ValueError("an engine without mounts has no mount forces")
-    return over(evaluation.engine.cycle.base_order, [forces])[0].sample(finer * evaluation.samples)
-
-
-def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
-    """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
-    samples, fine = mount_samples(evaluation, k), mount_samples(evaluation, k, PEAK_REFINEMENT)
-    return [replace(cycle_measures(samples[:, m]), max=cycle_measures(fine[:, m]).max) for m in range(samples.shape[1])]
 
 
 def mount_measures(result: Result) -> list[MountMeasures]:

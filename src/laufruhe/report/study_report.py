@@ -1,10 +1,11 @@
-"""The files of a study: netCDF, CSV and a Markdown table for every part, and the page that lists them."""
+"""The files of a study: netCDF, CSV, picture and a Markdown table for every part, and the page that lists them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from laufruhe.problem.study_models import StudyFile
 from laufruhe.report import files
@@ -17,47 +18,77 @@ if TYPE_CHECKING:
 def file_names(study: StudyFile) -> list[str]:
     """Everything that `write_study` makes."""
     own = figure_files() if study.study.figures else []
-    return ["report.md", *own, *(f"{part.name}.{end}" for part in study.study.parts for end in ("nc", "csv", "png"))]
+    parts = [f"{part.name}.{end}" for part in study.study.parts for end in ("nc", "csv", "png")]
+    return [files.REPORT, *own, *parts]
 
 
 def write_study(
-    study: StudyFile, datasets: dict[str, xr.Dataset], folder: Path, command: str, say: Callable[[str], None]
+    study: StudyFile,
+    datasets: Mapping[str, xr.Dataset],
+    seconds: Mapping[str, float],
+    folder: Path,
+    command: str,
+    say: Callable[[str], None],
 ) -> None:
-    """Datasets, figures and the report into a folder that exists."""
-    lines = [f"# {study.title}", "", f"Source: {study.source}", "", f"Made by `{command}`.", ""]
+    """Datasets, pictures and the report into a folder that exists.
+
+    Parameters
+    ----------
+    seconds
+        What each part took.
+    """
+    lines = [f"# {study.title}", ""]
+    lines += [f"Source: {study.source}", ""] if study.source else []
+    lines += [f"Made by `{command}`.", ""]
     if study.assumptions:
         lines += ["Assumptions:", "", *(f"- {text}" for text in study.assumptions), ""]
     if study.study.figures:
         lines += write_figures(folder, say)
     for part in study.study.parts:
-        data = datasets[part.name]
-        data.to_netcdf(folder / f"{part.name}.nc")
-        data.to_dataframe().to_csv(folder / f"{part.name}.csv")
-        lines += [
-            f"## {part.title}",
-            "",
-            f"{part.kind.capitalize()}. Source: {part.source}",
-            "",
-            *_table(data),
-            "",
-            f"![{part.title}]({part.name}.png)",
-            "",
-        ]
-    files.write(folder / "report.md", "\n".join(lines))
+        say(f"writing {part.name}")
+        lines += _part(part.name, datasets[part.name], folder)
+    if datasets:
+        spent = [f"| {name} | {duration:.1f} |" for name, duration in seconds.items()]
+        lines += ["## Where the time went", "", "Seconds on one core.", "", "| part | s |", "| --- | ---: |", *spent,
+                  f"| all | {sum(seconds.values()):.1f} |", ""]  # fmt: skip
+    files.write(folder / files.REPORT, "\n".join(lines))
 
 
-def _table(data: xr.Dataset) -> list[str]:
-    swept = [str(name) for name in data.coords if name not in ("mount", "case", "status")]
-    head = ["case", *swept, "as given [N]", "at the optimum [N]", "proven bound [N]", "change", "largest, optimum [N]"]
-    rows = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
-    for k in range(data.sizes["point"]):
-        row = data.isel(point=k)
-        given, best = float(row["objective_given"]), float(row["objective"])
-        change = f"{100.0 * (best / given - 1.0):+.1f} %" if given else "-"
-        cells = [
-            str(row["case"].item()), *(str(row[name].item()) for name in swept),
-            f"{given:.1f}", f"{best:.1f}", f"{float(row['lower_bound']):.1f}", change,
-            f"{float(row['maximum'].max()):.1f}",
-        ]  # fmt: skip
-        rows.append("| " + " | ".join(cells) + " |")
+def _part(name: str, data: xr.Dataset, folder: Path) -> list[str]:
+    from laufruhe.plots.style import save
+    from laufruhe.report.study_kinds import SHOWN
+
+    shown, title, source = SHOWN[data.attrs["kind"]], data.attrs["title"], data.attrs["source"]
+    data.to_netcdf(folder / f"{name}.nc")
+    _flat(data).to_csv(folder / f"{name}.csv")
+    save(shown.picture(data), folder / f"{name}.png")
+    words = data.attrs["kind"].capitalize() + "." + (f" Source: {source}" if source else "")
+    return [f"## {title}", "", words, "", *shown.table(data), "", f"![{title}]({name}.png)", ""]
+
+
+def _flat(data: xr.Dataset) -> Any:
+    """A row a point: what stands for every mount and decision becomes a column each."""
+    wide = [str(dim) for dim in ("mount", "decision") if dim in data.dims]
+    rows = data.drop_dims(wide).to_dataframe()
+    for name, values in data.data_vars.items():
+        if len(values.dims) == 2 and values.dims[1] in wide:
+            for k, of in enumerate(data[values.dims[1]].values):
+                rows[f"{name}: {of}"] = values.values[:, k]
     return rows
+
+
+def as_json(study: StudyFile, datasets: Mapping[str, xr.Dataset], seconds: Mapping[str, float]) -> str:
+    """All parts as strict JSON: what xarray says of a dataset, with null for what is no number."""
+    parts = {
+        name: {"seconds": seconds[name], **data.to_dict(data="list", encoding=False)} for name, data in datasets.items()
+    }
+    content = {"title": study.title, "source": study.source, "assumptions": study.assumptions, "parts": parts}
+    return json.dumps(_finite(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not abs(value) < float("inf") else value

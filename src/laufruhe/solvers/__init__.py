@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.solvers.accuracy import error_of, solve_within
+from laufruhe.solvers.direct_cones import solve_direct
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.unbalances import objective_name, solve_unbalances
 
 __all__ = ["Result", "Status", "solve", "state"]
 
 
-def solve(problem: Problem) -> Result:
+def solve(problem: Problem, many: bool = False) -> Result:
     """Decide what a problem leaves open.
+
+    Parameters
+    ----------
+    many
+        Whether this is one of many small problems: cone programs are then handed to the solver as
+        arrays, and not stated in cvxpy first. The design is the same.
 
     Raises
     ------
@@ -40,7 +48,7 @@ def solve(problem: Problem) -> Result:
         raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
     if not problem.decisions:
         return state(problem)
-    return solve_within(problem, solve_unbalances)
+    return solve_within(problem, partial(solve_unbalances, cones=solve_direct if many else None))
 
 
 def state(problem: Problem) -> Result:

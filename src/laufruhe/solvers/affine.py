@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject
 from laufruhe.solvers.domain import Domain, domains_of
 
 Array = NDArray[np.float64]
+
+NEEDED = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +88,31 @@ class AffineProblem:
         """Largest size of every column."""
         return np.concatenate([np.full(d.width, d.scale) for d in self.domains]) if self.domains else np.zeros(0)
 
+    @cached_property
+    def units(self) -> Array:
+        """A size of every column for a solver: its bound, or a thousand times what all loads need if that is less.
+
+        Bounds that are far apart would else leave no digits for the small ones.
+        """
+        norms = [norm for _, norm in (*self.terms, *self.limits)]
+        found = []
+        for domain in self.domains:
+            own = [float(np.linalg.norm(norm.slope[:, :, domain.columns])) for norm in norms]
+            needs = [float(np.linalg.norm(n.constant)) / size for n, size in zip(norms, own, strict=True) if size > 0.0]
+            needed = NEEDED * max(needs, default=0.0)
+            found.append(np.full(domain.width, min(domain.scale, needed) if needed > 0.0 else domain.scale))
+        return np.concatenate(found) if found else np.zeros(0)
+
     def objective(self, x: Array) -> float:
         """Weighted sum of the terms."""
         return sum(weight * norm.value(x) for weight, norm in self.terms)
+
+
+def reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
+    """A size of these norms that is not zero: at no decisions, or at large ones."""
+    sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
+    sizes += [float(np.abs(norm.slope * problem.units).max(initial=0.0)) for norm in norms]
+    return max(sizes, default=0.0) or 1.0
 
 
 class AffineModel:

@@ -17,37 +17,12 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.solvers.affine import AffineNorm, AffineProblem
+from laufruhe.solvers.affine import AffineNorm, AffineProblem, reach
 from laufruhe.solvers.certificate import Multipliers
+from laufruhe.solvers.direct_cones import TIGHT, ConicSolution
 from laufruhe.solvers.domain import Domain
 
 Array = NDArray[np.float64]
-
-# flat optima need a small gap before their decisions are digits one can build
-NEEDED = 1e3
-_TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
-
-
-@dataclass(frozen=True, eq=False)
-class ConicSolution:
-    """What the cone solver returned; nothing in it is believed before it is evaluated.
-
-    Attributes
-    ----------
-    x
-        Decision vector; None where the limits cannot be met together.
-    multipliers
-        Dual rows of terms and limits.
-    solver_seconds
-        Spent inside the cone solver.
-    iterations
-        Of the interior-point method.
-    """
-
-    x: Array | None
-    multipliers: Multipliers
-    solver_seconds: float
-    iterations: int
 
 
 @dataclass
@@ -84,11 +59,9 @@ class ConicProgram:
         self._reusable = reusable
         # decisions in units of what they may need, rows in units of what these can reach
         self._y = cp.Variable(problem.size)
-        self._sizes = _sizes(problem)
-        self._scales = np.repeat(self._sizes, [domain.width for domain in problem.domains])
-        self._unit = self._reach([norm for _, norm in problem.terms])
+        self._unit = reach(problem, [norm for _, norm in problem.terms])
         self._terms = [self._cone(norm, self._unit) for _, norm in problem.terms]
-        self._limits = [self._cone(norm, self._reach([norm])) for _, norm in problem.limits]
+        self._limits = [self._cone(norm, reach(problem, [norm])) for _, norm in problem.limits]
         self._maxima = [
             self._number(np.array(maximum / cone.unit))
             for (maximum, _), cone in zip(problem.limits, self._limits, strict=True)
@@ -101,8 +74,8 @@ class ConicProgram:
         ]
         constraints += [
             c
-            for domain, size in zip(problem.domains, self._sizes, strict=True)
-            for c in _membership(domain, self._y[domain.columns], size)
+            for domain in problem.domains
+            for c in _membership(domain, self._y[domain.columns], float(problem.units[domain.start]))
         ]
         self._program = cp.Problem(cp.Minimize(sum(least)), constraints)
 
@@ -110,7 +83,7 @@ class ConicProgram:
         """V0 + B x in a second-order cone a row, or in one cone for a root mean square."""
         k, d = norm.constant.shape
         constant = self._number(norm.constant / unit)
-        slope = (norm.slope * (self._scales / unit)).reshape(k * d, -1)
+        slope = (norm.slope * (self._problem.units / unit)).reshape(k * d, -1)
         rows = cp.reshape(slope @ self._y, (k, d), order="C") + constant
         if norm.norm is Norm.RMS:
             factors = np.sqrt(norm.weights)
@@ -120,12 +93,6 @@ class ConicProgram:
         heads = cp.Variable(k) if norm.norm is Norm.SUM else cp.Variable()
         tops = heads if norm.norm is Norm.SUM else heads * np.ones(k)
         return _Cone(constant, heads, cp.SOC(tops, rows, axis=1), unit, (k, d), np.ones(k))
-
-    def _reach(self, norms: Sequence[AffineNorm]) -> float:
-        """A size of these norms that is not zero: at no decisions, or at large ones."""
-        sizes = [norm.value(np.zeros(self._problem.size)) for norm in norms]
-        sizes += [float(np.abs(norm.slope * self._scales).max(initial=0.0)) for norm in norms]
-        return max(sizes, default=0.0) or 1.0
 
     def _number(self, value: Array) -> Any:
         return cp.Parameter(value.shape, value=value) if self._reusable else cp.Constant(value)
@@ -145,7 +112,7 @@ class ConicProgram:
             # an inaccurate answer is judged by its certificate, not by a warning
             warnings.simplefilter("ignore")
             try:
-                self._program.solve(solver=cp.CLARABEL, **_TIGHT)
+                self._program.solve(solver=cp.CLARABEL, **TIGHT)
             except cp.error.SolverError as error:
                 raise SolverError(f"the cone solver gave up ({error})") from None
         return self._answer(problem)
@@ -165,7 +132,7 @@ class ConicProgram:
             return ConicSolution(None, Multipliers((), ()), seconds, iterations)
         if self._y.value is None:
             raise SolverError(f"the cone solver stopped with status '{status}'")
-        x = np.asarray(self._y.value) * self._scales
+        x = np.asarray(self._y.value) * self._problem.units
         for domain in problem.domains:
             x[domain.columns] = domain.project(x)
         terms = tuple(
@@ -177,26 +144,6 @@ class ConicProgram:
 
 def _value(norm: AffineNorm, cone: _Cone) -> Any:
     return norm.weights @ cone.heads if norm.norm is Norm.SUM else cone.heads
-
-
-def _sizes(problem: AffineProblem) -> list[float]:
-    """A size for every decision: its bound, or a thousand times what all loads need where that is less.
-
-    Bounds that are far apart would else leave nothing of the small ones.
-    """
-    norms = [norm for _, norm in (*problem.terms, *problem.limits)]
-    found = []
-    for domain in problem.domains:
-        needs = [
-            _length(norm.constant) / alone for norm in norms if (alone := _length(norm.slope[:, :, domain.columns]))
-        ]
-        needed = NEEDED * max(needs, default=0.0)
-        found.append(min(domain.scale, needed) if needed > 0.0 else domain.scale)
-    return found
-
-
-def _length(values: Array) -> float:
-    return float(np.linalg.norm(values))
 
 
 def _membership(domain: Domain, y: Any, unit: float) -> list[Any]:

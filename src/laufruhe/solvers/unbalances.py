@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,12 @@ from laufruhe.problem.quantity import MASSES
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.solvers.certificate import Bound, Certificate, Proof, best_bound, kkt_residual
+from laufruhe.solvers.direct_cones import ConicSolution
 from laufruhe.solvers.domain import Domain
 from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible
 
 Array = NDArray[np.float64]
+ConeSolver: TypeAlias = Callable[[AffineProblem], ConicSolution]
 
 MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
@@ -51,8 +54,13 @@ class _Optimum:
     samples: int
 
 
-def solve_unbalances(problem: Problem) -> Result:
+def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Result:
     """Global optimum of a problem whose decisions are unbalances.
+
+    Parameters
+    ----------
+    cones
+        What solves the cone programs; a program in cvxpy where left out.
 
     Returns
     -------
@@ -68,7 +76,7 @@ def solve_unbalances(problem: Problem) -> Result:
     model = AffineModel(problem)
     initial = evaluate(problem)
     modelled = time.perf_counter()
-    optimum = _refine(problem, model, objective_value(problem, initial))
+    optimum = _refine(problem, model, objective_value(problem, initial), cones or _stated)
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
@@ -81,11 +89,11 @@ def solve_unbalances(problem: Problem) -> Result:
     return replace(result, timing={**timing, "evaluate": time.perf_counter() - solved})
 
 
-def _refine(problem: Problem, model: AffineModel, initial: float) -> _Optimum | None:
+def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSolver) -> _Optimum | None:
     """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6)."""
     samples, best = model.full_samples, None
     for _ in range(MOST_DOUBLINGS + 1):
-        found = _allowed(problem, model, samples, initial)
+        found = _allowed(problem, model, samples, initial, cones)
         if found is None:
             # fewer angles ask for less: what they cannot meet, all cannot
             return best
@@ -97,27 +105,27 @@ def _refine(problem: Problem, model: AffineModel, initial: float) -> _Optimum | 
     return best
 
 
-def _allowed(problem: Problem, model: AffineModel, samples: int, initial: float) -> _Optimum | None:
+def _allowed(problem: Problem, model: AffineModel, samples: int, initial: float, cones: ConeSolver) -> _Optimum | None:
     """An optimum at `samples` angles that keeps its limits between them too.
 
     A peak between the angles breaks its limit by a little; the next attempt asks for
     that little less at the angles.
     """
-    found = _attempt(problem, model, samples, initial, 0.0)
+    found = _attempt(problem, model, samples, initial, 0.0, cones)
     margin = 0.0
     for _ in range(MOST_MARGINS):
         if found is None or found.excess <= FEASIBLE:
             break
         margin += 1.05 * found.excess
-        found = _attempt(problem, model, samples, initial, margin) or found
+        found = _attempt(problem, model, samples, initial, margin, cones) or found
     return found
 
 
-def _attempt(problem: Problem, model: AffineModel, samples: int, initial: float, margin: float) -> _Optimum | None:
-    from laufruhe.solvers.conic import ConicProgram
-
+def _attempt(
+    problem: Problem, model: AffineModel, samples: int, initial: float, margin: float, cones: ConeSolver
+) -> _Optimum | None:
     coarse, fine = model.at(samples), model.at(2 * samples)
-    solution = ConicProgram(_tightened(coarse, margin)).solve()
+    solution = cones(_tightened(coarse, margin))
     if solution.x is None:
         return None
     x = _settled(problem, fine, solution.x)
@@ -126,6 +134,12 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, initial: float,
     value = judge.objective(x)
     gap = (value - bound.value) / _measure(value, initial)
     return _Optimum(x, bound, fine, max(gap, 0.0), _excess(judge, x), samples)
+
+
+def _stated(affine: AffineProblem) -> ConicSolution:
+    from laufruhe.solvers.conic import ConicProgram
+
+    return ConicProgram(affine).solve()
 
 
 def _has_peaks(problem: Problem) -> bool:

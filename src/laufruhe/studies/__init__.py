@@ -1,6 +1,6 @@
 """Sweeps and comparisons described by study files."""
 
-from laufruhe.studies.points import Point, points_of
 from laufruhe.studies.runner import run
+from laufruhe.studies.scenes import Point, Scenes
 
-__all__ = ["Point", "points_of", "run"]
+__all__ = ["Point", "Scenes", "run"]

@@ -8,7 +8,7 @@ kilogram is worth. The engine with one more cylinder stands beside, rebuilt at e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -61,10 +61,9 @@ class Claim:
 
 @dataclass(frozen=True)
 class Build:
-    """One engine of a comparison: a problem that has the shafts to be built and no others."""
+    """What one engine of a comparison is called, what it is, and what is said of it."""
 
     name: str
-    problem: Problem
     standing: Standing = Standing.SHAFTS
     claim: Claim = Claim()
 
@@ -134,49 +133,78 @@ def best(problem: Problem, mass_limit: float = np.inf) -> FrontPoint:
     return FrontPoint(mass_limit, mass, result.objective.value, bound, price)
 
 
-def front(problem: Problem, mass_limits: Sequence[float]) -> tuple[FrontPoint, ...]:
-    """Least objective under each limit on the mass of the shafts [kg], in the order given.
+@dataclass(frozen=True)
+class Front:
+    """Least objective of one engine against the mass on its shafts.
 
-    A problem without shafts is a level line, solved once.
-    """
-    if not shafts_of(problem):
-        only = best(problem)
-        return tuple(replace(only, mass_limit=limit) for limit in mass_limits)
-    return tuple(best(problem, limit) for limit in mass_limits)
-
-
-def fronts(
-    builds: Sequence[Build], mass_limits: Sequence[float], say: Callable[[int, int], None] = lambda _done, _all: None
-) -> xr.Dataset:
-    """Fronts of several builds, and the optimum of each whatever its shafts weigh, as one labelled dataset.
-
-    Parameters
+    Attributes
     ----------
-    mass_limits
-        Ascending [kg].
-    say
-        Told how many builds are done, of how many.
+    points
+        Under each limit, in the order asked for.
+    optimum
+        Whatever the shafts weigh.
+    shafts, cylinders
+        How many the engine has.
+    objective, unit
+        What is least, in words and SI.
+    """
+
+    points: tuple[FrontPoint, ...]
+    optimum: FrontPoint
+    shafts: int
+    cylinders: int
+    objective: str
+    unit: str
+
+
+def front(problem: Problem, mass_limits: Sequence[float]) -> Front:
+    """Least objective under each limit on the mass of the shafts [kg], and without one.
+
+    A limit that the free optimum keeps changes nothing, so it is not solved for.
 
     Raises
     ------
     ModelError
-        If the builds do not minimise one and the same load.
+        If the problem minimises no load.
+    SolverError
+        If there is no design.
     """
-    unit = _common_unit([build.problem for build in builds])
-    lines, optima = [], []
-    for k, build in enumerate(builds):
-        say(k, len(builds))
-        lines.append(front(build.problem, mass_limits))
-        optima.append(best(build.problem) if shafts_of(build.problem) else lines[-1][0])
-    say(len(builds), len(builds))
-    shafts = np.array([len(shafts_of(build.problem)) for build in builds])
+    if not problem.objective or any(term.quantity.subject in MASSES for term in problem.objective):
+        raise ModelError("shafts are weighed against a load, and none is minimised; minimise mean mount force")
+    optimum = best(problem)
+    return Front(
+        points=tuple(
+            replace(optimum, mass_limit=limit) if limit >= optimum.mass else best(problem, limit)
+            for limit in mass_limits
+        ),
+        optimum=optimum,
+        shafts=len(shafts_of(problem)),
+        cylinders=len(problem.engine.slider_cranks),
+        objective=objective_name(problem),
+        unit=problem.objective[0].quantity.unit,
+    )
+
+
+def compared(builds: Sequence[Build], fronts: Sequence[Front]) -> xr.Dataset:
+    """Fronts of several engines, at the same mass limits, as one labelled dataset.
+
+    Raises
+    ------
+    ModelError
+        If they do not minimise one and the same load.
+    """
+    asked = sorted({line.objective for line in fronts})
+    if len(asked) > 1:
+        raise ModelError(f"engines minimise different things ({'; '.join(asked)}); give all one objective")
+    unit = fronts[0].unit
+    limits = [point.mass_limit for point in fronts[0].points]
 
     def along(name: str, unit: str, words: str) -> tuple[tuple[str, str], list[list[float]], dict[str, str]]:
-        table = [[getattr(point, name) for point in line] for line in lines]
+        table = [[getattr(point, name) for point in line.points] for line in fronts]
         return ("build", "mass_limit"), table, {"units": unit, "long_name": words}
 
     def each(name: str, unit: str, words: str) -> tuple[str, list[float], dict[str, str]]:
-        return "build", [getattr(point, name) for point in optima], {"units": unit, "long_name": words}
+        return "build", [getattr(line.optimum, name) for line in fronts], {"units": unit, "long_name": words}
 
     data = xr.Dataset(
         {
@@ -189,19 +217,19 @@ def fronts(
             "optimum_bound": each("lower_bound", unit, "what no design falls below, whatever the shafts weigh"),
             "optimum_mass": each("mass", "kg", "mass on the shafts at the least objective"),
         },
-        coords=_coordinates(builds, mass_limits, shafts),
-        attrs={"title": "Economics of balancing", "kind": "economics", "objective": objective_name(builds[0].problem)},
+        coords=_coordinates(builds, fronts, limits),
+        attrs={"title": "Economics of balancing", "kind": "economics", "objective": asked[0]},
     )
     return data.assign(efficient=_efficient(data))
 
 
-def _coordinates(builds: Sequence[Build], mass_limits: Sequence[float], shafts: np.ndarray) -> dict[str, object]:
+def _coordinates(builds: Sequence[Build], fronts: Sequence[Front], limits: Sequence[float]) -> dict[str, object]:
     claims = [build.claim for build in builds]
     return {
         "build": [build.name for build in builds],
-        "mass_limit": ("mass_limit", list(mass_limits), {"units": "kg", "long_name": "mass allowed on shafts"}),
-        "shafts": ("build", shafts, {"units": "1", "long_name": "balancer shafts"}),
-        "cylinders": ("build", [len(b.problem.engine.slider_cranks) for b in builds], {"units": "1"}),
+        "mass_limit": ("mass_limit", list(limits), {"units": "kg", "long_name": "mass allowed on shafts"}),
+        "shafts": ("build", [line.shafts for line in fronts], {"units": "1", "long_name": "balancer shafts"}),
+        "cylinders": ("build", [line.cylinders for line in fronts], {"units": "1"}),
         "standing": ("build", [str(build.standing) for build in builds]),
         "claim": ("build", [claim.says for claim in claims], {"long_name": "what the source says"}),
         "claimed_fall": ("build", [claim.falls_by for claim in claims], {"units": "1"}),
@@ -223,13 +251,3 @@ def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str,
             own = rivals[:, k].min()
             on_front[b, k] = force[b, k] <= own and force[b, k] < (1.0 - SAME) * min(lighter, fewer)
     return ("build", "mass_limit"), on_front, {"long_name": "whether no other design is better in every respect"}
-
-
-def _common_unit(problems: Sequence[Problem]) -> str:
-    asked = {objective_name(problem) for problem in problems}
-    if len(asked) > 1:
-        raise ModelError(f"engines minimise different things ({'; '.join(sorted(asked))}); give all one objective")
-    terms = problems[0].objective
-    if not terms or any(term.quantity.subject in MASSES for term in terms):
-        raise ModelError("shafts are weighed against a load, and none is minimised; minimise mean mount force")
-    return terms[0].quantity.unit

@@ -8,7 +8,7 @@ turns against it needs a shaft (Hasselgruber 1964, eq. 33, Fig. 29).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,31 +88,39 @@ def firing_intervals(engine: Engine) -> tuple[float, float]:
     return min(intervals), max(intervals)
 
 
-def free_forces(
-    engines: Mapping[str, tuple[Engine, float]],
-    literature: Mapping[str, Mapping[str, float]],
-    say: Callable[[int, int], None] = lambda _done, _all: None,
-) -> xr.Dataset:
+@dataclass(frozen=True)
+class Layout:
+    """Free loads of one engine by order, and its firing intervals [rad]."""
+
+    loads: tuple[FreeLoad, ...]
+    intervals: tuple[float, float]
+    cylinders: int
+
+
+def layout(engine: Engine, spacing: float) -> Layout:
+    """Free loads of the orders 1 and 2, couples in units of a spacing [m]."""
+    loads = tuple(free_load(engine, order, spacing) for order in ORDERS)
+    return Layout(loads, firing_intervals(engine), len(engine.slider_cranks))
+
+
+def compared(layouts: Mapping[str, Layout], literature: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
     """Free forces and couples of several layouts beside printed ones.
 
     Parameters
     ----------
-    engines
-        Engine and spacing [m] by name.
     literature
-        Printed values by the name of the engine and "force 1", "couple 2", ...; NaN in the
+        Printed values by the name of the layout and "force 1", "couple 2", ...; NaN in the
         dataset where a table has none.
     """
-    rows, printed, fires = [], [], []
-    for k, (name, (engine, spacing)) in enumerate(engines.items()):
-        say(k, len(engines))
-        loads = [free_load(engine, order, spacing) for order in ORDERS]
-        rows.append([[own.force, own.couple, own.force_against, own.couple_against] for own in loads])
-        known = literature.get(name, {})
-        printed.append([[known.get(f"{what} {order}", math.nan) for what in ("force", "couple")] for order in ORDERS])
-        fires.append([math.degrees(angle) for angle in firing_intervals(engine)])
-    say(len(engines), len(engines))
-    table, known_table, interval = np.array(rows), np.array(printed), np.array(fires)
+    table = np.array(
+        [[[o.force, o.couple, o.force_against, o.couple_against] for o in own.loads] for own in layouts.values()]
+    )
+    known = [literature.get(name, {}) for name in layouts]
+    kinds = ("force", "couple")
+    printed = np.array(
+        [[[own.get(f"{what} {order}", math.nan) for what in kinds] for order in ORDERS] for own in known]
+    )
+    interval = np.degrees([own.intervals for own in layouts.values()])
 
     def each(values: NDArray[np.float64], words: str) -> tuple[tuple[str, str], NDArray[np.float64], dict[str, str]]:
         return ("case", "order"), values, {"units": "1", "long_name": words}
@@ -123,15 +131,22 @@ def free_forces(
             "couple": each(table[..., 1], "free couple over one cylinder's force times the spacing"),
             "force_against": each(table[..., 2], "free force that turns against the crank"),
             "couple_against": each(table[..., 3], "free couple that turns against the crank"),
-            "force_printed": each(known_table[..., 0], "free force in the literature"),
-            "couple_printed": each(known_table[..., 1], "free couple in the literature"),
+            "force_printed": each(printed[..., 0], "free force in the literature"),
+            "couple_printed": each(printed[..., 1], "free couple in the literature"),
             "least_interval": ("case", interval[:, 0], {"units": "deg", "long_name": "shortest firing interval"}),
             "largest_interval": ("case", interval[:, 1], {"units": "deg", "long_name": "longest firing interval"}),
         },
         coords={
-            "case": list(engines),
+            "case": list(layouts),
             "order": list(ORDERS),
-            "cylinders": ("case", [len(engine.slider_cranks) for engine, _ in engines.values()], {"units": "1"}),
+            "cylinders": ("case", [own.cylinders for own in layouts.values()], {"units": "1"}),
         },
         attrs={"title": "Free forces and couples by layout", "kind": "free forces"},
     )
+
+
+def printed_agree(data: xr.Dataset) -> tuple[int, int]:
+    """How many printed values agree to half of their last digit, and of how many."""
+    half = 0.5 * 10.0 ** -int(data.attrs["digits"]) * (1.0 + 1e-9)
+    apart = np.array([abs(data[what].values - data[f"{what}_printed"].values) for what in ("force", "couple")])
+    return int((apart <= half).sum()), int(np.isfinite(apart).sum())

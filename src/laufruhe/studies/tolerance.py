@@ -7,7 +7,7 @@ so finer balancing promises nothing for engines of fewer than six cylinders.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,12 +18,14 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 from laufruhe.problem.model import Problem
+from laufruhe.studies.tractor.verdict import Verdict
 
 Array = NDArray[np.float64]
 
 ANGLES = 360
 DIRECTIONS = 720
 PIECE = 500
+CAUSES = ("reciprocating masses", "unbalance", "alignment")
 SHARES = np.arange(201) / 200.0
 SEVERAL = 3.0
 """A force this many times another decides alone: the rest moves it by less than a third, were they in phase."""
@@ -86,11 +88,12 @@ def worst_parts(engine: Engine, speed: float, tolerances: Tolerances) -> dict[st
     angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
     directions = np.stack([np.sin(angles), np.cos(angles)])
     segments = np.abs(_unit_forces(engine, speed) @ directions).sum(axis=0) * tolerances.reciprocating_mass
-    return {
-        "reciprocating masses": float(segments.max()),
-        "unbalance": tolerances.planes * tolerances.unbalance * speed**2,
-        "alignment": sum(tolerances.aligned_masses) * tolerances.alignment * speed**2,
-    }
+    sizes = (
+        float(segments.max()),
+        tolerances.planes * tolerances.unbalance * speed**2,
+        sum(tolerances.aligned_masses) * tolerances.alignment * speed**2,
+    )
+    return dict(zip(CAUSES, sizes, strict=True))
 
 
 def worst_force(engine: Engine, speed: float, tolerances: Tolerances) -> float:
@@ -108,16 +111,10 @@ def random_forces(
     tolerances: Tolerances,
     builds: int,
     seed: int,
-    say: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Array:
     """Largest free force over the cycle [N] of each of many engines, the nominal force left out.
 
     Masses are even over their tolerance, unbalances even over their disc.
-
-    Parameters
-    ----------
-    say
-        Told how many engines are built, of how many.
     """
     random = np.random.default_rng(seed)
     unit = _unit_forces(engine, speed)
@@ -131,12 +128,10 @@ def random_forces(
     peaks = np.empty(builds)
     # in pieces: all engines at once would take gigabytes
     for start in range(0, builds, PIECE):
-        say(start, builds)
         piece = slice(start, start + PIECE)
         moved = np.tensordot(masses[piece], unit, axes=1)
         zeta = rotating[piece, None] * crank
         peaks[piece] = np.hypot(moved[..., 0] + zeta.imag, moved[..., 1] + zeta.real).max(axis=1)
-    say(builds, builds)
     return peaks
 
 
@@ -148,60 +143,91 @@ def nominal_force(problem: Problem) -> float:
     return float(np.hypot(force[:, 0], force[:, 1]).max())
 
 
-def _after(before: int, of: int, say: Callable[[int, int], None]) -> Callable[[int, int], None]:
-    return lambda done, _all: say(before + done, of)
+@dataclass(frozen=True)
+class Spread:
+    """What tolerances do to the free force of one engine [N].
 
-
-def tolerance_study(
-    problems: Mapping[str, Problem],
-    tolerances: Tolerances,
-    builds: int = 10_000,
-    seed: int = 1964,
-    say: Callable[[int, int], None] = lambda _done, _all: None,
-) -> xr.Dataset:
-    """Nominal free force, the worst that tolerances add, and how it is distributed over random engines.
-
-    Parameters
+    Attributes
     ----------
-    problems
-        Engines by name, each with one operating point.
-    say
-        Told how many engines are built, of how many.
+    nominal
+        Largest over the cycle, of the engine as drawn.
+    worst
+        Largest that each cause adds, by its name.
+    mean
+        Of what is added at random.
+    random
+        What this share (SHARES) of random engines stay below.
+    speed
+        Of the crank [rad/s].
+    """
+
+    nominal: float
+    worst: dict[str, float]
+    mean: float
+    random: tuple[float, ...]
+    speed: float
+
+
+def spread(problem: Problem, tolerances: Tolerances, builds: int = 10_000, seed: int = 1964) -> Spread:
+    """Nominal free force, the worst that tolerances add, and how it is distributed over random engines.
 
     Raises
     ------
     ModelError
-        If an engine has several operating points.
+        If the problem has several operating points.
     """
-    several = [name for name, problem in problems.items() if len(problem.points) != 1]
-    if several:
-        raise ModelError(f"'{several[0]}' needs one operating point where tolerances are studied; give it one")
-    nominal, parts, drawn = [], [], []
-    for k, problem in enumerate(problems.values()):
-        engine, speed = problem.engine, problem.points[0].speed
-        nominal.append(nominal_force(problem))
-        parts.append(worst_parts(engine, speed, tolerances))
-        peaks = random_forces(engine, speed, tolerances, builds, seed, _after(k * builds, len(problems) * builds, say))
-        drawn.append([peaks.mean(), *np.quantile(peaks, SHARES)])
-    table = np.array(drawn)
+    if len(problem.points) != 1:
+        raise ModelError(f"'{problem.name}' needs one operating point where tolerances are studied; give it one")
+    engine, speed = problem.engine, problem.points[0].speed
+    drawn = random_forces(engine, speed, tolerances, builds, seed)
+    quantiles = tuple(float(q) for q in np.quantile(drawn, SHARES))
+    worst = worst_parts(engine, speed, tolerances)
+    return Spread(nominal_force(problem), worst, float(drawn.mean()), quantiles, speed)
+
+
+def compared(spreads: Mapping[str, Spread]) -> xr.Dataset:
+    """Several engines side by side as one labelled dataset."""
+    found = list(spreads.values())
 
     def newton(words: str) -> dict[str, str]:
         return {"units": "N", "long_name": words}
 
-    worst = np.array([list(own.values()) for own in parts])
+    causes = {
+        f"worst_{cause.replace(' ', '_')}": ("case", [own.worst[cause] for own in found], newton(f"from {cause} alone"))
+        for cause in CAUSES
+    }
+    worst = [sum(own.worst.values()) for own in found]
+    shares = np.array([own.random for own in found])
     return xr.Dataset(
         {
-            "nominal": ("case", nominal, newton("largest free force of the drawing")),
-            "worst": ("case", worst.sum(axis=1), newton("largest free force that tolerances add")),
-            "worst_part": (("case", "cause"), worst, newton("the same from one cause alone")),
-            "mean": ("case", table[:, 0], newton("mean of what tolerances add at random")),
-            "random": (("case", "share"), table[:, 1:], newton("largest free force of this share of random engines")),
+            "nominal": ("case", [own.nominal for own in found], newton("largest free force of the drawing")),
+            "worst": ("case", worst, newton("largest free force that tolerances add")),
+            **causes,
+            "mean": ("case", [own.mean for own in found], newton("mean of what tolerances add at random")),
+            "random": (("case", "share"), shares, newton("added free force that this share of random engines keeps")),
         },
         coords={
-            "case": list(problems),
-            "cause": list(parts[0]),
+            "case": list(spreads),
             "share": ("share", SHARES, {"units": "1", "long_name": "share of random engines that stay below"}),
-            "speed": ("case", [p.points[0].speed for p in problems.values()], {"units": "rad/s"}),
+            "speed": ("case", [own.speed for own in found], {"units": "rad/s"}),
         },
-        attrs={"title": "Tolerances against free forces", "kind": "tolerance", "seed": seed, "builds": builds},
+        attrs={"title": "Tolerances against free forces", "kind": "tolerance", "source": ""},
     )
+
+
+def verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
+    """What the source says of finer balancing, engine by engine, confirmed or not.
+
+    It promises nothing where the free force of the drawing is several times the worst sum of
+    tolerances: without tolerances at all the engine would shake as before.
+    """
+    found = []
+    for name in data["case"].values:
+        row = data.sel(case=name)
+        claim, times = str(row["claim"].item()), float(row["nominal"] / row["worst"])
+        if claim:
+            agrees = (times > SEVERAL) == (claim == "promises nothing")
+            why = f"promises nothing where the drawing leaves more than {SEVERAL:g} times what tolerances add at worst"
+            unit = "times the worst sum"
+            found.append(Verdict(f"finer balancing, {name}", claim, times, unit, agrees, why))
+    return tuple(found)

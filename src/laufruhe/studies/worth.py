@@ -19,15 +19,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 import xarray as xr
 
 from laufruhe.errors import ModelError
+from laufruhe.problem.study_costs import Judgement
 from laufruhe.studies.economics import Standing
 from laufruhe.studies.tractor.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 
-JUDGEMENTS = ("negligible", "noticeable", "better", "worth building", "not worth building")
+JUDGEMENTS: tuple[Judgement, ...] = get_args(Judgement)
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,9 @@ def _worth(data: xr.Dataset, build: str) -> Worth:
     fewer = min(_optimum(data, rival) for rival in _fewer(data, build))
     following = _named(data, Standing.NEXT)[0]
     further, beside = 1.0 - own / fewer, own / _optimum(data, following)
-    if further < NOTICEABLE:
+    if further < 0.0:
+        why = f"fewer shafts do better: {_percent(-further)} beside the best of them"
+    elif further < NOTICEABLE:
         size = "negligible" if further < NEGLIGIBLE else "slight"
         why = f"{size}: {_percent(-further)} beside the best with fewer shafts"
     elif beside > 1.0 + NEGLIGIBLE:
@@ -123,12 +127,12 @@ Rule = Callable[[xr.Dataset, str, str], tuple[bool, float, str]]
 def _negligible(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
     most = 1.0 - _bound(data, build) / _optimum(data, against)
     ours = -100.0 * _fall(data, build, against)
-    return most < NEGLIGIBLE, ours, f"W1: under {_percent(NEGLIGIBLE)}; proven, none of these shafts does more"
+    return most < NEGLIGIBLE, ours, f"W1: under {100.0 * NEGLIGIBLE:.0f} %; proven, none of these shafts does more"
 
 
 def _noticeable(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
     fall = _fall(data, build, against)
-    return fall >= NOTICEABLE, -100.0 * fall, f"W2: {_percent(NOTICEABLE)} or more"
+    return fall >= NOTICEABLE, -100.0 * fall, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
 
 
 def _better(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
@@ -180,5 +184,5 @@ def _fall(data: xr.Dataset, build: str, against: str) -> float:
     return 1.0 - _optimum(data, build) / _optimum(data, against)
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:+.1f} %" if share < 0 else f"{100.0 * share:.1f} %"
+def _percent(change: float) -> str:
+    return f"{100.0 * change:+.1f} %"

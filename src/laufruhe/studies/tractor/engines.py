@@ -60,7 +60,7 @@ THROWS: dict[int, tuple[float, ...]] = {
 FIRING_ORDERS: dict[int, tuple[int, ...]] = {
     1: (1,),
     2: (1, 2),
-    3: (1, 2, 3),
+    3: (1, 3, 2),
     4: (1, 3, 4, 2),
     6: (1, 5, 3, 6, 2, 4),
 }

@@ -1,0 +1,68 @@
+"""The study command: points, files, and what is said while they are made."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from laufruhe.errors import Complaint, InputError
+from laufruhe.problem.study_reader import load_study
+from laufruhe.report import files
+from laufruhe.studies import run
+from laufruhe.studies.kept import NAME
+
+SAID_EVERY = 0.2
+
+
+def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None]) -> tuple[str, str]:
+    """Files of a study in their folder; what to say of them, and all parts as JSON."""
+    if jobs is not None and jobs < 1:
+        complaint = Complaint("--jobs", str(jobs), "must be one or more", "leave it out to use every core")
+        raise InputError("laufruhe", (complaint,))
+    started = time.perf_counter()
+    study = load_study(path)
+    folder = out if out is not None else Path("results") / path.stem
+    kept = folder / NAME
+    datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or _cores())
+    # late: pictures and tables are not needed where the study is refused
+    from laufruhe.report.study_report import as_json, file_names, write_study
+
+    with files.staged(folder, "--out" if out is not None else "results", file_names(study)) as stage:
+        write_study(study, datasets, seconds, stage, shlex.join(["laufruhe", "study", str(path)]), say)
+    kept.unlink(missing_ok=True)
+    spent = "".join(f"{duration:8.1f} s  {name}\n" for name, duration in seconds.items())
+    text = f"{spent}done in {time.perf_counter() - started:.1f} s: {folder / files.REPORT}\n"
+    return text, as_json(study, datasets, seconds)
+
+
+class _Teller:
+    """How many points are done and how long the others will take, not more often than can be read."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._first: tuple[float, int] | None = None
+        self._last = 0.0
+
+    def __call__(self, done: int, whole: int) -> None:
+        now = time.perf_counter()
+        if self._first is None:
+            self._first = (now, done)
+        elif now - self._last < SAID_EVERY and done < whole:
+            return
+        self._last = now
+        self._say(f"{done} of {whole} points{self._left(now, done, whole)}")
+
+    def _left(self, now: float, done: int, whole: int) -> str:
+        began, before = self._first or (now, done)
+        if done <= before or done == whole:
+            return ""
+        seconds = (now - began) / (done - before) * (whole - done)
+        return f", about {seconds / 60.0:.0f} min left" if seconds >= 100.0 else f", about {seconds:.0f} s left"
+
+
+def _cores() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,222 @@
+"""The cone program of an affine problem as arrays, straight to Clarabel (P1).
+
+For studies, which solve thousands of small programs: `solvers.conic` states the same
+program in cvxpy, whose compiling takes as long as the solving. Nothing is kept between
+two solves, so a point's result hangs on that point alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import SolverError
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.solvers.affine import AffineNorm, AffineProblem, reach
+from laufruhe.solvers.certificate import Multipliers
+from laufruhe.solvers.domain import Domain
+
+Array = NDArray[np.float64]
+
+# flat optima need a small gap before their decisions are digits one can build
+TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
+
+
+@dataclass(frozen=True, eq=False)
+class ConicSolution:
+    """What the cone solver returned; nothing in it is believed before it is evaluated.
+
+    Attributes
+    ----------
+    x
+        Decision vector; None where the limits cannot be met together.
+    multipliers
+        Dual rows of terms and limits.
+    solver_seconds
+        Spent inside the cone solver.
+    iterations
+        Of the interior-point method.
+    """
+
+    x: Array | None
+    multipliers: Multipliers
+    solver_seconds: float
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """One norm: its columns of heads and its rows in the program.
+
+    Attributes
+    ----------
+    unit
+        Rows are counted in it.
+    heads
+        First column, and how many follow.
+    """
+
+    norm: AffineNorm
+    unit: float
+    heads: tuple[int, int]
+
+    @property
+    def factors(self) -> Array:
+        """What each row is multiplied by inside its cone."""
+        rms = self.norm.norm is Norm.RMS
+        return np.sqrt(self.norm.weights) if rms else np.ones(len(self.norm.weights))
+
+    @property
+    def value(self) -> Array:
+        """The norm as a linear function of its heads."""
+        return self.norm.weights if self.norm.norm is Norm.SUM else np.ones(1)
+
+
+class _Rows:
+    """A x + s = b, s in a product of cones: blocks of rows as they are added."""
+
+    def __init__(self, columns: int) -> None:
+        self.columns = columns
+        self.entries: list[tuple[NDArray[np.int64], NDArray[np.int64], Array]] = []
+        self.right: list[Array] = []
+        self.cones: list[Any] = []
+        self.count = 0
+
+    def add(self, rows: Any, columns: Any, values: Any, right: Array) -> None:
+        """Entries, their rows counted from the block's first."""
+        at, across, numbers = np.broadcast_arrays(rows, columns, values)
+        self.entries.append((at.ravel() + self.count, across.ravel(), numbers.ravel()))
+        self.right.append(right)
+        self.count += len(right)
+
+    def matrix(self) -> Any:
+        from scipy.sparse import csc_array
+
+        rows, columns, values = (np.concatenate([entry[k] for entry in self.entries]) for k in range(3))
+        used = values != 0.0
+        return csc_array((values[used], (rows[used], columns[used])), shape=(self.count, self.columns))
+
+
+def solve_direct(problem: AffineProblem) -> ConicSolution:
+    """Least weighted sum of norms under limits.
+
+    Raises
+    ------
+    SolverError
+        If the solver stops without telling optimal from infeasible.
+    """
+    import clarabel
+
+    unit = reach(problem, [norm for _, norm in problem.terms])
+    blocks: list[_Block] = []
+    columns = problem.size
+    for norm, size in [
+        *((norm, unit) for _, norm in problem.terms),
+        *((norm, reach(problem, [norm])) for _, norm in problem.limits),
+    ]:
+        heads = len(norm.weights) if norm.norm is Norm.SUM else 1
+        blocks.append(_Block(norm, size, (columns, heads)))
+        columns += heads
+    rows = _Rows(columns)
+    for domain in problem.domains:
+        _add_domain(rows, domain, float(problem.units[domain.start]))
+    for (maximum, _), block in zip(problem.limits, blocks[len(problem.terms) :], strict=True):
+        rows.add(0, np.arange(*_span(block)), block.value, np.array([maximum / block.unit]))
+        rows.cones.append(clarabel.NonnegativeConeT(1))
+    starts = [_add_norm(rows, block, problem) for block in blocks]
+    cost = np.zeros(columns)
+    for (weight, _), block in zip(problem.terms, blocks, strict=False):
+        cost[slice(*_span(block))] = weight * block.value
+    return _answer(problem, blocks, starts, _solved(rows, cost))
+
+
+def _solved(rows: _Rows, cost: Array) -> Any:
+    import clarabel
+    from scipy.sparse import csc_array
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    for name, tolerance in TIGHT.items():
+        setattr(settings, name, tolerance)
+    nothing = csc_array((rows.columns, rows.columns))
+    right = np.concatenate(rows.right)
+    return clarabel.DefaultSolver(nothing, cost, rows.matrix(), right, rows.cones, settings).solve()
+
+
+def _answer(problem: AffineProblem, blocks: list[_Block], starts: list[int], found: Any) -> ConicSolution:
+    status, seconds, iterations = str(found.status), float(found.solve_time), int(found.iterations)
+    if "PrimalInfeasible" in status:
+        return ConicSolution(None, Multipliers((), ()), seconds, iterations)
+    if "Solved" not in status:
+        raise SolverError(f"the cone solver stopped with status '{status}'")
+    x = np.asarray(found.x)[: problem.size] * problem.units
+    for domain in problem.domains:
+        x[domain.columns] = domain.project(x)
+    duals = np.asarray(found.z)
+    unit = blocks[0].unit if problem.terms else 1.0
+    rows = [_dual_rows(block, duals, start, unit) for block, start in zip(blocks, starts, strict=True)]
+    terms = tuple(z / weight for z, (weight, _) in zip(rows, problem.terms, strict=False))
+    return ConicSolution(x, Multipliers(terms, tuple(rows[len(terms) :])), seconds, iterations)
+
+
+def _span(block: _Block) -> tuple[int, int]:
+    return block.heads[0], block.heads[0] + block.heads[1]
+
+
+def _add_domain(rows: _Rows, domain: Domain, unit: float) -> None:
+    """The decision's own set, in units of a size (P4)."""
+    import clarabel
+
+    upper, lower = domain.decision.upper / unit, domain.decision.lower / unit
+    if domain.width == 1:
+        rows.add([0, 1], domain.start, [1.0, -1.0], np.array([upper, -lower]))
+        rows.cones.append(clarabel.NonnegativeConeT(2))
+        return
+    if len(domain.edges):
+        (ax, ay), (bx, by) = domain.edges
+        across = np.array([domain.start, domain.start + 1])
+        rows.add([[0], [1]], across, [[ay, -ax], [-by, bx]], np.zeros(2))
+        rows.cones.append(clarabel.NonnegativeConeT(2))
+    rows.add([1, 2], [domain.start, domain.start + 1], -1.0, np.array([upper, 0.0, 0.0]))
+    rows.cones.append(clarabel.SecondOrderConeT(3))
+
+
+def _add_norm(rows: _Rows, block: _Block, problem: AffineProblem) -> int:
+    """V0 + B x in a cone a row, or in one cone for a root mean square; returns the first row."""
+    import clarabel
+
+    norm, start = block.norm, rows.count
+    k, d = norm.constant.shape
+    slope = norm.slope * (problem.units / block.unit) * block.factors[:, None, None]
+    constant = norm.constant / block.unit * block.factors[:, None]
+    whole = norm.norm is Norm.RMS
+    # rows of the program in the order of its cones: a head, then what is under it
+    width = k * d + 1 if whole else d + 1
+    heads = np.zeros(1, dtype=int) if whole else np.arange(k) * width
+    under = (1 + np.arange(k * d).reshape(k, d)) if whole else heads[:, None] + 1 + np.arange(d)
+    right = np.zeros(width if whole else k * width)
+    right[under] = constant
+    places = np.broadcast_to(under[:, :, None], slope.shape)
+    across = np.broadcast_to(np.arange(problem.size), slope.shape)
+    head_columns = block.heads[0] + (np.arange(k) if norm.norm is Norm.SUM else np.zeros(len(heads), dtype=int))
+    rows.add(
+        np.concatenate([heads, places.ravel()]),
+        np.concatenate([head_columns, across.ravel()]),
+        np.concatenate([np.full(len(heads), -1.0), -slope.ravel()]),
+        right,
+    )
+    rows.cones += [clarabel.SecondOrderConeT(width)] * (1 if whole else k)
+    return start
+
+
+def _dual_rows(block: _Block, duals: Array, start: int, objective_unit: float) -> Array:
+    """mu Z of the rows [SI] (P2), in the objective's own unit."""
+    k, d = block.norm.constant.shape
+    if block.norm.norm is Norm.RMS:
+        z = -duals[start + 1 : start + 1 + k * d].reshape(k, d)
+    else:
+        z = -duals[start : start + k * (d + 1)].reshape(k, d + 1)[:, 1:]
+    return np.asarray(z * block.factors[:, None] * (objective_unit / block.unit))

@@ -1,0 +1,189 @@
+"""What a study keeps of a solved scene, and the dataset that scenes make together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from laufruhe.errors import SolverError
+from laufruhe.problem.evaluation import Evaluation, measured
+from laufruhe.problem.model import Problem
+from laufruhe.problem.study_parts import SweptPartTable
+from laufruhe.problem.study_sweeps import Axis, axis_of
+from laufruhe.solvers import solve, state
+from laufruhe.solvers.result import Result
+from laufruhe.studies.scenes import Point
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+AS_GIVEN, FAILED = "as given", "failed"
+LABELS = ("mount", "decision", "case", "status", "proof")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a study keeps of one scene [SI].
+
+    Attributes
+    ----------
+    metric, unit
+        Of the objective.
+    status, proof
+        As of a result; "as given" where nothing was open.
+    objective_given, objective, lower_bound
+        Of the design as given and as decided, and what no design falls below; NaN where
+        there is none.
+    mounts
+        Names.
+    mean_given, maximum_given, mean, maximum
+        Per mount [N]; means over the operating points by their weights.
+    decisions, units
+        Values decided, by name.
+    """
+
+    metric: str
+    unit: str
+    status: str
+    proof: str
+    objective_given: float
+    objective: float
+    lower_bound: float
+    mounts: list[str]
+    mean_given: list[float]
+    maximum_given: list[float]
+    mean: list[float]
+    maximum: list[float]
+    decisions: dict[str, float]
+    units: dict[str, str]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For the file of finished points."""
+        return asdict(self)
+
+
+def solved(problem: Problem) -> Outcome:
+    """Solve a scene; one that no solver answers is kept as failed."""
+    try:
+        result = solve(problem, many=True)
+    except SolverError:
+        return _outcome(state(problem), FAILED, "none")
+    proof = str(result.certificate.kind) if result.certificate else AS_GIVEN if _is_closed(problem) else "none"
+    return _outcome(result, str(result.status), proof)
+
+
+def _outcome(shown: Result, status: str, proof: str) -> Outcome:
+    nothing = math.nan
+    objective, designed = shown.objective, status not in (FAILED, "infeasible")
+    before = _over_points(shown.problem, shown.initial)
+    after = _over_points(shown.problem, shown.final) if designed else [(nothing, nothing)] * len(before)
+    return Outcome(
+        metric=objective.name if objective else "",
+        unit=objective.unit if objective else "",
+        status=status,
+        proof=proof,
+        objective_given=objective.initial if objective else nothing,
+        objective=objective.value if objective and designed else nothing,
+        lower_bound=shown.certificate.lower_bound if shown.certificate else nothing,
+        mounts=shown.initial.mount_names if shown.initial.engine.mounts else [],
+        mean_given=[mean for mean, _ in before],
+        maximum_given=[most for _, most in before],
+        mean=[mean for mean, _ in after],
+        maximum=[most for _, most in after],
+        decisions={decision.name: decision.value for decision in shown.decisions},
+        units={decision.name: decision.unit for decision in shown.decisions},
+    )
+
+
+def _is_closed(problem: Problem) -> bool:
+    return not problem.decisions and problem.phasing is None and not problem.mount_design.asked
+
+
+def _over_points(problem: Problem, evaluation: Evaluation) -> list[tuple[float, float]]:
+    """Mean and maximum of every mount over the operating points [N]."""
+    if not evaluation.engine.mounts:
+        return []
+    each = [measured(evaluation, k) for k in range(len(problem.points))]
+    weights = [point.weight for point in problem.points]
+    return [
+        (
+            sum(w * m.mean for w, m in zip(weights, of_mount, strict=True)) / sum(weights),
+            max(m.max for m in of_mount),
+        )
+        for of_mount in zip(*each, strict=True)
+    ]
+
+
+def axes_of(part: SweptPartTable) -> list[Axis]:
+    """What the part sweeps."""
+    return [axis_of(sweep) for sweep in part.sweep]
+
+
+def coordinates(axes: Sequence[Axis], points: Sequence[Point]) -> dict[str, Any]:
+    """Swept values along the points, as numbers with their unit, or as labels."""
+    found: dict[str, Any] = {}
+    for axis in axes:
+        values = [point.changes[axis.quantity] for point in points]
+        number = axis.by_value()
+        shown = [str(value) for value in values] if axis.numbers is None else [number[value] for value in values]
+        found[axis.quantity] = ("point", shown, {"units": axis.unit, "long_name": axis.name, "swept": 1})
+    return found
+
+
+def dataset(
+    part: SweptPartTable, points: Sequence[Point], records: Sequence[Mapping[str, Any]], extra: Mapping[str, Any]
+) -> xr.Dataset:
+    """One labelled dataset of a part, along its points.
+
+    Engines of one part may have different mounts and decisions; those that one lacks are NaN.
+
+    Parameters
+    ----------
+    extra
+        Coordinates along the points.
+    """
+    import numpy as np
+    import xarray as xr
+
+    outcomes = [Outcome(**record) for record in records]
+    mounts = list(dict.fromkeys(name for o in outcomes for name in o.mounts))
+    decided = {name: unit for o in outcomes for name, unit in o.units.items()}
+    metrics = {o.metric: o.unit for o in outcomes if o.metric}
+
+    def per_mount(name: str) -> tuple[tuple[str, str], Any, dict[str, str]]:
+        rows = [dict(zip(o.mounts, getattr(o, name), strict=True)) for o in outcomes]
+        values = np.array([[row.get(mount, np.nan) for mount in mounts] for row in rows], dtype=float)
+        words = f"{name.replace('_', ' ')} of the mount's force"
+        return ("point", "mount"), values.reshape(len(rows), len(mounts)), {"units": "N", "long_name": words}
+
+    def each(name: str, words: str) -> tuple[str, Any, dict[str, str]]:
+        return "point", np.array([getattr(o, name) for o in outcomes]), {"units": unit, "long_name": words}
+
+    # metrics of one part are of one dimension, or `check_metrics` has refused them
+    unit = next(iter(metrics.values()), "")
+    metric = next(iter(metrics), "") if len(metrics) == 1 else "objective"
+    values = np.array([[o.decisions.get(name, np.nan) for name in decided] for o in outcomes], dtype=float)
+    return xr.Dataset(
+        {
+            "objective_given": each("objective_given", f"{metric} of the design as given"),
+            "objective": each("objective", f"{metric} of the design as decided"),
+            "lower_bound": each("lower_bound", f"{metric} that no design falls below"),
+            **{name: per_mount(name) for name in ("mean_given", "maximum_given", "mean", "maximum")},
+            "decided": (
+                ("point", "decision"), values.reshape(len(outcomes), len(decided)),
+                {"long_name": "value decided, in decision_unit"},
+            ),
+        },
+        coords={
+            "mount": mounts,
+            "decision": list(decided),
+            "decision_unit": ("decision", list(decided.values())),
+            "case": ("point", [point.case.name for point in points]),
+            "status": ("point", [o.status for o in outcomes]),
+            "proof": ("point", [o.proof for o in outcomes]),
+            **extra,
+        },
+        attrs={"title": part.title, "kind": part.settings()["kind"], "source": part.source, "metric": metric},
+    )  # fmt: skip

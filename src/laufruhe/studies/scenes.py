@@ -1,0 +1,105 @@
+"""The scenes of a study: read once, changed point by point, solved, and told apart by all that they hang on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from laufruhe import __version__
+from laufruhe.errors import Complaint, InputError, ModelError
+from laufruhe.problem.model import Problem
+from laufruhe.problem.reader import load_tables, tables_of
+from laufruhe.problem.study_parts import CaseTable
+from laufruhe.problem.study_reader import scene_tables
+from laufruhe.studies.equal_power import at_equal_power
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@dataclass(frozen=True)
+class Point:
+    """One piece of work of a part, not yet done.
+
+    Attributes
+    ----------
+    case
+        The scene.
+    changes
+        Values put into it, by their paths.
+    metric
+        In place of the scene's own objective.
+    shafts
+        Balancer shafts kept; all when None.
+    """
+
+    case: CaseTable
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    metric: str | None = None
+    shafts: tuple[str, ...] | None = None
+
+    def __str__(self) -> str:
+        return ", ".join([self.case.name, *(f"{path} = {value}" for path, value in self.changes.items())])
+
+
+class Scenes:
+    """Problem files of a study, each read once.
+
+    Parameters
+    ----------
+    folder
+        That problem files are named from.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._files: dict[Path, dict[str, Any]] = {}
+
+    def tables(self, point: Point) -> dict[str, Any]:
+        """Tables of the problem of a point; not to be changed."""
+        path = self.folder / point.case.problem
+        if path not in self._files:
+            self._files[path] = tables_of(path)
+        return scene_tables(self._files[path], point.case, point.changes, path, point.metric)
+
+    def problem(self, point: Point) -> Problem:
+        """The problem of a point at the power that its case asks for, with all of its shafts.
+
+        Raises
+        ------
+        InputError
+            If the problem file is bad, has no such quantity, or what is made of it is bad.
+        """
+        problem = load_tables(self.tables(point), self.folder / point.case.problem)
+        reference = point.case.equal_power_to
+        if reference is None:
+            return problem
+        with self.blamed(point, "equal_power_to"):
+            return at_equal_power(problem, reference)
+
+    @contextmanager
+    def blamed(self, point: Point, where: str = "point") -> Iterator[None]:
+        """A machine that cannot exist or run is the fault of this point."""
+        try:
+            yield
+        except ModelError as error:
+            rule, _, remedy = str(error).partition("; ")
+            path = self.folder / point.case.problem
+            raise InputError(str(path), (Complaint(where, f'"{point}"', rule, remedy),)) from None
+
+    def fingerprint(self, point: Point, settings: Mapping[str, Any]) -> str:
+        """Of everything that a point hangs on: scene, files that it names, what is asked, and this package."""
+        tables = self.tables(point)
+        about = [settings, point.case.problem, point.case.equal_power_to, point.shafts, tables, __version__]
+        found = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
+        gas = tables.get("gas")
+        named = gas.get("file") if isinstance(gas, dict) else None
+        if isinstance(named, str):
+            trace = (self.folder / point.case.problem).parent / named
+            found.update(trace.read_bytes() if trace.is_file() else b"")
+        return found.hexdigest()[:32]

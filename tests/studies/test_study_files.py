@@ -1,0 +1,177 @@
+"""Study files: what is refused, in one line and before anything is computed or written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from laufruhe.cli import app
+from laufruhe.errors import InputError
+from laufruhe.problem.reader import load
+from laufruhe.problem.study_parts import CaseTable, SweepTable
+from laufruhe.problem.study_paths import field_at
+from laufruhe.problem.study_reader import load_study
+from laufruhe.problem.study_sweeps import axis_of
+from laufruhe.studies import Point, Scenes, run
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+SPEED = "operating_points.1.mean_piston_speed"
+FRACTION = "counterweights.web.balance_fraction"
+
+
+def study(
+    kind: str = "counterweight fraction", sweep: str = "", problem: str = "tractor-single", more: str = ""
+) -> str:
+    return (
+        f'title = "t"\n[study]\n[[study.parts]]\nname = "p"\nkind = "{kind}"\ntitle = "t"\n{more}\n{sweep}\n'
+        f'[[study.parts.cases]]\nname = "one"\nproblem = "{PROBLEMS / problem}.toml"\n'
+    )
+
+
+def swept(quantity: str, text: str) -> str:
+    return f'[[study.parts.sweep]]\nquantity = "{quantity}"\n{text}\n'
+
+
+def case(name: str, problem: str, more: str = "") -> str:
+    return f'[[study.parts.cases]]\nname = "{name}"\nproblem = "{problem}"\n{more}\n'
+
+
+VEE = PROBLEMS / "vee-six-60.toml"
+FOUR = PROBLEMS / "tractor-four-lanchester.toml"
+LONGER = case("T", str(FOUR), 'set = { "engine.stroke" = "100 mm" }')
+BAD = [
+    (study("counterweight fracton"), "did you mean 'counterweight fraction'?"),
+    (study().replace('kind = "counterweight fraction"', ""), "study.parts[1].kind: is missing; use one of:"),
+    (study(sweep=swept(FRACTION, "values = []")), "study.parts[1].sweep[1].values = []: is empty"),
+    (study(sweep=swept(FRACTION, "values = [0.5]")), "holds one value, which is no sweep"),
+    (study(sweep=swept(FRACTION, "values = [0.5, 0.5]")), "names a value twice"),
+    (study(sweep=swept(SPEED, 'values = ["6 m/s", "600 cm/s"]')), "names a value twice"),
+    (study(sweep=swept(SPEED, 'values = ["6 m/s", "8 kg"]')), "'kg' is not a unit of a speed"),
+    (study(sweep=swept(SPEED, 'values = ["6 m/s", "8"]')), "has no unit"),
+    (study(sweep=swept(SPEED, 'values = [8, "6 m/s"]')), "mixes numbers with and without a unit"),
+    (study(sweep=swept(SPEED, 'from = "6 m/s"\nto = "12 m/s"\npoints = 1')), "points = 1: makes no sweep"),
+    (study(sweep=swept(SPEED, 'from = "6 m/s"\nto = "12 m/s"\npoints = 1000000')), "is more than"),
+    (study(sweep=swept(SPEED, 'from = "12 m/s"\nto = "6 m/s"\npoints = 3')), "lies above to"),
+    (study(sweep=swept(SPEED, 'from = "6 m/s"\nto = "6 m/s"\npoints = 3')), "equals to"),
+    (study(sweep=swept(SPEED, 'from = "6 m/s"\nto = "12 mm"\npoints = 3')), "'mm' is not a unit of a speed"),
+    (study(sweep=swept(SPEED, 'from = "fast"\nto = "faster"\npoints = 3')), "is not a number with a unit"),
+    (study(sweep=swept(SPEED, 'from = "6 m/s"\npoints = 3')), "sweep[1].to: is missing"),
+    (study(sweep=swept(SPEED, "")), "values: is missing; add values, or from, to and points"),
+    (study(sweep=swept(SPEED, 'values = ["6 m/s", "8 m/s"]\npoints = 3')), "are given beside from"),
+    (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "log"')), "has no logarithm"),
+    (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "cubic"')), "use one of: linear, log"),
+    (study(sweep=2 * swept(FRACTION, "values = [0, 1]")), "is swept twice"),
+    (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{FRACTION}" = 0.5 }}', "is swept, and set by"),
+    (study(sweep=swept("engine.rod_ration", "values = [0.2, 0.3]")), "did you mean 'rod_ratio'?"),
+    (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "is no quantity of this scene"),
+    (study(sweep=swept("engine.rod_ratio", "values = [0.2, 1.2]")), "rod_ratio"),
+    (study(problem="tractor-four-lanchester"), "leaves no balance fraction open"),
+    (study("balancer sizing"), "nothing to size"),
+    (study("layout comparison", problem="nowhere"), "does not exist"),
+    (study("layout comparison", problem="tractor-study"), "makes this a study file"),
+    (study("layout comparison") + case("one", "x.toml"), "two cases of one name"),
+    (study("layout comparison") + case("V", str(VEE)) + "equal_power_to = 4", "differs between cases"),
+    (study("layout comparison", problem="tractor-four-lanchester") + LONGER,
+     "compare layouts of one cylinder"),
+    (study("layout comparison", more='metric = "mean mount torque"'), "did you mean"),
+    (study() + 'without = ["gass"]', "did you mean 'gas'?"),
+    ('title = "a problem"\n', "so this is no study file"),
+    ('title = "t"\n[study]\n', "study.parts: is missing; add"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "said"), BAD, ids=[said for _, said in BAD])
+def test_refused_in_one_line_and_nothing_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text(text, encoding="utf-8")
+    answer = CliRunner().invoke(app, ["study", "s.toml"])
+    assert answer.exit_code == 2, answer.output
+    assert said in answer.stderr
+    assert answer.stderr.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["s.toml"]
+
+
+def test_problem_given_to_study_and_study_to_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="use laufruhe solve for a problem"):
+        load_study(PROBLEMS / "tractor-single.toml")
+    for command in ("solve", "evaluate", "check"):
+        answer = CliRunner().invoke(app, [command, str(PROBLEMS / "tractor-sweeps.toml")])
+        assert answer.exit_code == 2
+        assert "makes this a study file; use laufruhe study" in answer.stderr
+    with pytest.raises(InputError, match="use laufruhe study"):
+        load(PROBLEMS / "tractor-sweeps.toml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_equal_power_needs_one_cylinder(tmp_path: Path) -> None:
+    """Two cylinders of different stroke on one crank have no one scale."""
+    text = (
+        'title = "t"\n[engine]\nlayout = "parts"\ncycle = "two-stroke"\nstroke = "100 mm"\nrod_ratio = 0.25\n'
+        'reciprocating_mass = "1 kg"\n[[engine.slider_cranks]]\nx = "0 mm"\n'
+        '[[engine.slider_cranks]]\nx = "100 mm"\nstroke = "120 mm"\n'
+        '[[operating_points]]\nspeed = "2000 rpm"\n[objective]\nminimise = "rms shaking force"\n'
+    )
+    (tmp_path / "banks.toml").write_text(text, encoding="utf-8")
+    banks = CaseTable(name="banks", problem="banks.toml", equal_power_to=4)
+    assert Scenes(tmp_path).problem(Point(banks.model_copy(update={"equal_power_to": None})))
+    with pytest.raises(
+        InputError, match=r"equal_power_to = \"banks\": cylinders differ in bore or stroke.*; make them equal"
+    ):
+        Scenes(tmp_path).problem(Point(banks))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "keys", "unit", "numbers"),
+    [
+        (SPEED, {"from": "6 m/s", "to": "12 m/s", "points": 4}, "m/s", (6.0, 8.0, 10.0, 12.0)),
+        (SPEED, {"values": ["6 m/s", "36 km/h"]}, "m/s", (6.0, 10.0)),
+        ("operating_points.1.speed", {"values": ["600 rpm", "20 Hz"]}, None, None),
+        ("engine.rod_ratio", {"from": 0.1, "to": 0.3, "points": 3}, "1", (0.1, 0.2, 0.3)),
+        ("engine.throws.2", {"values": [90, 180]}, "deg", (90.0, 180.0)),
+        ("gas.imep", {"from": "1 bar", "to": "100 bar", "points": 3, "spacing": "log"}, "bar", (1.0, 10.0, 100.0)),
+        ("engine.layout", {"values": ["inline", "vee"]}, "", None),
+        ("operating_points.1.motored", {"values": [True, False]}, "", None),
+    ],
+)  # fmt: skip
+def test_swept_values_are_numbers_with_their_unit(
+    quantity: str, keys: dict[str, object], unit: str | None, numbers: tuple[float, ...] | None
+) -> None:
+    sweep = SweepTable.model_validate({"quantity": quantity, **keys})
+    if unit is None:
+        with pytest.raises(Exception, match="Hz"):
+            axis_of(sweep)
+        return
+    axis = axis_of(sweep)
+    assert axis.unit == unit
+    if numbers is None:
+        assert axis.numbers is None
+    else:
+        assert axis.numbers == pytest.approx(numbers, rel=1e-11)
+
+
+def test_paths_know_their_field() -> None:
+    found = field_at("balancer_shafts.front.unbalances.1.unbalance")
+    assert found is not None
+    assert found.unit == "kg m"
+    assert field_at("engine.layout") is None
+    assert field_at("engine.no.such.path") is None
+
+
+def test_equal_power_is_eq_23(tmp_path: Path) -> None:
+    """Rebuilt and evaluated, forces are those of the reference over the ratio of cylinders."""
+    more = 'without = ["balancer_shafts"]\n'
+    text = study("layout comparison", problem="tractor-two") + more
+    found = []
+    for power in ("", "equal_power_to = 4\n"):
+        path = tmp_path / "s.toml"
+        path.write_text(text + power, encoding="utf-8")
+        found.append(run(load_study(path), tmp_path, tmp_path / "kept" / "k")[0]["p"])
+    # gas samples and the solver's grid are the same, so only rounding is left
+    assert found[1]["objective_given"].values == pytest.approx(2.0 * found[0]["objective_given"].values, rel=1e-9)
+    assert found[1]["objective"].values == pytest.approx(2.0 * found[0]["objective"].values, rel=1e-4)
+    assert found[1].attrs["at"] == "the power of 4 cylinders"
