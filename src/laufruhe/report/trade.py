@@ -14,6 +14,7 @@ from laufruhe.studies.trade_optima import is_local
 
 DASH = "-"
 ALIKE = 1.3
+TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
 LOCAL = (
     " Mounts are decided here: every fidelity searches from the design as given alone, and finds an optimum nearby. "
     "Choices about modes and time would change with the mounts, so they decide nothing. "
@@ -76,15 +77,20 @@ def _beyond(found: Trade) -> list[str]:
 
 
 def advice(found: Trade) -> str:
-    """The cheapest fidelity whose number, and whose decision, are good to a thousandth."""
+    """The choices in words."""
+    number, decided = choices(found)
+    text = f"`{number.name}` where a number good to 0.1 % is wanted ({_time(number.evaluation)} a design)"
+    if decided is not None:
+        text += f"; `{decided.name}` to decide, its optimum is within 0.1 % of the best ({_time(decided.solve)})"
+    return text + "."
+
+
+def choices(found: Trade) -> tuple[Row, Row | None]:
+    """The cheapest fidelity whose number, and the cheapest whose decision, is good to a thousandth."""
     good = [row for row in found.rows if row.error <= 1e-3]
     number = _quick(good, lambda row: row.evaluation) if good else found.rows[-1]
-    text = f"`{number.name}` where a number good to 0.1 % is wanted ({_time(number.evaluation)} a design)"
-    decided = [row for row in found.rows if not math.isnan(row.regret) and row.regret <= 1e-3]
-    if decided:
-        best = _quick(decided, lambda row: row.solve)
-        text += f"; `{best.name}` to decide, its optimum is within 0.1 % of the best ({_time(best.solve)})"
-    return text + "."
+    deciding = [row for row in found.rows if not math.isnan(row.regret) and row.regret <= 1e-3]
+    return number, _quick(deciding, lambda row: row.solve) if deciding else None
 
 
 def _quick(rows: Sequence[Row], time: Callable[[Row], float]) -> Row:
@@ -109,39 +115,64 @@ def as_json(found: Trade) -> str:
 
 
 def index(trades: Sequence[Trade]) -> str:
-    """One line for every problem."""
+    """One line for every problem, and what they have in common."""
     lines = [
         "# Speed against accuracy",
         "",
-        "Which fidelity to take, measured on every ready problem. In short:",
+        f"Which fidelity to take, measured on {len(trades)} ready problems. In short:",
         "",
-        "- `auto` is the safe choice: it says how wrong it can be, and is not more wrong than that.",
-        "- The two-order formulas of textbooks cost up to 2 % of the number, and up to 2 % of the design. "
+        "- `auto` is the safe choice: it says how wrong it can be, and is not more wrong than that. Where nothing but "
+        "modes or sag is asked, no load needs to be computed.",
+        f"- {_cost(trades, TWO_ORDER, 'The two-order formulas of textbooks cost')} "
         "Engines whose second order cancels are left with what these formulas leave out.",
-        "- Leaving gas out is what costs most: it decides how the roll moment is balanced.",
+        f"- {_cost(trades, NO_GAS, 'Leaving gas out costs')} It decides how the roll moment is balanced.",
+        f"- {_cost(trades, RIGID, 'Taking elastic mounts for rigid costs')} A few modes are no way out: "
+        "all that the scene excites take the same time.",
         "- More than 720 steps a cycle serve peaks and proofs, not means.",
         "- Regret may be far below the error, for an optimum is flat, and far above it: what a shaft is wrongly made "
         "to balance stays. Read both columns.",
         "",
-        "| problem | take | error of two-order | of no gas | of auto 0.001 | regret of two-order | of auto 0.001 "
-        "| uneven speed |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |",
+        "| problem | for a number good to 0.1 % | a design | to decide within 0.1 % | a solve "
+        "| error of two-order | of no gas | of auto 0.001 | regret of two-order | of auto 0.001 | uneven speed |",
+        "| --- | --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
-    for found in trades:
-        named = {row.name: row for row in found.rows}
-        two, auto = named.get("two-order, 720 steps"), named.get("auto 0.001")
-        gas = named.get("exact without gas, 720 steps")
-        name = found.problem.name
-        lines.append(
-            f"| [{name}]({name}.md) | {advice(found)} | {_error(two)} | {_error(gas)} | {_error(auto)} "
-            f"| {_regret(two)} | {_regret(auto)} | {_uneven(found)} |"
-        )
-    lines += [
-        "",
-        "A dash: the problem has no such part, leaves nothing open, or asks of mounts alone what no load enters.",
-    ]
+    lines += [_index_line(found) for found in trades]
+    lines += ["", "A dash: the problem has no such part, leaves nothing open, or asks of mounts what no load enters."]
     lines += ["", "*Uneven speed*: what a flywheel that leaves 2 % of unevenness changes of the objective."]
     return "\n".join(lines) + "\n"
+
+
+def _index_line(found: Trade) -> str:
+    two, auto, gas = (_named(found, name) for name in (TWO_ORDER, "auto 0.001", NO_GAS))
+    number, decided = choices(found)
+    deciding = f"`{decided.name}` | {_time(decided.solve)}" if decided else f"{DASH} | {DASH}"
+    name = found.problem.name
+    return (
+        f"| [{name}]({name}.md) | `{number.name}` | {_time(number.evaluation)} | {deciding} | {_error(two)} "
+        f"| {_error(gas)} | {_error(auto)} | {_regret(two)} | {_regret(auto)} | {_uneven(found)} |"
+    )
+
+
+def _named(found: Trade, name: str) -> Row | None:
+    return next((row for row in found.rows if row.name == name), None)
+
+
+def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
+    """What a fidelity costs of the number and of the design, at worst and in the middle."""
+    rows = [row for found in trades if found.problem.objective and (row := _named(found, name)) is not None]
+    errors = sorted(row.error for row in rows)
+    regrets = sorted(max(row.regret, 0.0) for row in rows if not math.isnan(row.regret))
+    if not errors:
+        return f"{what} nothing that these problems show."
+    middle = _percent(errors[len(errors) // 2])
+    text = f"{what} up to {_percent(errors[-1])} of the number, {middle} in the middle of {len(errors)} problem(s)"
+    if regrets:
+        text += f"; of the design up to {_percent(regrets[-1])}, {_percent(regrets[len(regrets) // 2])} in the middle"
+    return text + "."
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
 
 
 def _line(row: Row) -> str:
