@@ -61,7 +61,7 @@ def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
 def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[str, str]:
     """Pages and pictures of every problem, an index of them all; returns the index and JSON."""
     from laufruhe.plots.style import save
-    from laufruhe.plots.trade import figure
+    from laufruhe.plots.trade import figure, has_picture
     from laufruhe.report import files
     from laufruhe.report import trade as report
     from laufruhe.studies.trade import trade
@@ -73,9 +73,11 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
         found.append(one)
         names = (f"{problem.name}.md", f"{problem.name}.png")
         with files.staged(folder, "--out", names) as stage:
-            save(figure(one), stage / names[1])
+            drawn = has_picture(one)
+            if drawn:
+                save(figure(one), stage / names[1])
             command = shlex.join(["laufruhe", "trade", str(path)])
-            files.write(stage / names[0], report.as_page(one, names[1], command))
+            files.write(stage / names[0], report.as_page(one, names[1] if drawn else None, command))
         data.append(report.as_json(one).strip())
     index = report.index(found)
     if len(found) > 1:

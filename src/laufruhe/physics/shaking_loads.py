@@ -70,6 +70,11 @@ def _slider_crank_loads(
     return kept
 
 
+def forget() -> None:
+    """Drop the loads that are remembered, for whoever measures what they cost."""
+    _slider_crank_loads.cache_clear()
+
+
 def _kept(loads: Spectrum, fidelity: Fidelity) -> Spectrum:
     """The orders that a fidelity keeps (F1)."""
     return loads if fidelity.orders is None else loads.kept(fidelity.orders)

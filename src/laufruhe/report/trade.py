@@ -26,8 +26,8 @@ HEAD = (
 )
 
 
-def as_page(found: Trade, picture: str, command: str) -> str:
-    """Table, picture and the choice for one problem."""
+def as_page(found: Trade, picture: str | None, command: str) -> str:
+    """Table, picture if there is one, and the choice for one problem."""
     problem = found.problem
     optimum = "" if math.isnan(found.optimum) else f", of its optimum {found.optimum:.6g}"
     sections = [
@@ -35,7 +35,9 @@ def as_page(found: Trade, picture: str, command: str) -> str:
         f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
         f"(SI). {_digits(found)}",
         f"**Take** {advice(found)}",
-        f"![Time against error of every fidelity; colour is regret]({picture})",
+        f"![Time against error of every fidelity; colour is regret]({picture})"
+        if picture
+        else "No load enters what is asked, so every fidelity gives the same number.",
         "\n".join([HEAD, *(_line(row) for row in found.rows)]),
         "*Another design*: objective with the scene prepared. *Gradient*: with its derivatives by all decisions. "
         "*Solve*: optimum from nothing, at this fidelity's own angles. *From nothing*: engine to objective. "
