@@ -58,7 +58,7 @@ def figure(found: Trade) -> Figure:
     hollow = "" if decides.all() else " Hollow: nothing decided."
     heading(
         drawn.figure, "Speed against accuracy", found.problem.title, [],
-        f"Joined: none beats these in both. Drawn at their edge: errors under {LEAST_ERROR:g}, regrets under "
+        f"Joined: beaten by none in both. At the edge: errors under {LEAST_ERROR:g}, regrets under "
         f"{LEAST_REGRET:g}.{hollow} Computed with Laufruhe.",
     )  # fmt: skip
     return drawn.figure
