@@ -74,6 +74,8 @@ def test_trade_of_a_question_about_modes(tmp_path: Path) -> None:
     assert min(data["rows"], key=lambda row: row["fresh"])["name"] == "mounts alone, no loads"
     assert max(abs(row["regret"]) for row in data["rows"]) < 1e-6
     assert data["uneven_speed"] is None
+    # all dots would lie on one line
+    assert {p.name for p in (tmp_path / "trade").iterdir()} == {"powertrain-torque-roll.md"}
 
 
 def test_trade_of_elastic_mounts(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -95,10 +96,12 @@ class AffineProblem:
         Bounds that are far apart would else leave no digits for the small ones.
         """
         norms = [norm for _, norm in (*self.terms, *self.limits)]
+        constants = [float(np.linalg.norm(norm.constant)) for norm in norms]
+        squares = [np.einsum("kdn,kdn->n", norm.slope, norm.slope) for norm in norms]
         found = []
         for domain in self.domains:
-            own = [float(np.linalg.norm(norm.slope[:, :, domain.columns])) for norm in norms]
-            needs = [float(np.linalg.norm(n.constant)) / size for n, size in zip(norms, own, strict=True) if size > 0.0]
+            own = [math.sqrt(float(square[domain.columns].sum())) for square in squares]
+            needs = [constant / size for constant, size in zip(constants, own, strict=True) if size > 0.0]
             needed = NEEDED * max(needs, default=0.0)
             found.append(np.full(domain.width, min(domain.scale, needed) if needed > 0.0 else domain.scale))
         return np.concatenate(found) if found else np.zeros(0)
