@@ -15,6 +15,7 @@ from laufruhe.studies.trade_optima import is_local
 DASH = "-"
 ALIKE = 1.3
 TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
+MOVED = " Throws leave their even steps here, and such optima are local: a regret may be below zero."
 LOCAL = (
     " Mounts are decided here: every fidelity searches from the design as given alone, and finds an optimum nearby. "
     "Choices about modes and time would change with the mounts, so they decide nothing. "
@@ -42,7 +43,7 @@ def as_page(found: Trade, picture: str | None, command: str) -> str:
         "*Another design*: objective with the scene prepared. *Gradient*: with its derivatives by all decisions. "
         "*Solve*: optimum from nothing, at this fidelity's own angles. *From nothing*: engine to objective. "
         "*Regret*: by how much the reference objective of the optimum found is above that of the best."
-        + (LOCAL if is_local(problem) else ""),
+        + (LOCAL if is_local(problem) else MOVED if problem.phasing and problem.phasing.continuous else ""),
         *_beyond(found),
         f"```sh\n{command}\n```",
     ]
@@ -139,7 +140,12 @@ def index(trades: Sequence[Trade]) -> str:
         "| --- | --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     lines += [_index_line(found) for found in trades]
-    lines += ["", "A dash: the problem has no such part, leaves nothing open, or asks of mounts what no load enters."]
+    lines += [
+        "",
+        "A dash: the problem has no such part, leaves nothing open, has an optimum of zero, or asks of mounts what no "
+        "load enters. Where mounts are open, or throws one by one, optima are local: a regret there says as much of the "
+        "search as of the fidelity, and may be below zero.",
+    ]
     lines += ["", "*Uneven speed*: what a flywheel that leaves 2 % of unevenness changes of the objective."]
     return "\n".join(lines) + "\n"
 
@@ -166,15 +172,22 @@ def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
     regrets = sorted(max(row.regret, 0.0) for row in rows if not math.isnan(row.regret))
     if not errors:
         return f"{what} nothing that these problems show."
-    middle = _percent(errors[len(errors) // 2])
-    text = f"{what} up to {_percent(errors[-1])} of the number, {middle} in the middle of {len(errors)} problem(s)"
+    text = f"{what} up to {_percent(errors[-1])} of the number{_middle(errors)}"
     if regrets:
-        text += f"; of the design up to {_percent(regrets[-1])}, {_percent(regrets[len(regrets) // 2])} in the middle"
+        text += f"; of the design up to {_percent(regrets[-1])}{_middle(regrets)}"
     return text + "."
 
 
+def _middle(shares: Sequence[float]) -> str:
+    """Of a few problems the middle says nothing."""
+    count = len(shares)
+    return f", {_percent(shares[count // 2])} in the middle of {count} problems" if count > 2 else ""
+
+
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"
+    if share < 1e-4:
+        return "less than 0.01 %"
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
 def _line(row: Row) -> str:
