@@ -143,8 +143,8 @@ def index(trades: Sequence[Trade]) -> str:
     lines += [
         "",
         "A dash: the problem has no such part, leaves nothing open, has an optimum of zero, or asks of mounts what no "
-        "load enters. Where mounts are open, or throws one by one, optima are local: a regret there says as much of the "
-        "search as of the fidelity, and may be below zero.",
+        "load enters. Where mounts are open, or throws one by one, optima are local: a regret there says as much of "
+        "the search as of the fidelity, and may be below zero.",
     ]
     lines += ["", "*Uneven speed*: what a flywheel that leaves 2 % of unevenness changes of the objective."]
     return "\n".join(lines) + "\n"

@@ -171,7 +171,6 @@ def _without_negligible(affine: AffineProblem, x: Array) -> Array:
     x = x.copy()
     nothing = np.zeros_like(x)
     norms = [(norm, max(norm.value(x), norm.value(nothing))) for _, norm in affine.terms]
-    norms += [(norm, maximum) for maximum, norm in affine.limits]
     norms = _linear(norms)
     for domain in affine.domains:
         if domain.decision.lower > 0.0 or not x[domain.columns].any():
@@ -180,9 +179,16 @@ def _without_negligible(affine: AffineProblem, x: Array) -> Array:
         alone[domain.columns] = x[domain.columns]
         without[domain.columns] = 0.0
         faint = all(norm.value(alone) <= NEGLIGIBLE * size for norm, size in norms)
-        if faint or (affine.objective(without) <= affine.objective(x) and _excess(affine, without) <= 0.0):
+        if (faint or affine.objective(without) <= affine.objective(x)) and _keeps_limits(affine, x, without):
             x = without
     return x
+
+
+def _keeps_limits(affine: AffineProblem, x: Array, without: Array) -> bool:
+    """Whether no limit is broken that was kept, and none that was broken is broken more."""
+    return all(
+        norm.value(without) <= (1.0 + 0.1 * FEASIBLE) * max(maximum, norm.value(x)) for maximum, norm in affine.limits
+    )
 
 
 def _linear(norms: Sequence[tuple[AffineNorm, float]]) -> list[tuple[AffineNorm, float]]:
