@@ -6,37 +6,62 @@ import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from laufruhe.errors import Complaint, InputError
 from laufruhe.problem.model import Problem
 
+if TYPE_CHECKING:
+    from laufruhe.problem.automatic import Choice
+
 
 def explained(path: Path, tolerance: float) -> tuple[str, str]:
     """Text and JSON of what a scene needs."""
+    from laufruhe.problem.automatic import choose
+    from laufruhe.problem.mount_needs import needs
+    from laufruhe.report import explain
+
+    problem = _with_objective(path)
+    if problem.objective:
+        choice, times = choose(problem, tolerance), _load_times
+    else:
+        choice, times = needs(problem), _mount_times
+    both = times(problem, choice)
+    return explain.as_text(problem, choice, tolerance, both), explain.as_json(problem, choice, tolerance, both)
+
+
+def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
+    """Milliseconds of another design, as chosen and exact over the whole cycle."""
     import numpy as np
 
     from laufruhe.physics.fidelity import Fidelity
-    from laufruhe.problem.automatic import choose
-    from laufruhe.report import explain
     from laufruhe.solvers.batch import prepare
     from laufruhe.studies.trade import seconds
 
-    problem = _with_objective(path)
-    choice = choose(problem, tolerance)
     whole = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
     times = []
     for fidelity, prune in ((choice.fidelity, True), (whole, False)):
         designs = prepare(replace(problem, fidelity=fidelity), prune)
         start = np.zeros((1, 1 + designs.columns))
         times.append(1e3 * seconds(lambda d=designs, x=start: d.of_columns(x)))  # type: ignore[misc]
-    both = (times[0], times[1])
-    return explain.as_text(problem, choice, tolerance, both), explain.as_json(problem, choice, tolerance, both)
+    return times[0], times[1]
+
+
+def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
+    """Milliseconds of what is asked of mounts, with the loads that it needs and with all."""
+    from laufruhe.problem.evaluation import evaluate
+    from laufruhe.problem.mount_values import whole_objective
+    from laufruhe.studies.trade import seconds
+
+    needed = problem if choice.numbers[0] else replace(problem, points=())
+    times = [1e3 * seconds(lambda p=p: whole_objective(p, evaluate(p))) for p in (needed, problem)]  # type: ignore[misc]
+    return times[0], times[1]
 
 
 def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[str, str]:
     """Pages and pictures of every problem, an index of them all; returns the index and JSON."""
     from laufruhe.plots.style import save
-    from laufruhe.plots.trade import figure
+    from laufruhe.plots.trade import figure, has_picture
     from laufruhe.report import files
     from laufruhe.report import trade as report
     from laufruhe.studies.trade import trade
@@ -46,12 +71,13 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     for problem, path in zip(problems, paths, strict=True):
         one = trade(problem, lambda text, name=problem.name: say(f"{name}: {text}"))  # type: ignore[misc]
         found.append(one)
-        names = (f"{problem.name}.md", f"{problem.name}.png", f"{problem.name}.json")
+        names = (f"{problem.name}.md", f"{problem.name}.png")
         with files.staged(folder, "--out", names) as stage:
-            save(figure(one), stage / names[1])
+            drawn = has_picture(one)
+            if drawn:
+                save(figure(one), stage / names[1])
             command = shlex.join(["laufruhe", "trade", str(path)])
-            files.write(stage / names[0], report.as_page(one, names[1], command))
-            files.write(stage / names[2], report.as_json(one))
+            files.write(stage / names[0], report.as_page(one, names[1] if drawn else None, command))
         data.append(report.as_json(one).strip())
     index = report.index(found)
     if len(found) > 1:
@@ -64,7 +90,7 @@ def _with_objective(path: Path) -> Problem:
     from laufruhe.problem.reader import load
 
     problem = load(path)
-    if not problem.objective:
+    if not problem.objective and not problem.mount_design.terms:
         rule, remedy = "is missing: accuracy is that of an objective", "add [objective] or mounts"
         raise InputError(str(path), (Complaint("objective", "", rule, remedy),))
     return problem

@@ -6,7 +6,7 @@ import math
 import random
 from dataclasses import replace
 
-from laufruhe.machine import Cycle, Engine, GasModel, Mount, OperatingPoint, Rotor, Seiliger, Shaft, Wiebe
+from laufruhe.machine import Block, Cycle, Engine, GasModel, Mount, OperatingPoint, Rotor, Seiliger, Shaft, Wiebe
 from laufruhe.machine.layouts import Mechanism, build, inline, vee
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.model import Problem, Term
@@ -50,6 +50,39 @@ def random_problem(rng: random.Random, gas: bool | None = None) -> Problem:
     )  # fmt: skip
 
 
+def random_elastic_problem(rng: random.Random, gas: bool | None = None) -> Problem:
+    """The same on elastic mounts: some stiff, some soft, with loss or damping, some symmetric in the plane y = 0."""
+    problem = random_problem(rng, gas)
+    engine = problem.engine
+    mass, symmetric = rng.uniform(50.0, 600.0), rng.random() < 0.4
+    x, y, z = (mass * rng.uniform(0.02, 0.06) for _ in range(3))
+    inertia = ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, min(z, 0.9 * (x + y))))
+    if inertia[2][2] + min(x, y) <= max(x, y):
+        inertia = ((x, 0.0, 0.0), (0.0, x, 0.0), (0.0, 0.0, x))
+    side = 0.0 if symmetric else rng.uniform(-0.05, 0.05)
+    block = Block(mass, inertia, (rng.uniform(-0.2, 0.2), side, rng.uniform(0.0, 0.2)))
+    stiff = 10.0 ** rng.uniform(4.5, 8.5)
+    damping = rng.choice([0.0, 10.0 ** rng.uniform(1.0, 3.0)])
+    loss = rng.uniform(0.02, 0.3) if damping == 0.0 or rng.random() < 0.5 else 0.0
+    mounts = tuple(
+        replace(
+            mount, stiffness=tuple(stiff * k for k in mount.stiffness), loss_factor=loss, damping=(damping,) * 3,
+        )
+        for mount in engine.mounts
+    )  # fmt: skip
+    if symmetric:
+        mounts = tuple(
+            replace(mount, position=(a, b if k % 2 == 0 else -mounts[k - 1].position[1],
+                                     (mount if k % 2 == 0 else mounts[k - 1]).position[2]),
+                    stiffness=mounts[k - k % 2].stiffness)
+            for k, mount in enumerate(mounts) for a, b, _ in [mount.position]
+        )  # fmt: skip
+    elastic = replace(problem, engine=replace(engine, mounts=mounts, block=block))
+    subject = rng.choice([Subject.MOUNT_FORCE, Subject.MOUNT_FORCE, Subject.MOUNT_TRAVEL])
+    quantity = replace(problem.objective[0].quantity, subject=subject)
+    return replace(elastic, objective=(Term(quantity),))
+
+
 def _gas(rng: random.Random, wanted: bool | None) -> GasModel | None:
     if wanted is False or (wanted is None and rng.random() < 0.7):
         return None
@@ -61,4 +94,5 @@ def _gas(rng: random.Random, wanted: bool | None) -> GasModel | None:
 def finer(problem: Problem, samples: int) -> Problem:
     """The same at a fidelity above any that the project offers of itself."""
     return replace(problem, fidelity=replace(problem.fidelity, kinematics="exact", samples=samples, orders=None,
-                                             rod="rigid", gas=True, gas_samples=None, tolerance=None))  # fmt: skip
+                                             rod="rigid", gas=True, gas_samples=None, mounts="frequency", modes=None,
+                                             tolerance=None))  # fmt: skip

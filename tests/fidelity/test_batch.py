@@ -14,7 +14,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.automatic import automatic
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.reader import load
-from laufruhe.solvers.batch import prepare, random_decisions
+from laufruhe.solvers.batch import Designs, prepare, random_decisions
 from laufruhe.solvers.batch_engines import EngineArrays, EngineFamily
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -24,12 +24,23 @@ COUNT = 12
 
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
-@pytest.mark.parametrize("prune", [True, False])
-def test_designs_agree_with_evaluations(path: Path, prune: bool) -> None:
+def test_designs_agree_with_evaluations(path: Path) -> None:
     problem = replace(load(path), fidelity=Fidelity(samples=720))
     values = random_decisions(problem, COUNT)
     single = [objective_value(problem, evaluate(problem, problem.design(list(v)))) for v in values]
-    assert prepare(problem, prune).objective(values) == pytest.approx(single, rel=1e-12)
+    for prune in (True, False):
+        designs = prepare(problem, prune)
+        assert designs.objective(values) == pytest.approx(single, rel=1e-12)
+        features = np.concatenate([np.ones((COUNT, 1)), _columns(designs, values)], axis=1)
+        assert [designs.one(x) for x in features] == pytest.approx(single, rel=1e-12)
+
+
+def _columns(designs: Designs, values: np.ndarray) -> np.ndarray:
+    parts = [
+        np.array([domain.columns_of(complex(u)) for u in values[:, k]])
+        for k, domain in enumerate(designs.model.domains)
+    ]
+    return np.concatenate(parts, axis=1) if parts else np.zeros((len(values), 0))
 
 
 def test_threads_change_nothing() -> None:

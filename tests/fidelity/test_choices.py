@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import random
+import subprocess
+import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import tractor
 from cli import scenes
-from fidelity.scenes import random_problem
+from fidelity.scenes import random_elastic_problem, random_problem
 from laufruhe.errors import InputError, ModelError
 from laufruhe.machine import OperatingPoint
 from laufruhe.physics.fidelity import Fidelity
@@ -19,6 +24,7 @@ from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.automatic import choose
 from laufruhe.problem.error_bounds import reference
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.model import Problem
 from laufruhe.problem.reader import load
 from laufruhe.solvers import solve
 
@@ -68,14 +74,52 @@ def test_no_gas_is_an_engine_without_a_gas_model() -> None:
     assert np.array_equal(shaking_loads(engine, POINT, Fidelity(gas=False)).coefficients, bare.coefficients)
 
 
-def test_order_of_parts_does_not_matter() -> None:
-    problem = random_problem(random.Random(11), gas=True)
-    parts = list(problem.engine.slider_cranks)
+@pytest.mark.parametrize("make", [random_problem, random_elastic_problem])
+def test_order_of_parts_does_not_matter(make: Callable[..., Problem]) -> None:
+    problem = make(random.Random(11), gas=True)
+    other = replace(problem.points[0], name="other", speed=0.7 * problem.points[0].speed)
+    problem = replace(problem, points=(*problem.points, other))
     value = objective_value(problem, evaluate(problem))
     for seed in range(5):
-        random.Random(seed).shuffle(parts)
-        shuffled = replace(problem.engine, slider_cranks=tuple(parts))
-        assert objective_value(problem, evaluate(problem, shuffled)) == pytest.approx(value, rel=1e-13)
+        rng, engine = random.Random(seed), problem.engine
+        shuffled = replace(
+            engine, slider_cranks=_shuffled(rng, engine.slider_cranks), mounts=_shuffled(rng, engine.mounts),
+            rotors=_shuffled(rng, engine.rotors),
+        )  # fmt: skip
+        again = replace(problem, engine=shuffled, points=_shuffled(rng, problem.points))
+        assert objective_value(again, evaluate(again)) == pytest.approx(value, rel=1e-12)
+
+
+def _shuffled(rng: random.Random, parts: tuple[Any, ...]) -> tuple[Any, ...]:
+    out = list(parts)
+    rng.shuffle(out)
+    return tuple(out)
+
+
+THREADS = """
+from laufruhe import load, solve
+from laufruhe.problem.automatic import choose
+found = solve(load("problems/tractor-four-lanchester.toml"))
+print(found.objective.value, found.certificate.lower_bound, choose(found.problem, 1e-3).error_estimate)
+"""
+
+
+def test_threads_of_the_machine_change_a_rounding() -> None:
+    """Optimum, bound and estimate to a rounding, whatever the threads of its libraries."""
+    root = Path(__file__).parents[2]
+    answers = [
+        subprocess.run(
+            [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True, cwd=root,
+            env={**os.environ, **dict.fromkeys(NAMES, count)},
+        ).stdout
+        for count in ("1", "3")
+    ]  # fmt: skip
+    one, more = ([float(word) for word in answer.split()] for answer in answers)
+    assert len(one) == 3
+    assert one == pytest.approx(more, rel=1e-11)
+
+
+NAMES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
 
 
 def test_automatic_finds_what_is_not_there() -> None:

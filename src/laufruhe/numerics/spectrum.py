@@ -55,7 +55,10 @@ class Spectrum:
         for start in range(0, len(self.coefficients), samples):
             block = self.coefficients[start : start + samples]
             folded[: len(block)] += block
-        return np.asarray((np.fft.ifft(folded, axis=0) * samples).real)
+        # of a real signal half of the folded orders say all
+        first = samples // 2 + 1
+        real = 0.5 * samples * (folded[:first] + folded[-np.arange(first) % samples].conj())
+        return np.asarray(np.fft.irfft(real, samples, axis=0))
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at any crank angles [rad], shape (len(angles), ...)."""

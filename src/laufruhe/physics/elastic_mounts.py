@@ -49,10 +49,13 @@ class ElasticMounting:
         The body carried.
     mounts
         What carries it.
+    answering
+        Modes that answer, 1 the lowest; all that are excited when None.
     """
 
     block: Block
     mounts: tuple[Mount, ...]
+    answering: tuple[int, ...] | None = None
 
     @cached_property
     def motions(self) -> Array:
@@ -117,14 +120,20 @@ class ElasticMounting:
         # what cancels in the sum counts against the size of its terms
         size = np.abs(wrenches) @ np.abs(self._about_centre).T
         floor = UNDRIVEN * np.maximum(size, np.abs(drive).max(axis=-1, keepdims=True, initial=0.0))
-        return np.where(np.abs(drive) > floor, drive, 0.0)
+        return np.where((np.abs(drive) > floor) & self._answers, drive, 0.0)
+
+    @cached_property
+    def _answers(self) -> NDArray[np.bool_]:
+        """Which modes answer, shape (6,)."""
+        kept = range(1, 7) if self.answering is None else self.answering
+        return np.isin(np.arange(1, 7), list(kept))
 
     def excited(self, wrench: Spectrum) -> tuple[int, ...]:
         """Modes that a wrench drives, directly or through damping (E12)."""
         return self._reached(self.drives(wrench.coefficients))
 
     def _reached(self, drive: ComplexArray) -> tuple[int, ...]:
-        coupled = (self._loss != 0.0) | (self._damping != 0.0)
+        coupled = ((self._loss != 0.0) | (self._damping != 0.0)) & self._answers
         reached = np.any(drive != 0.0, axis=0)
         while True:
             further = reached | np.any(coupled[reached], axis=0)
@@ -239,8 +248,10 @@ def _coupled(matrix: Array) -> bool:
     return bool(np.any(matrix[~np.eye(len(matrix), dtype=bool)]))
 
 
-def elastic_mounting(block: Block, mounts: Sequence[Mount]) -> ElasticMounting:
-    """A block on its mounts.
+def elastic_mounting(
+    block: Block, mounts: Sequence[Mount], answering: tuple[int, ...] | None = None
+) -> ElasticMounting:
+    """A block on its mounts; of its modes those that answer, all when None.
 
     Raises
     ------
@@ -249,7 +260,7 @@ def elastic_mounting(block: Block, mounts: Sequence[Mount]) -> ElasticMounting:
     """
     if not any(any(mount.stiffness) for mount in mounts):
         raise ModelError("no mount has a stiffness; an elastic mounting needs one")
-    return ElasticMounting(block, tuple(mounts))
+    return ElasticMounting(block, tuple(mounts), answering)
 
 
 def single_transmissibility(ratio: Array, loss_factor: float = 0.0, damping_ratio: float = 0.0) -> Array:

@@ -10,14 +10,13 @@ from laufruhe.errors import ModelError
 
 Kinematics = Literal["exact", "two-order"]
 RodModel = Literal["rigid", "mass-only"]
+MountModel = Literal["frequency", "rigid", "time"]
+MODES = 6
 
 
 @dataclass(frozen=True)
 class Fidelity:
     """What of the physics is kept.
-
-    How the engine is held is no part of it: rigid and elastic mounts take whatever
-    loads these choices leave.
 
     Attributes
     ----------
@@ -37,6 +36,12 @@ class Fidelity:
     crank_inertia
         Of everything that turns with the crank [kg m2], at crank speed. Infinite for a
         crank that turns evenly; a finite one speeds up and slows down within the cycle.
+    mounts
+        How a block on elastic mounts answers: order by order ("frequency"), as if no
+        mount gave way ("rigid"), or by integration in time ("time"), bump stops
+        included. Mounts of an engine without a block are rigid at every choice.
+    modes
+        Natural modes that answer, 1 the lowest; all that are excited when None.
     tolerance
         Relative error of the objective that was asked of an automatic choice; None for
         one made by hand.
@@ -54,6 +59,8 @@ class Fidelity:
     gas: bool = True
     gas_samples: int | None = None
     crank_inertia: float = math.inf
+    mounts: MountModel = "frequency"
+    modes: tuple[int, ...] | None = None
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
@@ -63,6 +70,12 @@ class Fidelity:
             raise ModelError(f"crank inertia {self.crank_inertia:g} kg m2 must be positive")
         if self.is_uneven and self.kinematics != "exact":
             raise ModelError("an uneven crank speed goes with exact kinematics only; leave kinematics out")
+        if self.modes is None:
+            return
+        if len(set(self.modes)) != len(self.modes) or not all(1 <= mode <= MODES for mode in self.modes):
+            raise ModelError(f"modes {list(self.modes)} must be different numbers from 1 to {MODES}, 1 the lowest")
+        if self.mounts != "frequency":
+            raise ModelError(f"modes go with mounts in the frequency domain, not with '{self.mounts}'; leave modes out")
 
     @property
     def is_uneven(self) -> bool:
@@ -86,6 +99,12 @@ class Fidelity:
             words.append("no gas")
         if self.is_uneven:
             words.append(f"uneven crank speed ({self.crank_inertia:g} kg m2)")
+        if self.mounts == "rigid":
+            words.append("mounts that do not give way")
+        if self.mounts == "time":
+            words.append("mounts in the time domain")
+        if self.modes is not None:
+            words.append("modes " + ", ".join(map(str, self.modes)) if self.modes else "no mode")
         return ", ".join(words)
 
     def local_orders(self, ratio: float) -> int | None:

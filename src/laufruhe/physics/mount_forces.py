@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,10 +47,13 @@ class RigidMounting:
             If the wrench drives a direction that no mount carries.
         """
         self.check_carried(wrench)
-        return Spectrum(wrench.base, np.einsum("mij,nj->nmi", self.maps, wrench.coefficients))
+        forces = wrench.coefficients @ self.maps.reshape(-1, 6).T
+        return Spectrum(wrench.base, forces.reshape(-1, len(self.maps), 3))
 
     def check_carried(self, wrench: Spectrum) -> None:
         """Refuse a wrench that some direction lets through."""
+        if not len(self.free):
+            return
         scaled = wrench.coefficients / _scales(self.arm)
         size = float(np.abs(scaled).max(initial=0.0))
         uncarried = np.abs(scaled @ self.free.T @ self.free)
@@ -67,6 +71,11 @@ def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:
     Directions that no mount carries are left to `check_carried`; the scene may not
     drive them.
     """
+    return _rigid_mounting(tuple(mounts))
+
+
+@lru_cache(maxsize=256)
+def _rigid_mounting(mounts: tuple[Mount, ...]) -> RigidMounting:
     positions = np.array([mount.position for mount in mounts])
     arm = float(np.linalg.norm(positions, axis=1).max(initial=0.0)) or 1.0
     scales = _scales(arm)
@@ -80,6 +89,7 @@ def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:
     rank = int(np.sum(values > FREE_STRETCH * values[0]))
     shares = (left[:, :rank] / values[:rank]).reshape(len(mounts), 3, rank)
     maps = np.einsum("mba,mbr,rk->mak", roots, shares, right[:rank]) / scales
+    maps.setflags(write=False)
     return RigidMounting(maps, right[rank:], arm)
 
 

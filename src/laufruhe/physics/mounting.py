@@ -7,35 +7,59 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
+from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.mount_forces import RigidMounting, rigid_mounting
+from laufruhe.physics.time_mounting import TimeMounting
 
 
 class Mounting(Protocol):
-    """Rigid or elastic; linear in the wrench at every speed."""
+    """Rigid or elastic; in the frequency domain linear in the wrench at every speed."""
 
     def forces(self, wrench: Spectrum, speed: float) -> Spectrum:
         """Forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7)."""
 
 
-def mounting_of(engine: Engine) -> RigidMounting | ElasticMounting | None:
+def mounting_of(engine: Engine, fidelity: Fidelity = EXACT) -> Mounting | None:
     """The mounting of an engine: elastic where its block is described, else rigid; None without mounts."""
     if not engine.mounts:
         return None
-    return rigid_mounting(engine.mounts) if engine.block is None else elastic_mounting(engine.block, engine.mounts)
+    if engine.block is None or fidelity.mounts == "rigid":
+        return rigid_mounting(engine.mounts)
+    mounting = elastic_mounting(engine.block, engine.mounts, fidelity.modes)
+    return TimeMounting(mounting, fidelity.samples) if fidelity.mounts == "time" else mounting
 
 
-def travel_of(mounting: Mounting | None, wrench: Spectrum, speed: float) -> Spectrum | None:
-    """Displacement at every mount, shape (n, mounts, 3) [m]; None where mounts do not give way."""
-    return mounting.travel(wrench, speed) if isinstance(mounting, ElasticMounting) else None
+def travel_of(engine: Engine, mounting: Mounting | None, wrench: Spectrum, speed: float) -> Spectrum | None:
+    """Displacement at every mount, shape (n, mounts, 3) [m]; None where there are no elastic mounts.
+
+    Elastic mounts that are taken for rigid do not travel.
+    """
+    if mounting is None or engine.block is None:
+        return None
+    if isinstance(mounting, ElasticMounting | TimeMounting):
+        return mounting.travel(wrench, speed)
+    return Spectrum(wrench.base, np.zeros((1, len(engine.mounts), 3), dtype=complex))
 
 
-def mount_maps(mounting: RigidMounting | ElasticMounting, order: float, speed: float) -> NDArray[np.complex128]:
-    """Mount forces per wrench at one order and speed, shape (mounts, 3, 6)."""
+def mount_maps(mounting: Mounting, order: float, speed: float) -> NDArray[np.complex128]:
+    """Mount forces per wrench at one order and speed, shape (mounts, 3, 6).
+
+    Raises
+    ------
+    ModelError
+        Of mounts in the time domain, which have no map.
+    """
     if isinstance(mounting, RigidMounting):
         return mounting.maps.astype(complex)
+    if not isinstance(mounting, ElasticMounting):
+        raise ModelError(NO_MAP)
     omegas = np.full(6, order * speed)
     forces = mounting.mount_forces(omegas, mounting.responses(omegas, np.eye(6, dtype=complex)))
     return np.asarray(np.moveaxis(forces, 0, 2))
+
+
+NO_MAP = "mounts in the time domain are evaluated, not solved for; leave fidelity.mounts out and solve again"

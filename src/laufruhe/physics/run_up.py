@@ -156,8 +156,8 @@ def periodic_state(
         raise ModelError(f"a steady state in time needs a speed above zero, not {speed:g} rad/s")
     model = time_model(mounting)
     period = 2.0 * np.pi / (float(wrench.base) * speed)
-    loads = wrench.coefficients @ model.load.T
-    orders = wrench.orders
+    loaded = np.any(wrench.coefficients != 0.0, axis=1)
+    loads, orders = wrench.coefficients[loaded] @ model.load.T, wrench.orders[loaded]
 
     def rates(t: float, state: Array, columns: int) -> Array:
         y, rate = state.reshape(12, columns)[:6], state.reshape(12, columns)[6:]

@@ -52,10 +52,27 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
         from laufruhe.physics.uneven_speed import uneven_loads
 
         return uneven_loads(engine, point, fidelity)
-    total = reciprocating_loads(engine, point.speed, fidelity) + rod_inertia_loads(engine, point.speed, fidelity)
-    if point.gas is not None and fidelity.gas:
-        total = total + gas_loads(engine, point.gas, fidelity)
-    return _kept(total, fidelity) + rotating_loads(engine, point.speed)
+    moving = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, point.gas, fidelity)
+    return moving + rotating_loads(engine, point.speed)
+
+
+@lru_cache(maxsize=64)
+def _slider_crank_loads(
+    cycle: Cycle, parts: tuple[SliderCrank, ...], speed: float, gas: GasModel | None, fidelity: Fidelity
+) -> Spectrum:
+    """Pistons, rods and gas: the same for every design that differs in its rotors alone."""
+    engine = Engine("pistons, rods and gas", cycle, parts)
+    total = reciprocating_loads(engine, speed, fidelity) + rod_inertia_loads(engine, speed, fidelity)
+    if gas is not None and fidelity.gas:
+        total = total + gas_loads(engine, gas, fidelity)
+    kept = _kept(total, fidelity)
+    kept.coefficients.setflags(write=False)
+    return kept
+
+
+def forget() -> None:
+    """Drop the loads that are remembered, for whoever measures what they cost."""
+    _slider_crank_loads.cache_clear()
 
 
 def _kept(loads: Spectrum, fidelity: Fidelity) -> Spectrum:
@@ -156,7 +173,7 @@ def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
     forward = shaft.ratio > 0.0
     vertical = rotor.unbalance if forward else rotor.unbalance.conjugate()
     lateral = vertical * (-1j if forward else 1j)
-    return np.asarray((shaft.ratio * speed) ** 2 * _wrench_of(lateral, vertical, rotor.x, shaft))
+    return np.asarray((shaft.ratio * speed) ** 2 * plane_wrench(lateral, vertical, rotor.x, shaft))
 
 
 def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -192,7 +209,7 @@ def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> 
 _ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 
 
-def _wrench_of(lateral: complex, vertical: complex, x: float, shaft: Shaft) -> NDArray[np.complex128]:
+def plane_wrench(lateral: complex, vertical: complex, x: float, shaft: Shaft) -> NDArray[np.complex128]:
     """Wrench of a force in the plane at x through a shaft's axis (C2)."""
     roll = shaft.y * vertical - shaft.z * lateral
     return np.array([0.0, lateral, vertical, roll, -x * vertical, x * lateral])
@@ -201,7 +218,7 @@ def _wrench_of(lateral: complex, vertical: complex, x: float, shaft: Shaft) -> N
 def _axial(part: SliderCrank) -> NDArray[np.float64]:
     """Wrench of a unit force along the cylinder axis through the crank axis."""
     axis = cis(as_turn(part.bank))
-    return _wrench_of(axis.imag, axis.real, part.x, part.shaft).real
+    return plane_wrench(axis.imag, axis.real, part.x, part.shaft).real
 
 
 def _square(part: SliderCrank, speed: float) -> float:

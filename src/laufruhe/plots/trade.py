@@ -6,52 +6,74 @@ import math
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.collections import PathCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from laufruhe.plots.style import FAINT, INK, heading, page
+from laufruhe.plots.style import FAINT, INK, Page, heading, page
 from laufruhe.studies.trade import Row, Trade
 
 Array = NDArray[np.float64]
 
 LEAST_ERROR, LEAST_REGRET = 1e-7, 1e-8
+LABEL_WIDTH, LABEL_HEIGHT = 0.28, 0.03
+"""Of a name, over the panel."""
+
+
+def has_picture(found: Trade) -> bool:
+    """Whether the fidelities differ in anything but time."""
+    return any(row.error > 0.0 for row in found.rows)
 
 
 def figure(found: Trade) -> Figure:
     """One panel: evaluation time of another design against error, the front joined."""
     drawn = page(1, 1, (6.6, 4.4))
-    axes = drawn.panels[0]
-    rows = found.rows
+    axes, rows = drawn.panels[0], found.rows
     times = np.array([1e6 * row.evaluation for row in rows])
     errors = np.array([max(row.error, LEAST_ERROR) for row in rows])
-    regrets = np.array([max(0.0 if math.isnan(row.regret) else row.regret, LEAST_REGRET) for row in rows])
     front = _front(rows)
     joined = [(1e6 * row.evaluation, max(row.error, LEAST_ERROR)) for row in front]
     axes.plot(*zip(*joined, strict=True), color=FAINT, lw=0.9, zorder=1)
+    decides = np.array([not math.isnan(row.regret) for row in rows])
+    axes.scatter(times[~decides], errors[~decides], s=55, zorder=3, facecolors="white", edgecolors=INK, linewidths=0.8)
+    regrets = [max(row.regret, LEAST_REGRET) for row in rows if not math.isnan(row.regret)]
     dots = axes.scatter(
-        times, errors, c=regrets, cmap="viridis_r", norm=LogNorm(LEAST_REGRET, 1.0), s=55, zorder=3,
+        times[decides], errors[decides], c=regrets, cmap="viridis_r", norm=LogNorm(LEAST_REGRET, 1.0), s=55, zorder=3,
         edgecolors=INK, linewidths=0.5,
     )  # fmt: skip
-    _name(axes, rows, times, errors)
     axes.set(xscale="log", yscale="log", xlabel="time of another design [µs]", ylabel="relative error of the objective")
     axes.set_xlim(0.75 * times.min(), 3.2 * times.max())
-    axes.set_ylim(0.4 * LEAST_ERROR, 3.0 * errors.max())
+    # names of all that lie at the edge stand under each other
+    crowd = int(np.sum(errors == LEAST_ERROR))
+    axes.set_ylim(LEAST_ERROR / 10.0 ** (0.6 + 0.18 * crowd), 3.0 * errors.max())
+    _name(axes, rows, times, errors)
+    plain = FuncFormatter(lambda value, _: f"{value:g}")
+    scales: list[Axis] = [axes.xaxis, axes.yaxis]
+    if regrets:
+        scales.append(_colour_bar(drawn, dots))
+    for axis in scales:
+        axis.set_major_formatter(plain)
+        axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
+    hollow = "" if decides.all() else " Hollow: nothing decided."
+    heading(
+        drawn.figure, "Speed against accuracy", found.problem.title, [],
+        f"Joined: beaten by none in both. At the edge: errors under {LEAST_ERROR:g}, regrets under "
+        f"{LEAST_REGRET:g}.{hollow} Computed with Laufruhe.",
+    )  # fmt: skip
+    return drawn.figure
+
+
+def _colour_bar(drawn: Page, dots: PathCollection) -> Axis:
+    """The scale of regret beside the panel."""
+    axes = drawn.panels[0]
     place = axes.get_position()
     axes.set_position((place.x0, place.y0, 0.86 * place.width, place.height))
     side = drawn.figure.add_axes((place.x0 + 0.89 * place.width, place.y0, 0.022 * place.width, place.height))
-    bar = drawn.figure.colorbar(dots, cax=side)
-    bar.set_label("regret of its optimum")
-    plain = FuncFormatter(lambda value, _: f"{value:g}")
-    for axis in (axes.xaxis, axes.yaxis, side.yaxis):
-        axis.set_major_formatter(plain)
-        axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
-    heading(
-        drawn.figure, "Speed against accuracy", f"{found.problem.title}; joined are those that none beats in both.", [],
-        f"Errors under {LEAST_ERROR:g} and regrets under {LEAST_REGRET:g} are drawn there. Computed with Laufruhe.",
-    )  # fmt: skip
-    return drawn.figure
+    drawn.figure.colorbar(dots, cax=side).set_label("regret of its optimum")
+    return side.yaxis
 
 
 def _front(rows: tuple[Row, ...]) -> list[Row]:
@@ -64,15 +86,21 @@ def _front(rows: tuple[Row, ...]) -> list[Row]:
 
 
 def _name(axes: Axes, rows: tuple[Row, ...], times: Array, errors: Array) -> None:
-    """Names beside the dots, moved apart where two would cover each other."""
+    """Names beside the dots, moved down where two would cover each other, to the left at the right edge."""
+    (left, right), (low, high) = np.log10(axes.get_xlim()), np.log10(axes.get_ylim())
+    width, height = right - left, high - low
     taken: list[tuple[float, float]] = []
     for k in np.argsort(-errors):
-        x, y = math.log10(times[k]), math.log10(errors[k])
-        shift = 0.0
-        while any(abs(y + shift - v) < 0.2 and abs(x - u) < 0.6 for u, v in taken):
-            shift -= 0.07
-        taken.append((x, y + shift))
+        x, y, shift = math.log10(times[k]), math.log10(errors[k]), 0.0
+        leftwards = x + LABEL_WIDTH * width > right
+        start = x - (LABEL_WIDTH * width if leftwards else 0.0)
+        while any(
+            abs(y + shift - v) < LABEL_HEIGHT * height and abs(start - u) < LABEL_WIDTH * width for u, v in taken
+        ):
+            shift -= 0.25 * LABEL_HEIGHT * height
+        taken.append((start, y + shift))
+        gap = -0.012 * width if leftwards else 0.012 * width
         axes.annotate(
-            rows[k].name, (times[k], errors[k]), xytext=(times[k] * 1.09, errors[k] * 10**shift), fontsize=7,
-            va="center", color=INK,
+            rows[k].name, (times[k], errors[k]), xytext=(10 ** (x + gap), 10 ** (y + shift)), fontsize=7,
+            va="center", ha="right" if leftwards else "left", color=INK,
         )  # fmt: skip

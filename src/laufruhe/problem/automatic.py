@@ -4,27 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from laufruhe.errors import UncarriedLoadError
 from laufruhe.machine import Engine
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.shaking_loads import WRENCH
-from laufruhe.problem.error_bounds import (
-    REFERENCE_SAMPLES,
-    ROUNDING,
-    gas_doubt,
-    half_gas,
-    left_out,
-    reference,
-    sampling_bound,
-    signals,
-)
-from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.error_bounds import REFERENCE_SAMPLES, reference, signals
+from laufruhe.problem.left_out import LeftOut, Scale, has_deficit, has_gas, mode_names, parts_left_out, repeats
 from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import MASSES
 
 DEFAULT_TOLERANCE = 1e-3
 ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256, 384)
@@ -32,26 +21,6 @@ SAMPLES = tuple(48 * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 20, 24, 30
 GAS_SAMPLES = (720, 1440, 2880, REFERENCE_SAMPLES)
 PHYSICS_SHARE, GAS_SHARE, PART_SHARE = 0.5, 0.25, 0.1
 """Shares of the tolerance that all physics, the steps of the gas, and one whole part may use."""
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """One thing that is not computed.
-
-    Attributes
-    ----------
-    what, why
-        In words.
-    share
-        Put back, it changes the objective by no more than this, relative.
-    restored
-        The choice with this part put back; None where nothing at all was lost.
-    """
-
-    what: str
-    why: str
-    share: float = 0.0
-    restored: Fidelity | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,32 +47,6 @@ class Choice:
     numbers: tuple[int, int]
 
 
-class _Scale:
-    """Objective of the reference, and bounds beside it."""
-
-    def __init__(self, problem: Problem, best: Evaluation) -> None:
-        self.problem, self.best = problem, best
-        self.terms = [term for term in problem.objective if term.quantity.subject not in MASSES]
-        self.value = sum(term.weight * best.value(term.quantity) for term in problem.objective)
-        half = half_gas(problem, best)
-        doubt = sum(term.weight * gas_doubt(term.quantity, best, half) for term in self.terms)
-        self.doubt = self.relative(doubt) + ROUNDING
-
-    def relative(self, bound: float) -> float:
-        return bound / self.value if self.value > 0.0 else (float("inf") if bound > 0.0 else 0.0)
-
-    def evaluation(self, fidelity: Fidelity) -> Evaluation:
-        return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)
-
-    def loses(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
-        ours, theirs = self.evaluation(fidelity), than or self.best
-        return self.relative(sum(term.weight * left_out(term.quantity, ours, theirs) for term in self.terms))
-
-    def misses(self, fidelity: Fidelity) -> float:
-        ours = self.evaluation(fidelity)
-        return self.relative(sum(term.weight * sampling_bound(term.quantity, ours) for term in self.terms))
-
-
 def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engine | None = None) -> Choice:
     """The cheapest fidelity for an objective (F10).
 
@@ -122,19 +65,21 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
     an objective that is zero, everything that is not zero is kept.
     """
     best = reference(problem, engine)
-    scale = _Scale(problem, best)
+    scale = Scale(problem, best)
     room = max(tolerance - scale.doubt, 0.0)
     chosen = replace(best.fidelity, tolerance=tolerance, gas_samples=REFERENCE_SAMPLES)
-    if _has_deficit(problem):
+    if has_deficit(problem):
         chosen = _without(scale, chosen, room, {"rod": "mass-only"})
-    if _has_gas(problem):
+    if has_gas(problem):
         chosen = _without(scale, chosen, room, {"gas": False})
-    if chosen.gas and _has_gas(problem):
+    if chosen.gas and has_gas(problem):
         chosen = _first(chosen, "gas_samples", GAS_SAMPLES, lambda f: scale.loses(f) <= GAS_SHARE * room)
     else:
         chosen = replace(chosen, gas_samples=None)
     if not chosen.is_uneven:
         chosen = _first(chosen, "orders", (*ORDERS, None), lambda f: scale.loses(f) <= PHYSICS_SHARE * room)
+    if not problem.mount_design.decisions:
+        chosen = _fewest_modes(scale, chosen, room)
     lost = scale.loses(chosen)
     if not chosen.is_uneven:
         chosen = _first(chosen, "samples", (*SAMPLES, REFERENCE_SAMPLES), lambda f: lost + scale.misses(f) <= room)
@@ -143,8 +88,8 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
         chosen,
         # the bounds are relative to the reference, a reader's error to what was computed
         estimate / max(1.0 - estimate, 0.5),
-        _kept(problem, chosen),
-        _parts_left_out(scale, chosen),
+        _kept(scale, chosen),
+        parts_left_out(scale, chosen),
         _numbers(problem, scale, chosen),
     )
 
@@ -152,8 +97,8 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
 def automatic(problem: Problem, tolerance: float, engine: Engine | None = None) -> Problem:
     """The problem at the fidelity chosen for it."""
     if not problem.objective:
-        return replace(problem, fidelity=replace(problem.fidelity, tolerance=tolerance))
-    return replace(problem, fidelity=choose(problem, tolerance, engine).fidelity)
+        return problem.at(replace(problem.fidelity, tolerance=tolerance))
+    return problem.at(choose(problem, tolerance, engine).fidelity)
 
 
 def _first(fidelity: Fidelity, name: str, ladder: Sequence[int | None], enough: Callable[[Fidelity], bool]) -> Fidelity:
@@ -167,7 +112,7 @@ def _first(fidelity: Fidelity, name: str, ladder: Sequence[int | None], enough: 
     return found
 
 
-def _without(scale: _Scale, fidelity: Fidelity, room: float, part: dict[str, Any]) -> Fidelity:
+def _without(scale: Scale, fidelity: Fidelity, room: float, part: dict[str, Any]) -> Fidelity:
     """Without one whole part, where the objective cannot see it."""
     if fidelity.is_uneven:
         # gas and inertia drive the speed there: they are a part of everything
@@ -176,96 +121,65 @@ def _without(scale: _Scale, fidelity: Fidelity, room: float, part: dict[str, Any
     return less if scale.loses(less) - scale.loses(fidelity) <= PART_SHARE * room else fidelity
 
 
-def _has_gas(problem: Problem) -> bool:
-    return any(point.gas is not None for point in problem.points)
+def _fewest_modes(scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+    """Mounts that give no way where the objective cannot tell, or without the modes that hardly answer.
+
+    Modes that an open rotor drives stay: what they answer is not known before it is decided.
+    """
+    if scale.mounting is None:
+        return fidelity
+    allowed = scale.loses(fidelity) + PART_SHARE * room
+    rigid = replace(fidelity, mounts="rigid")
+    if _is_carried(scale, rigid) and scale.loses(rigid) <= allowed:
+        return rigid
+    excited = scale.excited_modes
+    open_modes = {mode + 1 for mode in scale.decided_modes}
+    chosen, kept = fidelity, excited
+    for mode in sorted(set(excited) - open_modes, key=lambda mode: scale.strengths[mode]):
+        fewer = tuple(m for m in kept if m != mode)
+        candidate = replace(fidelity, modes=fewer)
+        if scale.loses(candidate) > allowed:
+            break
+        chosen, kept = candidate, fewer
+    return chosen
 
 
-def _has_deficit(problem: Problem) -> bool:
-    return any(part.rod_inertia_deficit != 0.0 for part in problem.engine.slider_cranks)
+def _is_carried(scale: Scale, rigid: Fidelity) -> bool:
+    """Whether the mounts would carry the loads if they gave no way."""
+    try:
+        scale.evaluation(rigid)
+    except UncarriedLoadError:
+        return False
+    return True
 
 
-def _kept(problem: Problem, fidelity: Fidelity) -> tuple[str, ...]:
+def _kept(scale: Scale, fidelity: Fidelity) -> tuple[str, ...]:
+    problem = scale.problem
     orders = "every order" if fidelity.orders is None else f"orders to {fidelity.orders}"
     kept = [f"exact kinematics, {orders} of pistons and rods"]
-    if fidelity.gas and _has_gas(problem):
+    if fidelity.gas and has_gas(problem):
         kept.append(f"gas, its torque taken at {fidelity.gas_steps} steps over the cycle, {orders} of it")
-    if fidelity.rod == "rigid" and _has_deficit(problem):
+    if fidelity.rod == "rigid" and has_deficit(problem):
         kept.append("inertia of the rods beyond that of two masses")
     if fidelity.is_uneven:
         kept.append("crank speed that varies within the cycle")
+    if scale.mounting is not None:
+        modes = scale.excited_modes if fidelity.modes is None else fidelity.modes
+        kept.append(
+            "mounts as if they gave no way"
+            if fidelity.mounts == "rigid"
+            else f"mode(s) {mode_names(scale.mounting, modes)} of the block on its mounts"
+        )
     return (*kept, f"{fidelity.samples} steps over the cycle")
 
 
-def _parts_left_out(scale: _Scale, chosen: Fidelity) -> tuple[LeftOut, ...]:
-    problem, found = scale.problem, [*_never_there(scale, chosen)]
-    if not chosen.gas and _has_gas(problem):
-        found.append(_part(scale, chosen, replace(chosen, gas=True, gas_samples=REFERENCE_SAMPLES), "gas",
-                           "the objective hardly sees its roll moment"))  # fmt: skip
-    if chosen.rod == "mass-only" and _has_deficit(problem):
-        found.append(_part(scale, chosen, replace(chosen, rod="rigid"), "inertia of the rods beyond two masses",
-                           "the objective hardly sees its roll moment"))  # fmt: skip
-    if chosen.orders is not None:
-        found.append(_part(scale, chosen, replace(chosen, orders=None), f"orders above {chosen.orders}",
-                           "their forces are small"))  # fmt: skip
-    finer = replace(chosen, samples=REFERENCE_SAMPLES, gas_samples=chosen.gas_steps)
-    share = scale.misses(chosen) + scale.misses(finer)
-    found.append(
-        LeftOut(f"angles between {chosen.samples} steps", "the force runs smoothly through them", share, finer)
-    )
-    return tuple(found)
-
-
-def _part(scale: _Scale, chosen: Fidelity, restored: Fidelity, what: str, why: str) -> LeftOut:
-    # of the objective itself; its samples see the part to within their own error
-    both = scale.loses(chosen, scale.evaluation(restored))
-    return LeftOut(what, why if both > 0.0 else "the objective does not count them", both, restored)
-
-
-def _never_there(scale: _Scale, chosen: Fidelity) -> list[LeftOut]:
-    """What costs nothing to leave out, for it is exactly zero."""
-    problem, best, found = scale.problem, scale.best, []
-    if not _has_gas(problem):
-        found.append(LeftOut("gas", "the problem describes none"))
-    if not _has_deficit(problem):
-        found.append(LeftOut("inertia of the rods beyond two masses", "the problem describes none"))
-    wrench = [loads.wrench.coefficients for loads in best.loads]
-    still = [name for k, name in enumerate(WRENCH) if not any(w[:, k].any() for w in wrench)]
-    if still:
-        found.append(LeftOut("loads " + ", ".join(still), "nothing drives them"))
-    last = min(float(chosen.orders or 8), 12.0)
-    orders = best.loads[0].wrench.orders
-    silent = [
-        f"{order:g}"
-        for k, order in enumerate(orders)
-        if 0 < order <= last and not any(k < len(w) and w[k].any() for w in wrench)
-    ]
-    if silent:
-        found.append(LeftOut("orders " + ", ".join(silent), "the crank star cancels them, or nothing has them"))
-    repeats = _repeats(scale)
-    if repeats > 1:
-        found.append(LeftOut(f"{repeats - 1} of {repeats} parts of the cycle", "the loads repeat after each"))
-    return found
-
-
-def _repeats(scale: _Scale) -> int:
-    """Times that all measured signals repeat within the cycle, whatever is decided."""
-    ratios = tuple(
-        Fraction(abs(rotor.shaft.ratio)).limit_denominator(1000)
-        for rotor in scale.problem.engine.rotors
-        if rotor.unbalance != 0 or any(d.rotor == rotor.name for c in scale.problem.decisions for d in c.drives)
-    )
-    cycle = scale.problem.engine.cycle.base_order
-    bases = [loads.wrench.reduced(ratios).base for loads in scale.best.loads]
-    return int(min(bases) / cycle) if bases else 1
-
-
-def _numbers(problem: Problem, scale: _Scale, chosen: Fidelity) -> tuple[int, int]:
+def _numbers(problem: Problem, scale: Scale, chosen: Fidelity) -> tuple[int, int]:
     """Force components sampled in one evaluation, pruned and not."""
     pruned = whole = 0
     for term in scale.terms:
         found = signals(term.quantity, scale.best)
         directions = sum(int(np.any(np.abs(s.coefficients) > 0.0, axis=(0, 1)).sum()) for s in found)
         mounts, width = found[0].coefficients.shape[1:]
-        pruned += max(chosen.samples // _repeats(scale), 24) * mounts * directions
+        pruned += max(chosen.samples // repeats(scale), 24) * mounts * directions
         whole += problem.fidelity.samples * mounts * width * len(found)
     return pruned, whole

@@ -31,10 +31,10 @@ ROUNDING = 2e-13
 
 
 def reference(problem: Problem, engine: Engine | None = None, samples: int = REFERENCE_SAMPLES) -> Evaluation:
-    """The highest fidelity: every order, rigid rod, gas at many steps; uneven speed where the problem has it."""
+    """The highest fidelity: every order, rigid rod, gas at many steps, every mode; uneven speed where it was asked."""
     f = problem.fidelity
     best = replace(f, kinematics="exact", samples=samples, orders=None, rod="rigid", gas=True,
-                   gas_samples=None, tolerance=None)  # fmt: skip
+                   gas_samples=None, mounts="frequency", modes=None, tolerance=None)  # fmt: skip
     return evaluate(replace(problem, fidelity=best), engine)
 
 

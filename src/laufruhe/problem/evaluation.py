@@ -126,24 +126,26 @@ def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None
     """
     engine = problem.engine if engine is None else engine
     wrenches = [(point, shaking_loads(engine, point, problem.fidelity)) for point in problem.points]
-    loads = _on_mounts(engine, wrenches)
+    loads = _on_mounts(engine, problem.fidelity, wrenches)
     return Evaluation(engine, problem.fidelity, loads, samples or problem.fidelity.samples)
 
 
 def remounted(evaluation: Evaluation, engine: Engine) -> Evaluation:
     """The loads of an evaluation on other mounts; `engine` differs in its mounts alone."""
-    loads = _on_mounts(engine, [(loads.point, loads.wrench) for loads in evaluation.loads])
+    loads = _on_mounts(engine, evaluation.fidelity, [(loads.point, loads.wrench) for loads in evaluation.loads])
     return replace(evaluation, engine=engine, loads=loads)
 
 
-def _on_mounts(engine: Engine, wrenches: Sequence[tuple[OperatingPoint, Spectrum]]) -> tuple[PointLoads, ...]:
-    mounting = mounting_of(engine)
+def _on_mounts(
+    engine: Engine, fidelity: Fidelity, wrenches: Sequence[tuple[OperatingPoint, Spectrum]]
+) -> tuple[PointLoads, ...]:
+    mounting = mounting_of(engine, fidelity)
     return tuple(
         PointLoads(
             point,
             wrench,
             mounting.forces(wrench, point.speed) if mounting else None,
-            travel_of(mounting, wrench, point.speed),
+            travel_of(engine, mounting, wrench, point.speed),
         )
         for point, wrench in wrenches
     )

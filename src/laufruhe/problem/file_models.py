@@ -356,6 +356,10 @@ class FidelityTable(Table):
     crank_inertia: f.PositiveInertia | None = Field(
         default=None, description="Of all that turns with the crank: its speed varies within the cycle."
     )
+    mounts: Literal["frequency", "rigid", "time"] | None = Field(
+        default=None, description="Elastic mounts order by order, as if they gave no way, or integrated in time."
+    )
+    modes: list[int] | None = Field(default=None, description="Natural modes that answer, 1 the lowest.")
 
 
 class SearchTable(Table):

@@ -143,6 +143,14 @@ class Problem:
         """Decisions of the design as given."""
         return tuple(decision.start for decision in self.decisions)
 
+    def at(self, fidelity: Fidelity) -> Problem:
+        """The same problem at another fidelity, every design of an open star included."""
+        if self.phasing is None:
+            return replace(self, fidelity=fidelity)
+        realise = self.phasing.realise
+        phasing = replace(self.phasing, realise=lambda candidate: realise(candidate).at(fidelity))
+        return replace(self, fidelity=fidelity, phasing=phasing)
+
     def design(self, values: Sequence[complex], mount_values: Sequence[float] | None = None) -> Engine:
         """The engine with these decisions in place of those it was given with."""
         unbalances = {rotor.name: rotor.unbalance for rotor in self.engine.rotors}

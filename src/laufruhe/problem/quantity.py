@@ -50,7 +50,7 @@ MASSES: Mapping[Subject, tuple[Role, ...]] = {
     Subject.ADDED_MASS: (Role.COUNTERWEIGHT, Role.BALANCER),
 }
 ON_MOUNTS = (Subject.MOUNT_FORCE, Subject.MOUNT_TRAVEL)
-_COMPONENTS: Mapping[Subject, slice] = {
+COMPONENTS: Mapping[Subject, slice] = {
     Subject.SHAKING_FORCE: slice(0, 3),
     Subject.ROLL_MOMENT: slice(3, 4),
     Subject.ROCKING_COUPLE: slice(4, 6),
@@ -175,7 +175,7 @@ def selected(quantity: Quantity, signal: Spectrum, mount_names: Sequence[str]) -
         if quantity.direction_weights is not None:
             c = c * np.array(quantity.direction_weights)
     else:
-        c = c[:, None, _COMPONENTS[quantity.subject]]
+        c = c[:, None, COMPONENTS[quantity.subject]]
     if quantity.orders is not None:
         keep = np.isin(np.round(signal.orders * 1000), np.round(np.array(quantity.orders) * 1000))
         c = np.where(keep[:, None, None], c, 0.0)

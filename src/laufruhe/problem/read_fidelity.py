@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.fidelity import EXACT, MODES, Fidelity
 from laufruhe.problem.automatic import DEFAULT_TOLERANCE, automatic
 from laufruhe.problem.complaints import Refused
 from laufruhe.problem.file_models import FidelityTable
 from laufruhe.problem.model import Problem
 
-_BY_HAND = ("samples", "orders", "rod", "gas", "gas_samples")
+_BY_HAND = ("samples", "orders", "rod", "gas", "gas_samples", "mounts", "modes")
 
 
 def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
@@ -22,6 +22,7 @@ def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
     Refused
         If a key contradicts another.
     """
+    _check_mounts(problem, table)
     inertia = math.inf if table.crank_inertia is None else table.crank_inertia
     if table.kinematics != "auto":
         if table.tolerance is not None:
@@ -45,4 +46,24 @@ def _by_hand(table: FidelityTable, exact: bool, inertia: float) -> Fidelity:
         gas=table.gas is not False,
         gas_samples=table.gas_samples,
         crank_inertia=inertia,
+        mounts=table.mounts or EXACT.mounts,
+        modes=None if table.modes is None else tuple(table.modes),
     )
+
+
+def _check_mounts(problem: Problem, table: FidelityTable) -> None:
+    """How mounts answer is a choice of elastic ones, and only one of it leaves them to be decided."""
+    for key in ("mounts", "modes"):
+        value = getattr(table, key)
+        if value is None or value == EXACT.mounts:
+            continue
+        name = f"fidelity.{key}"
+        if problem.engine.block is None:
+            raise Refused(name, value, "is a choice of elastic mounts", 'leave it out, or add mounts of kind "elastic"')
+        if problem.mount_design.decisions:
+            raise Refused(name, value, "would change with the mounts that are open", "leave it out, or fix the mounts")
+    modes = table.modes
+    if modes is not None and table.mounts in ("rigid", "time"):
+        raise Refused("fidelity.modes", modes, "go with mounts in the frequency domain", "leave one of the two out")
+    if modes is not None and (len(set(modes)) < len(modes) or not all(1 <= mode <= MODES for mode in modes)):
+        raise Refused("fidelity.modes", modes, f"must be different numbers from 1 to {MODES}", "1 is the lowest mode")

@@ -30,7 +30,7 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         "left out:",
         *(_line(part.what, part.why, part.share) for part in choice.left_out),
         "saved:",
-        f"  {pruned} force components sampled in place of {whole}, 1/{whole / max(pruned, 1):.0f}",
+        f"  {pruned} force components sampled in place of {whole}" + (f", 1/{whole / pruned:.0f}" if pruned else ""),
         f"  {milliseconds[0]:.3f} ms for another design in place of {milliseconds[1]:.3f} ms",
     ]
     return "\n".join(lines) + "\n"

@@ -5,52 +5,95 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from laufruhe.report.markdown import escaped
 from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade
+from laufruhe.studies.trade_optima import is_local
 
 DASH = "-"
 ALIKE = 1.3
+TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
+MOVED = " Throws leave their even steps here, and such optima are local: a regret may be below zero."
+LOCAL = (
+    " Mounts are decided here: every fidelity searches from the design as given alone, and finds an optimum nearby. "
+    "Choices about modes and time would change with the mounts, so they decide nothing. "
+    "A small regret may be below zero."
+)
 HEAD = (
     "| fidelity | error | said to be at most | another design | gradient | solve | from nothing | memory | regret |\n"
     "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
 )
 
 
-def as_page(found: Trade, picture: str, command: str) -> str:
-    """Table, picture and the choice for one problem."""
+def as_page(found: Trade, picture: str | None, command: str) -> str:
+    """Table, picture if there is one, and the choice for one problem."""
     problem = found.problem
-    inertia, change = found.flywheel
     optimum = "" if math.isnan(found.optimum) else f", of its optimum {found.optimum:.6g}"
     sections = [
         f"# Speed against accuracy: {escaped(problem.title)}",
         f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
-        f"(SI). Its order coefficients agree with 50-digit arithmetic to {max(found.rigid_part_error, 1e-17):.0e}.",
+        f"(SI). {_digits(found)}",
         f"**Take** {advice(found)}",
-        f"![Time against error of every fidelity; colour is regret]({picture})",
+        f"![Time against error of every fidelity; colour is regret]({picture})"
+        if picture
+        else "No load enters what is asked, so every fidelity gives the same number.",
         "\n".join([HEAD, *(_line(row) for row in found.rows)]),
         "*Another design*: objective with the scene prepared. *Gradient*: with its derivatives by all decisions. "
         "*Solve*: optimum from nothing, at this fidelity's own angles. *From nothing*: engine to objective. "
-        "*Regret*: by how much the reference objective of the optimum found is above that of the best.",
-        f"Constant crank speed: with a flywheel of {inertia:.3g} kg m2 for all that turns, at which the speed "
-        f"varies by some 2 %, the objective changes by {100.0 * change:+.2f} %. "
-        "No fidelity at constant speed sees that.",
+        "*Regret*: by how much the reference objective of the optimum found is above that of the best."
+        + (LOCAL if is_local(problem) else MOVED if problem.phasing and problem.phasing.continuous else ""),
+        *_beyond(found),
         f"```sh\n{command}\n```",
     ]
     return "\n\n".join(sections) + "\n"
 
 
+def _digits(found: Trade) -> str:
+    """What double precision costs, and of which measures that was found."""
+    part = found.rigid_part
+    return (
+        "Double precision against 50 digits, from the kinematics of every cylinder to the "
+        f"{' and '.join(part.covered)}: relative error {max(part.error, 1e-17):.0e}."
+    )
+
+
+def _beyond(found: Trade) -> list[str]:
+    """What no fidelity at constant speed, or none in the frequency domain, sees."""
+    lines = []
+    if found.flywheel is not None:
+        inertia, change = found.flywheel
+        lines.append(
+            f"Constant crank speed: with a flywheel of {inertia:.3g} kg m2 for all that turns, at which the speed "
+            f"varies by some 2 %, the objective changes by {100.0 * change:+.2f} %. "
+            "No fidelity at constant speed sees that."
+        )
+    if found.time_domain is not None:
+        own = found.time_domain
+        lines.append(
+            f"Time domain ({own.point}): mount forces integrated in time agree with the same equations in the "
+            f"frequency domain to {own.integration:.0e} of their peak. Hysteretic loss has no law in time; the viscous "
+            f"damping in its place changes them by up to {100.0 * own.loss:.2g} % of the peak."
+        )
+    return lines
+
+
 def advice(found: Trade) -> str:
-    """The cheapest fidelity whose number, and whose decision, are good to a thousandth."""
+    """The choices in words."""
+    number, decided = choices(found)
+    text = f"`{number.name}` where a number good to 0.1 % is wanted ({_time(number.evaluation)} a design)"
+    if decided is not None:
+        text += f"; `{decided.name}` to decide, its optimum is within 0.1 % of the best ({_time(decided.solve)})"
+    return text + "."
+
+
+def choices(found: Trade) -> tuple[Row, Row | None]:
+    """The cheapest fidelity whose number, and the cheapest whose decision, is good to a thousandth."""
     good = [row for row in found.rows if row.error <= 1e-3]
     number = _quick(good, lambda row: row.evaluation) if good else found.rows[-1]
-    text = f"`{number.name}` where a number good to 0.1 % is wanted ({_time(number.evaluation)} a design)"
-    decided = [row for row in found.rows if not math.isnan(row.regret) and row.regret <= 1e-3]
-    if decided:
-        best = _quick(decided, lambda row: row.solve)
-        text += f"; `{best.name}` to decide, its optimum is within 0.1 % of the best ({_time(best.solve)})"
-    return text + "."
+    deciding = [row for row in found.rows if not math.isnan(row.regret) and row.regret <= 1e-3]
+    return number, _quick(deciding, lambda row: row.solve) if deciding else None
 
 
 def _quick(rows: Sequence[Row], time: Callable[[Row], float]) -> Row:
@@ -64,44 +107,87 @@ def as_json(found: Trade) -> str:
     content = {
         "problem": found.problem.name,
         "reference": {"objective": found.value, "optimum": _finite(found.optimum)},
-        "rigid_part_error": found.rigid_part_error,
-        "uneven_speed": {"crank_inertia": found.flywheel[0], "change": found.flywheel[1]},
+        "rigid_part": asdict(found.rigid_part),
+        "uneven_speed": None
+        if found.flywheel is None
+        else dict(zip(("crank_inertia", "change"), found.flywheel, strict=True)),
+        "time_domain": None if found.time_domain is None else asdict(found.time_domain),
         "rows": [_entry(row) for row in found.rows],
     }
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
 def index(trades: Sequence[Trade]) -> str:
-    """One line for every problem."""
+    """One line for every problem, and what they have in common."""
     lines = [
         "# Speed against accuracy",
         "",
-        "Which fidelity to take, measured on every ready problem. In short:",
+        f"Which fidelity to take, measured on {len(trades)} ready problems. In short:",
         "",
-        "- `auto` is the safe choice: it says how wrong it can be, and is not more wrong than that.",
-        "- The two-order formulas of textbooks cost up to 2 % of the number, and up to 2 % of the design. "
+        "- `auto` is the safe choice: it says how wrong it can be, and is not more wrong than that. Where nothing but "
+        "modes or sag is asked, no load needs to be computed.",
+        f"- {_cost(trades, TWO_ORDER, 'The two-order formulas of textbooks cost')} "
         "Engines whose second order cancels are left with what these formulas leave out.",
-        "- Leaving gas out is what costs most: it decides how the roll moment is balanced.",
+        f"- {_cost(trades, NO_GAS, 'Leaving gas out costs')} It decides how the roll moment is balanced.",
+        f"- {_cost(trades, RIGID, 'Taking elastic mounts for rigid costs')} A few modes are no way out: "
+        "all that the scene excites take the same time.",
         "- More than 720 steps a cycle serve peaks and proofs, not means.",
         "- Regret may be far below the error, for an optimum is flat, and far above it: what a shaft is wrongly made "
         "to balance stays. Read both columns.",
         "",
-        "| problem | take | error of two-order | of no gas | of auto 0.001 | regret of two-order | of auto 0.001 "
-        "| uneven speed |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |",
+        "| problem | for a number good to 0.1 % | a design | to decide within 0.1 % | a solve "
+        "| error of two-order | of no gas | of auto 0.001 | regret of two-order | of auto 0.001 | uneven speed |",
+        "| --- | --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
-    for found in trades:
-        named = {row.name: row for row in found.rows}
-        two, auto = named.get("two-order, 720 steps"), named.get("auto 0.001")
-        gas = named.get("exact without gas, 720 steps")
-        name = found.problem.name
-        lines.append(
-            f"| [{name}]({name}.md) | {advice(found)} | {_error(two)} | {_error(gas)} | {_error(auto)} "
-            f"| {_regret(two)} | {_regret(auto)} | {100.0 * found.flywheel[1]:+.2f} % |"
-        )
-    lines += ["", "A dash under regret: only the crank star is open, no unbalance."]
+    lines += [_index_line(found) for found in trades]
+    lines += [
+        "",
+        "A dash: the problem has no such part, leaves nothing open, has an optimum of zero, or asks of mounts what no "
+        "load enters. Where mounts are open, or throws one by one, optima are local: a regret there says as much of "
+        "the search as of the fidelity, and may be below zero.",
+    ]
     lines += ["", "*Uneven speed*: what a flywheel that leaves 2 % of unevenness changes of the objective."]
     return "\n".join(lines) + "\n"
+
+
+def _index_line(found: Trade) -> str:
+    two, auto, gas = (_named(found, name) for name in (TWO_ORDER, "auto 0.001", NO_GAS))
+    number, decided = choices(found)
+    deciding = f"`{decided.name}` | {_time(decided.solve)}" if decided else f"{DASH} | {DASH}"
+    name = found.problem.name
+    return (
+        f"| [{name}]({name}.md) | `{number.name}` | {_time(number.evaluation)} | {deciding} | {_error(two)} "
+        f"| {_error(gas)} | {_error(auto)} | {_regret(two)} | {_regret(auto)} | {_uneven(found)} |"
+    )
+
+
+def _named(found: Trade, name: str) -> Row | None:
+    return next((row for row in found.rows if row.name == name), None)
+
+
+def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
+    """What a fidelity costs of the number and of the design, at worst and in the middle."""
+    rows = [row for found in trades if found.problem.objective and (row := _named(found, name)) is not None]
+    errors = sorted(row.error for row in rows)
+    regrets = sorted(max(row.regret, 0.0) for row in rows if not math.isnan(row.regret))
+    if not errors:
+        return f"{what} nothing that these problems show."
+    text = f"{what} up to {_percent(errors[-1])} of the number{_middle(errors)}"
+    if regrets:
+        text += f"; of the design up to {_percent(regrets[-1])}{_middle(regrets)}"
+    return text + "."
+
+
+def _middle(shares: Sequence[float]) -> str:
+    """Of a few problems the middle says nothing."""
+    count = len(shares)
+    return f", {_percent(shares[count // 2])} in the middle of {count} problems" if count > 2 else ""
+
+
+def _percent(share: float) -> str:
+    if share < 1e-4:
+        return "less than 0.01 %"
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
 def _line(row: Row) -> str:
@@ -111,10 +197,20 @@ def _line(row: Row) -> str:
     )
 
 
+def _uneven(found: Trade) -> str:
+    return DASH if found.flywheel is None else f"{100.0 * found.flywheel[1]:+.2f} %"
+
+
 def _time(seconds: float) -> str:
     if math.isnan(seconds):
         return DASH
-    return f"{1e6 * seconds:.0f} us" if seconds < 1e-3 else f"{1e3 * seconds:.3g} ms"
+    return (
+        f"{1e6 * seconds:.0f} us"
+        if seconds < 1e-3
+        else f"{1e3 * seconds:.3g} ms"
+        if seconds < 1.0
+        else f"{seconds:.3g} s"
+    )
 
 
 def _error(row: Row | None) -> str:

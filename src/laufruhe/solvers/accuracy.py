@@ -56,5 +56,5 @@ def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result
         better = choose(problem, asked, result.final.engine).fidelity
         if better == result.problem.fidelity:
             break
-        result = solve(replace(problem, fidelity=better))
+        result = solve(problem.at(better))
     return replace(result, error_estimate=error_of(result.problem, result.final))

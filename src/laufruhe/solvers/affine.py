@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.mounting import Mounting, mounting_of, travel_of
+from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_rotor_loads
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
@@ -22,6 +25,8 @@ from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject
 from laufruhe.solvers.domain import Domain, domains_of
 
 Array = NDArray[np.float64]
+
+NEEDED = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,15 +89,32 @@ class AffineProblem:
         """Largest size of every column."""
         return np.concatenate([np.full(d.width, d.scale) for d in self.domains]) if self.domains else np.zeros(0)
 
+    @cached_property
+    def units(self) -> Array:
+        """A size of every column for a solver: its bound, or a thousand times what all loads need if that is less.
+
+        Bounds that are far apart would else leave no digits for the small ones.
+        """
+        norms = [norm for _, norm in (*self.terms, *self.limits)]
+        constants = [float(np.linalg.norm(norm.constant)) for norm in norms]
+        squares = [np.einsum("kdn,kdn->n", norm.slope, norm.slope) for norm in norms]
+        found = []
+        for domain in self.domains:
+            own = [math.sqrt(float(square[domain.columns].sum())) for square in squares]
+            needs = [constant / size for constant, size in zip(constants, own, strict=True) if size > 0.0]
+            needed = NEEDED * max(needs, default=0.0)
+            found.append(np.full(domain.width, min(domain.scale, needed) if needed > 0.0 else domain.scale))
+        return np.concatenate(found) if found else np.zeros(0)
+
     def objective(self, x: Array) -> float:
         """Weighted sum of the terms."""
         return sum(weight * norm.value(x) for weight, norm in self.terms)
 
 
 def reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
-    """A size of these norms that is not zero: at no decisions, or at their largest."""
+    """A size of these norms that is not zero: at no decisions, or at large ones."""
     sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
-    sizes += [float(np.abs(norm.slope * problem.scales).max(initial=0.0)) for norm in norms]
+    sizes += [float(np.abs(norm.slope * problem.units).max(initial=0.0)) for norm in norms]
     return max(sizes, default=0.0) or 1.0
 
 
@@ -118,7 +140,9 @@ class AffineModel:
         self._keep_all = keep_all
         self.domains = domains_of(problem.decisions)
         bare = evaluate(problem, problem.design([0.0] * len(problem.decisions)))
-        mounting = mounting_of(problem.engine)
+        if problem.fidelity.mounts == "time" and problem.engine.block is not None:
+            raise ModelError(NO_MAP)
+        mounting = mounting_of(problem.engine, problem.fidelity)
         changes = [_change(problem, k, direction) for k, d in enumerate(self.domains) for direction in d.directions]
         self.bare, self._changes = bare, changes
         orders = [Fraction(abs(r.shaft.ratio)).limit_denominator(1000) for rotors in changes for r in rotors]
@@ -210,7 +234,7 @@ def _slope(
     wrench = added_rotor_loads(rotors, engine, point, fidelity)
     if subject is Subject.MOUNT_FORCE and mounting is not None:
         return mounting.forces(wrench, point.speed)
-    travel = travel_of(mounting, wrench, point.speed) if subject is Subject.MOUNT_TRAVEL else None
+    travel = travel_of(engine, mounting, wrench, point.speed) if subject is Subject.MOUNT_TRAVEL else None
     return wrench if travel is None else travel
 
 

@@ -64,6 +64,10 @@ class Designs:
             total += weight * norm.values(features, threads, cache_bytes)
         return total
 
+    def one(self, features: Array) -> float:
+        """Objective of a single design, of 1 and the decision vector, shape (1 + columns,)."""
+        return sum(weight * norm.value(features) for weight, norm in self.terms)
+
     @property
     def columns(self) -> int:
         """Length of the decision vector."""

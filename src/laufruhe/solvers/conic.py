@@ -57,7 +57,7 @@ class ConicProgram:
     def __init__(self, problem: AffineProblem, reusable: bool = False) -> None:
         self._problem = problem
         self._reusable = reusable
-        # decisions in units of their bounds, rows in units of what they can reach
+        # decisions in units of what they may need, rows in units of what these can reach
         self._y = cp.Variable(problem.size)
         self._unit = reach(problem, [norm for _, norm in problem.terms])
         self._terms = [self._cone(norm, self._unit) for _, norm in problem.terms]
@@ -72,14 +72,18 @@ class ConicProgram:
             _value(norm, cone) <= most
             for (_, norm), cone, most in zip(problem.limits, self._limits, self._maxima, strict=True)
         ]
-        constraints += [c for domain in problem.domains for c in _membership(domain, self._y[domain.columns])]
+        constraints += [
+            c
+            for domain in problem.domains
+            for c in _membership(domain, self._y[domain.columns], float(problem.units[domain.start]))
+        ]
         self._program = cp.Problem(cp.Minimize(sum(least)), constraints)
 
     def _cone(self, norm: AffineNorm, unit: float) -> _Cone:
         """V0 + B x in a second-order cone a row, or in one cone for a root mean square."""
         k, d = norm.constant.shape
         constant = self._number(norm.constant / unit)
-        slope = (norm.slope * (self._problem.scales / unit)).reshape(k * d, -1)
+        slope = (norm.slope * (self._problem.units / unit)).reshape(k * d, -1)
         rows = cp.reshape(slope @ self._y, (k, d), order="C") + constant
         if norm.norm is Norm.RMS:
             factors = np.sqrt(norm.weights)
@@ -128,7 +132,7 @@ class ConicProgram:
             return ConicSolution(None, Multipliers((), ()), seconds, iterations)
         if self._y.value is None:
             raise SolverError(f"the cone solver stopped with status '{status}'")
-        x = np.asarray(self._y.value) * problem.scales
+        x = np.asarray(self._y.value) * self._problem.units
         for domain in problem.domains:
             x[domain.columns] = domain.project(x)
         terms = tuple(
@@ -142,11 +146,11 @@ def _value(norm: AffineNorm, cone: _Cone) -> Any:
     return norm.weights @ cone.heads if norm.norm is Norm.SUM else cone.heads
 
 
-def _membership(domain: Domain, y: Any) -> list[Any]:
-    """The decision's own set, in units of its largest size (P4)."""
+def _membership(domain: Domain, y: Any, unit: float) -> list[Any]:
+    """The decision's own set, in units of a size (P4)."""
     if domain.width == 1:
-        return [y >= domain.decision.lower / domain.scale, y <= domain.decision.upper / domain.scale]
-    inside: list[Any] = [cp.SOC(cp.Constant(domain.decision.upper / domain.scale), y)]
+        return [y >= domain.decision.lower / unit, y <= domain.decision.upper / unit]
+    inside: list[Any] = [cp.SOC(cp.Constant(domain.decision.upper / unit), y)]
     if len(domain.edges):
         (ax, ay), (bx, by) = domain.edges
         inside += [ax * y[1] - ay * y[0] >= 0.0, bx * y[1] - by * y[0] <= 0.0]
@@ -167,20 +171,29 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
     weights
         Of every decision's size.
     """
+    total = sum(w * float(np.hypot.reduce(x[d.columns])) for w, d in zip(weights, problem.domains, strict=True))
+    # nothing lighter is larger than all of this together, whatever the bounds
+    units = [
+        min(d.scale, total / w) if w * total > 0.0 else d.scale for w, d in zip(weights, problem.domains, strict=True)
+    ]
+    scales = np.repeat(units, [d.width for d in problem.domains])
     z = cp.Variable(still.shape[1])
-    scales = problem.scales
-    y = x / scales + (still / scales[:, None]) @ z
-    sizes = [w * d.scale * cp.norm(y[d.columns]) for w, d in zip(weights, problem.domains, strict=True)]
-    held = [c for d in problem.domains for c in _membership(d, y[d.columns])]
+    step = still * (np.abs(x).max() or 1.0)
+    y = x / scales + (step / scales[:, None]) @ z
+    sizes = [
+        w * unit / max(units) * cp.norm(y[d.columns])
+        for w, unit, d in zip(weights, units, problem.domains, strict=True)
+    ]
+    held = [c for d, unit in zip(problem.domains, units, strict=True) for c in _membership(d, y[d.columns], unit)]
     for maximum, norm in problem.limits:
-        moves = np.einsum("kdn,nm->kdm", norm.slope, still)
+        moves = np.einsum("kdn,nm->kdm", norm.slope, step)
         if np.any(moves != 0.0) and norm.norm is Norm.SUM:
             k, d = norm.constant.shape
             rows = norm.rows(x) + cp.reshape(moves.reshape(k * d, -1) @ z, (k, d), order="C")
             held.append(norm.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
     program = cp.Problem(cp.Minimize(cp.sum(cp.hstack(sizes))), held)
     with warnings.catch_warnings():
-        # the design is evaluated again, however inaccurate this was
+        # the loads stay what they are however accurate this is
         warnings.simplefilter("ignore")
         try:
             program.solve(solver=cp.CLARABEL)
@@ -188,7 +201,7 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
             return x
     if z.value is None:
         return x
-    lighter = x + still @ np.asarray(z.value)
+    lighter = x + step @ np.asarray(z.value)
     for domain in problem.domains:
         lighter[domain.columns] = domain.project(lighter)
     return np.asarray(lighter)

@@ -122,7 +122,7 @@ def solve_direct(problem: AffineProblem) -> ConicSolution:
         columns += heads
     rows = _Rows(columns)
     for domain in problem.domains:
-        _add_domain(rows, domain)
+        _add_domain(rows, domain, float(problem.units[domain.start]))
     for (maximum, _), block in zip(problem.limits, blocks[len(problem.terms) :], strict=True):
         rows.add(0, np.arange(*_span(block)), block.value, np.array([maximum / block.unit]))
         rows.cones.append(clarabel.NonnegativeConeT(1))
@@ -152,7 +152,7 @@ def _answer(problem: AffineProblem, blocks: list[_Block], starts: list[int], fou
         return ConicSolution(None, Multipliers((), ()), seconds, iterations)
     if "Solved" not in status:
         raise SolverError(f"the cone solver stopped with status '{status}'")
-    x = np.asarray(found.x)[: problem.size] * problem.scales
+    x = np.asarray(found.x)[: problem.size] * problem.units
     for domain in problem.domains:
         x[domain.columns] = domain.project(x)
     duals = np.asarray(found.z)
@@ -166,11 +166,11 @@ def _span(block: _Block) -> tuple[int, int]:
     return block.heads[0], block.heads[0] + block.heads[1]
 
 
-def _add_domain(rows: _Rows, domain: Domain) -> None:
-    """The decision's own set, in units of its largest size (P4)."""
+def _add_domain(rows: _Rows, domain: Domain, unit: float) -> None:
+    """The decision's own set, in units of a size (P4)."""
     import clarabel
 
-    upper, lower = domain.decision.upper / domain.scale, domain.decision.lower / domain.scale
+    upper, lower = domain.decision.upper / unit, domain.decision.lower / unit
     if domain.width == 1:
         rows.add([0, 1], domain.start, [1.0, -1.0], np.array([upper, -lower]))
         rows.cones.append(clarabel.NonnegativeConeT(2))
@@ -190,7 +190,7 @@ def _add_norm(rows: _Rows, block: _Block, problem: AffineProblem) -> int:
 
     norm, start = block.norm, rows.count
     k, d = norm.constant.shape
-    slope = norm.slope * (problem.scales / block.unit) * block.factors[:, None, None]
+    slope = norm.slope * (problem.units / block.unit) * block.factors[:, None, None]
     constant = norm.constant / block.unit * block.factors[:, None]
     whole = norm.norm is Norm.RMS
     # rows of the program in the order of its cones: a head, then what is under it

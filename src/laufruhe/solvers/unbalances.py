@@ -15,7 +15,7 @@ from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, evaluate, o
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.affine import AffineModel, AffineProblem
+from laufruhe.solvers.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.solvers.certificate import Bound, Certificate, Proof, best_bound, kkt_residual
 from laufruhe.solvers.direct_cones import ConicSolution
 from laufruhe.solvers.domain import Domain
@@ -161,12 +161,40 @@ def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
     if still.shape[1]:
         sizes = [sum(abs(drive.gain) for drive in domain.decision.drives) for domain in affine.domains]
         x = lightest(affine, x, still, sizes)
+    return _without_negligible(affine, x)
+
+
+def _without_negligible(affine: AffineProblem, x: Array) -> Array:
+    """Decisions at zero that hardly load anything, or whose absence makes nothing worse.
+
+    Judged by their loads and not by their bounds, which may be a million times what is needed.
+    """
     x = x.copy()
+    nothing = np.zeros_like(x)
+    norms = [(norm, max(norm.value(x), norm.value(nothing))) for _, norm in affine.terms]
+    norms = _linear(norms)
     for domain in affine.domains:
-        part = x[domain.columns]
-        if domain.decision.lower <= 0.0 and float(np.hypot.reduce(part)) <= NEGLIGIBLE * domain.scale:
-            x[domain.columns] = 0.0
+        if domain.decision.lower > 0.0 or not x[domain.columns].any():
+            continue
+        alone, without = nothing.copy(), x.copy()
+        alone[domain.columns] = x[domain.columns]
+        without[domain.columns] = 0.0
+        faint = all(norm.value(alone) <= NEGLIGIBLE * size for norm, size in norms)
+        if (faint or affine.objective(without) <= affine.objective(x)) and _keeps_limits(affine, x, without):
+            x = without
     return x
+
+
+def _keeps_limits(affine: AffineProblem, x: Array, without: Array) -> bool:
+    """Whether no limit is broken that was kept, and none that was broken is broken more."""
+    return all(
+        norm.value(without) <= (1.0 + 0.1 * FEASIBLE) * max(maximum, norm.value(x)) for maximum, norm in affine.limits
+    )
+
+
+def _linear(norms: Sequence[tuple[AffineNorm, float]]) -> list[tuple[AffineNorm, float]]:
+    """The norms without their constants: what decisions alone make."""
+    return [(replace(norm, constant=np.zeros_like(norm.constant)), size) for norm, size in norms]
 
 
 def _excess(affine: AffineProblem, x: Array) -> float:
@@ -188,12 +216,16 @@ def _indistinguishable(problem: Problem, affine: AffineProblem) -> Array:
         norm for limit, (_, norm) in zip(problem.limits, affine.limits, strict=True)
         if limit.quantity.subject not in MASSES
     ]  # fmt: skip
-    slopes = [(norm.slope * affine.scales).reshape(-1, affine.size) for norm in loads]
+    # each decision in the size of what it loads: bounds may be far apart, and far from what is needed
+    sizes = np.sqrt(np.sum([np.sum(norm.slope**2, axis=(0, 1)) for norm in loads], axis=0))
+    units = np.where(sizes > 0.0, 1.0 / np.where(sizes > 0.0, sizes, 1.0), affine.scales)
+    slopes = [(norm.slope * units).reshape(-1, affine.size) for norm in loads]
     stacked = np.concatenate([_triangle(flat) for flat in slopes])
     _, values, rows = np.linalg.svd(stacked, full_matrices=True)
     small = np.ones(affine.size, dtype=bool)
     small[: len(values)] = values <= SAME_LOAD * values[0]
-    return np.asarray(rows[small].T * affine.scales[:, None])
+    still = rows[small].T * units[:, None]
+    return np.asarray(still / np.abs(still).max(axis=0, initial=1e-300))
 
 
 def _triangle(slope: Array) -> Array:

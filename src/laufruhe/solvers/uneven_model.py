@@ -68,7 +68,7 @@ class UnevenModel:
     def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
         self.problem, self.layout, self.rides = problem, layout, rides
         self.domains: tuple[Domain, ...] = domains_of(problem.decisions)
-        self._mounting = mounting_of(problem.engine)
+        self._mounting = mounting_of(problem.engine, problem.fidelity)
         self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
 
     def squares(self, quantity: Quantity, at: Symbols) -> Any:

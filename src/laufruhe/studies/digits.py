@@ -1,4 +1,4 @@
-"""The rigid part in 50 digits: what double precision costs (F13)."""
+"""Order coefficients in 50 digits: what double precision costs them (F13)."""
 
 from __future__ import annotations
 
@@ -7,24 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Engine
-from laufruhe.physics.order_coefficients import orders_needed, piston_acceleration_orders
+from laufruhe.physics.order_coefficients import orders_needed
 
 DIGITS = 50
-_ORDERS = 24
-
-
-def rigid_part_error(engine: Engine) -> float:
-    """Largest relative error of the order coefficients of s'' of an engine's mechanisms."""
-    shapes = {(part.rod_ratio, part.offset_ratio) for part in engine.slider_cranks}
-    return max((_error(*shape) for shape in shapes), default=0.0)
-
-
-def _error(rod_ratio: float, offset_ratio: float) -> float:
-    highest = min(_ORDERS, orders_needed(rod_ratio, offset_ratio))
-    ours = piston_acceleration_orders(rod_ratio, offset_ratio, highest)
-    exact = acceleration_orders(rod_ratio, offset_ratio, highest)
-    return float(np.abs(ours - exact).max() / np.abs(exact).max())
 
 
 @lru_cache(maxsize=32)

@@ -11,19 +11,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import ModelError, SolverError
+from laufruhe.errors import ModelError
+from laufruhe.machine import Engine
 from laufruhe.numerics import mixed_norms
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.automatic import choose
+from laufruhe.physics.shaking_loads import forget, shaking_loads
+from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
 from laufruhe.problem.error_bounds import REFERENCE_SAMPLES, error_bound, reference
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_design import mounting_in
+from laufruhe.problem.mount_values import whole_objective
 from laufruhe.solvers.affine import AffineModel, AffineNorm
-from laufruhe.studies.digits import rigid_part_error
+from laufruhe.studies.rigid_digits import RigidPart, rigid_part
+from laufruhe.studies.trade_ladder import TIME_ORDERS, TIME_SAMPLES, ladder
+from laufruhe.studies.trade_optima import is_open, optimum
 
 Array = NDArray[np.float64]
 
-AUTO = (1e-2, 1e-3, 1e-4)
 REFERENCE_STEPS = 1440
 """Steps over the period at which the optimum beside which a regret is counted is solved."""
 _LEAST_TIME, _MOST_REPEATS = 0.02, 50
@@ -40,21 +45,21 @@ class Row:
     error
         Of the objective of the design as given, relative to the reference.
     estimate
-        That the error is said not to exceed.
+        That the error is said not to exceed, relative to the reference too.
     evaluation, gradient, solve
-        Seconds; another design with the scene prepared, its gradient with it, and an
-        optimum from nothing. NaN where nothing is open.
+        Seconds; another design with the scene prepared (from nothing where that cannot
+        be prepared), its gradient with it, and an optimum from nothing. NaN where
+        nothing is open, or this fidelity cannot decide it.
     fresh
         Seconds of an evaluation from nothing.
     memory
         Largest memory of an evaluation from nothing [byte].
     regret
         Reference objective of this fidelity's optimum over the reference optimum, less
-        one; NaN where nothing is open.
+        one; NaN as above.
     """
 
     name: str
-    fidelity: Fidelity
     error: float
     estimate: float
     evaluation: float
@@ -63,6 +68,25 @@ class Row:
     fresh: float
     memory: int
     regret: float
+
+
+@dataclass(frozen=True)
+class TimeDomain:
+    """Mount forces integrated in time beside those of the frequency domain, over their peak.
+
+    Attributes
+    ----------
+    point
+        Operating point.
+    integration
+        Largest difference from the same equations in the frequency domain.
+    loss
+        Largest difference from hysteretic loss, which has no law in time (E26).
+    """
+
+    point: str
+    integration: float
+    loss: float
 
 
 @dataclass(frozen=True)
@@ -75,40 +99,22 @@ class Trade:
         Reference objective of the design as given [SI].
     optimum
         Reference objective of the reference optimum [SI]; NaN where nothing is open.
-    rigid_part_error
-        Relative disagreement of the reference's order coefficients with 50 digits.
+    rigid_part
+        Disagreement of the rigid reference with 50 digits.
     flywheel
         Crank inertia at which the constant speed was priced [kg m2], and the relative
-        change of the objective that the uneven speed makes.
+        change of the objective that the uneven speed makes; None where no load is asked.
+    time_domain
+        Elastic mounts in time beside the frequency domain; None where mounts are rigid.
     """
 
     problem: Problem
     rows: tuple[Row, ...]
     value: float
     optimum: float
-    rigid_part_error: float
-    flywheel: tuple[float, float]
-
-
-def ladder(problem: Problem) -> list[tuple[str, Fidelity]]:
-    """Every fidelity that differs on this problem, cheap ones first."""
-    has_gas = any(point.gas is not None for point in problem.points)
-    has_rod = any(part.rod_inertia_deficit != 0.0 for part in problem.engine.slider_cranks)
-    gas = 1440 if has_gas else None
-    found = [("two-order, 48 steps", Fidelity("two-order", 48, gas_samples=gas))]
-    if has_gas:
-        found.append(("exact without gas, 720 steps", Fidelity(samples=720, gas=False)))
-    if has_rod:
-        found.append(("exact, rod of two masses, 720 steps", Fidelity(samples=720, rod="mass-only")))
-    found.append(("two-order, 720 steps", Fidelity("two-order", 720)))
-    found += [
-        (f"orders to {orders}, {samples} steps", Fidelity(samples=samples, orders=orders, gas_samples=gas))
-        for orders, samples in ((4, 96), (8, 192), (24, 360))
-    ]
-    found += [(f"exact, {samples} steps", Fidelity(samples=samples)) for samples in (720, 1440, 2880)]
-    if problem.objective:
-        found += [(f"auto {tolerance:g}", choose(problem, tolerance).fidelity) for tolerance in AUTO]
-    return found
+    rigid_part: RigidPart
+    flywheel: tuple[float, float] | None
+    time_domain: TimeDomain | None
 
 
 def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trade:
@@ -119,50 +125,67 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     ModelError
         If the problem has no objective.
     """
-    if not problem.objective:
+    if not problem.objective and not problem.mount_design.terms:
         raise ModelError("a trade needs an objective; add [objective]")
     best = reference(problem)
-    value = objective_value(problem, best)
-    model = AffineModel(replace(problem, fidelity=best.fidelity)) if problem.decisions else None
-    optimum = math.nan
-    if model is not None:
+    truth = whole_objective(problem, best)
+    least = math.nan
+    if is_open(problem):
         say("solving the reference")
-        optimum = _reference_value(problem, _optimum(model, REFERENCE_STEPS))
+        engine = optimum(problem.at(Fidelity(samples=REFERENCE_STEPS)), REFERENCE_STEPS)
+        least = math.nan if engine is None else _reference_value(problem, engine)
     rows = []
-    for name, fidelity in ladder(problem):
+    for name, own in ladder(problem):
         say(name)
-        rows.append(_row(problem, name, fidelity, best, optimum))
+        rows.append(_row(name, own, best, truth, least))
     say("uneven crank speed")
     return Trade(
-        problem, tuple(rows), value, optimum, rigid_part_error(problem.engine), _price_of_constant_speed(problem)
+        problem, tuple(rows), truth, least, rigid_part(problem),
+        _price_of_constant_speed(problem) if problem.objective else None, _price_of_time(problem),
+    )  # fmt: skip
+
+
+def _row(name: str, own: Problem, best: Evaluation, truth: float, least: float) -> Row:
+    evaluation = evaluate(own)
+    value = whole_objective(own, evaluation)
+    prepared, gradient = _prepared_times(own)
+    solve, regret = math.nan, math.nan
+    if is_open(own) and own.fidelity.mounts != "time":
+        started = time.perf_counter()
+        engine = optimum(own)
+        if engine is not None:
+            solve = time.perf_counter() - started
+            whole = replace(own, points=tuple(loads.point for loads in best.loads))
+            regret = _reference_value(whole, engine) / least - 1.0 if least > 0.0 else math.nan
+    fresh = seconds(lambda: _from_nothing(own))
+    return Row(
+        name=name,
+        error=abs(value - truth) / truth if truth > 0.0 else 0.0,
+        # the bound is over what was computed, a table compares with the reference
+        estimate=error_bound(own, evaluation, best) * value / truth if truth > 0.0 else 0.0,
+        evaluation=fresh if math.isnan(prepared) else prepared,
+        gradient=gradient,
+        solve=solve,
+        fresh=fresh,
+        memory=_memory(lambda: _from_nothing(own)),
+        regret=regret,
     )
 
 
-def _row(problem: Problem, name: str, fidelity: Fidelity, best: Evaluation, optimum: float) -> Row:
-    own = replace(problem, fidelity=fidelity)
-    evaluation = evaluate(own)
-    value, truth = objective_value(own, evaluation), objective_value(problem, best)
+def _from_nothing(own: Problem) -> float:
+    forget()
+    return whole_objective(own, evaluate(own))
+
+
+def _prepared_times(own: Problem) -> tuple[float, float]:
+    """Seconds of another design and of its gradient; NaN where loads are not asked or not linear."""
+    if not own.objective or own.fidelity.mounts == "time":
+        return math.nan, math.nan
     model = AffineModel(own)
     affine = model.at(model.full_samples)
     x = np.concatenate([d.columns_of(d.decision.start) for d in affine.domains]) if affine.domains else np.zeros(0)
-    solve, regret = math.nan, math.nan
-    if problem.decisions:
-        started = time.perf_counter()
-        found = _optimum(AffineModel(own), model.full_samples)
-        solve = time.perf_counter() - started
-        regret = _reference_value(problem, found) / optimum - 1.0 if optimum > 0.0 else math.nan
-    return Row(
-        name=name,
-        fidelity=fidelity,
-        error=abs(value - truth) / truth if truth > 0.0 else 0.0,
-        estimate=error_bound(own, evaluation, best),
-        evaluation=seconds(lambda: affine.objective(x)),
-        gradient=seconds(lambda: _value_and_gradient(affine.terms, x)) if problem.decisions else math.nan,
-        solve=solve,
-        fresh=seconds(lambda: objective_value(own, evaluate(own))),
-        memory=_memory(lambda: objective_value(own, evaluate(own))),
-        regret=regret,
-    )
+    gradient = seconds(lambda: _value_and_gradient(affine.terms, x)) if own.decisions else math.nan
+    return seconds(lambda: affine.objective(x)), gradient
 
 
 def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -> tuple[float, Array]:
@@ -176,18 +199,23 @@ def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -
     return value, gradient
 
 
-def _optimum(model: AffineModel, samples: int) -> list[complex]:
-    """Decisions that are best at this model's samples, no refinement."""
-    from laufruhe.solvers.conic import ConicProgram
-
-    solution = ConicProgram(model.at(samples)).solve()
-    if solution.x is None:
-        raise SolverError("the limits cannot be met together; a regret needs a design")
-    return [domain.complex_value(solution.x) for domain in model.domains]
+def _reference_value(problem: Problem, engine: Engine) -> float:
+    return whole_objective(problem, reference(problem, engine))
 
 
-def _reference_value(problem: Problem, values: list[complex]) -> float:
-    return objective_value(problem, reference(problem, problem.design(values)))
+def _price_of_time(problem: Problem) -> TimeDomain | None:
+    """Elastic mounts by integration beside the frequency domain, at the first operating point."""
+    if problem.engine.block is None:
+        return None
+    point, mounting = problem.points[0], mounting_in(problem.engine)
+    wrench = shaking_loads(problem.engine, point, Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS))
+    found = TimeMounting(mounting, TIME_SAMPLES).forces(wrench, point.speed).sample(TIME_SAMPLES)
+    same, own = (
+        spectrum.sample(TIME_SAMPLES)
+        for spectrum in (viscous_forces(mounting, wrench, point.speed), mounting.forces(wrench, point.speed))
+    )
+    peak = float(np.abs(same).max())
+    return TimeDomain(point.name, *(float(np.abs(found - other).max()) / peak for other in (same, own)))
 
 
 def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:

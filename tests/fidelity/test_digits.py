@@ -1,0 +1,60 @@
+"""The rigid reference in 50 digits: double precision agrees with it, and a wrong number would show."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from fidelity.scenes import random_problem
+from laufruhe.problem.model import Problem
+from laufruhe.problem.reader import load
+from laufruhe.studies import rigid_digits
+from laufruhe.studies.rigid_digits import rigid_part
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_double_precision_on_random_engines(seed: int) -> None:
+    """Offsets, rods with inertia, rotating masses, vees, shafts either way, gas, one or two points, every norm."""
+    found = rigid_part(random_problem(random.Random(40 + seed)))
+    assert found.covered
+    assert found.error <= 2e-14
+
+
+@pytest.mark.parametrize("name", ["tractor-four-lanchester", "vee-eight-cross", "powertrain-torque-roll"])
+def test_double_precision_on_ready_engines(name: str) -> None:
+    assert rigid_part(load(PROBLEMS / f"{name}.toml")).error <= 2e-15
+
+
+@pytest.mark.parametrize("part", ["reciprocating_mass", "rotating_mass", "rod_inertia_deficit", "offset"])
+def test_a_wrong_number_shows(part: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One part of the engine off by 1e-6 in 50 digits only."""
+    problem = random_problem(random.Random(53), gas=False)
+    parts = tuple(
+        replace(p, rotating_mass=0.5, rod_inertia_deficit=0.004, offset=0.002) for p in problem.engine.slider_cranks
+    )
+    problem = replace(problem, engine=replace(problem.engine, slider_cranks=parts))
+    quantity = replace(problem.objective[0].quantity, subject=rigid_digits.Subject.MOUNT_FORCE)
+    problem = replace(problem, objective=(replace(problem.objective[0], quantity=quantity),))
+    assert rigid_part(problem).error <= 1e-14
+    exact = rigid_digits.wrench_in_digits
+
+    def off(engine, point):  # type: ignore[no-untyped-def]
+        changed = tuple(replace(p, **{part: getattr(p, part) * (1.0 + 1e-6)}) for p in engine.slider_cranks)
+        return exact(replace(engine, slider_cranks=changed), point)
+
+    monkeypatch.setattr(rigid_digits, "wrench_in_digits", off)
+    assert rigid_part(problem).error > 1e-11
+
+
+def _symmetric(problem: Problem) -> Problem:
+    return replace(problem, engine=replace(problem.engine, mounts=tuple(reversed(problem.engine.mounts))))
+
+
+def test_order_of_mounts_does_not_matter() -> None:
+    problem = load(PROBLEMS / "tractor-four-lanchester.toml")
+    assert rigid_part(_symmetric(problem)).error <= 2e-15
