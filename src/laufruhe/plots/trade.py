@@ -46,9 +46,7 @@ def figure(found: Trade) -> Figure:
     )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="time of another design [µs]", ylabel="relative error of the objective")
     axes.set_xlim(0.75 * times.min(), 3.2 * times.max())
-    # names of all that lie at the edge stand under each other
-    crowd = int(np.sum(errors == LEAST_ERROR))
-    axes.set_ylim(LEAST_ERROR / 10.0 ** (0.6 + 0.18 * crowd), 3.0 * errors.max())
+    axes.set_ylim(_lowest(errors), 3.0 * errors.max())
     _name(axes, rows, times, errors)
     plain = FuncFormatter(lambda value, _: f"{value:g}")
     scales: list[Axis] = [axes.xaxis, axes.yaxis]
@@ -64,6 +62,13 @@ def figure(found: Trade) -> Figure:
         f"{LEAST_REGRET:g}.{hollow} Computed with Laufruhe.",
     )  # fmt: skip
     return drawn.figure
+
+
+def _lowest(errors: Array) -> float:
+    """Lower end of the scale: names of all that lie at the edge stand under each other."""
+    share = LABEL_HEIGHT * (2.0 + float(np.sum(errors == LEAST_ERROR)))
+    top, edge = math.log10(3.0 * errors.max()), math.log10(LEAST_ERROR)
+    return float(10.0 ** ((edge - share * top) / (1.0 - share)))
 
 
 def _colour_bar(drawn: Page, dots: PathCollection) -> Axis:
