@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -36,11 +36,12 @@ from laufruhe.problem.mount_design import (
     torque_roll_rows,
 )
 from laufruhe.problem.mount_values import whole_objective
-from laufruhe.problem.quantity import ON_MOUNTS, Quantity, Subject
+from laufruhe.problem.quantity import ON_MOUNTS, Quantity
 from laufruhe.solvers.affine import AffineModel
 from laufruhe.solvers.gathered import Gathered
 from laufruhe.solvers.mount_loads import FixedThrows, Loads, MovedThrows
-from laufruhe.solvers.mount_symbols import SymbolicResponse, elimination, response, symbolic_mounts, waves
+from laufruhe.solvers.mount_rows import PointResponse, sampled_rows
+from laufruhe.solvers.mount_symbols import elimination, response, symbolic_mounts
 from laufruhe.solvers.nonlinear import NonlinearProgram, softened_lengths
 from laufruhe.solvers.throw_moves import ThrowMoves
 from laufruhe.solvers.uneven_model import UnevenModel
@@ -48,24 +49,11 @@ from laufruhe.solvers.uneven_program import rides_of
 
 Array = NDArray[np.float64]
 
-LEAST_SAMPLES = 32
-SAMPLES_PER_ORDER = 4
 SOFTNESS = (1e-2, 1e-4, 1e-7)
 # bounds of a stiffness that are further apart leave a start no place between them
 WIDE = 100.0
 # a typical deviation of a throw [rad]
 TURN = 0.1
-
-
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """Symbolic response at one operating point, and where its orders stand."""
-
-    name: str
-    weight: float
-    base: float
-    orders: Array
-    response: SymbolicResponse
 
 
 class JointProgram:
@@ -181,43 +169,19 @@ class JointProgram:
 
     # loads
 
-    def _responses(self) -> list[_Point]:
+    def _responses(self) -> list[PointResponse]:
         """Response to the orders that matter (E4)."""
         moved = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
         return [
-            _Point(point.name, point.weight, w.period, w.orders,
+            PointResponse(point.name, point.weight, w.period, w.orders,
                    response(self._mounts, w.orders * point.speed, w.real, w.imaginary))
             for point, w in zip(self.problem.points, self._loads.wrenches(moved), strict=True)
         ]  # fmt: skip
 
-    def _rows(self, quantity: Quantity) -> tuple[Any, Array]:
-        """Vectors at samples and their weights, as `load_rows` has them (P1)."""
-        names = [mount.name for mount in self.problem.engine.mounts]
-        chosen = [p for p in self._points if quantity.points is None or p.name in quantity.points]
-        mounts = [k for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts]
-        whole = sum(point.weight for point in chosen)
-        blocks, weights = [], []
-        for point in chosen:
-            signal = point.response.force if quantity.subject is Subject.MOUNT_FORCE else point.response.travel
-            counted = [
-                k for k, order in enumerate(point.orders)
-                if quantity.orders is None or any(abs(order - o) < 5e-4 for o in quantity.orders)
-            ]  # fmt: skip
-            highest = float(point.orders.max(initial=0.0))
-            samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * highest / point.base))
-            cosine, sine = waves(point.orders[counted].tolist(), point.base, samples)
-            values = signal[0][:, counted] @ cosine - signal[1][:, counted] @ sine
-            for k in mounts:
-                rows = values[3 * k : 3 * k + 3, :].T
-                if quantity.direction_weights is not None:
-                    rows = rows @ ca.diag(ca.DM(list(quantity.direction_weights)))
-                blocks.append(rows)
-                weights += [point.weight / whole / len(mounts) / samples] * samples
-        return ca.vertcat(*blocks), np.array(weights)
-
     def _vectors_of(self, quantity: Quantity) -> tuple[Any, Array, Norm]:
         if quantity.subject in ON_MOUNTS:
-            return *self._rows(quantity), quantity.norm
+            names = [mount.name for mount in self.problem.engine.mounts]
+            return *sampled_rows(self._points, names, quantity), quantity.norm
         return *self._loads.rows(quantity), quantity.norm
 
     def _load(self, quantity: Quantity) -> Any:
