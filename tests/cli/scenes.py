@@ -30,7 +30,7 @@ positions = [
     ["-1 m", "250 mm", "0 mm"], ["-1 m", "-250 mm", "0 mm"],
 ]
 """
-_SHAFTS = """
+SECOND_ORDER_SHAFTS = """
 [[balancer_shafts]]
 name = "left"
 ratio = 2
@@ -53,7 +53,7 @@ _SPEED = '[[operating_points]]\nspeed = "2500 rpm"\n'
 SHAKING_ONLY = (
     _FOUR
     + _SPEED
-    + _SHAFTS
+    + SECOND_ORDER_SHAFTS
     + """
 [objective]
 minimise = "mean shaking force"
@@ -64,7 +64,7 @@ TIGHT = (
     _FOUR
     + _SPEED
     + _MOUNTS
-    + _SHAFTS
+    + SECOND_ORDER_SHAFTS
     + """
 [[constraints]]
 limit = "balancer mass"
@@ -76,7 +76,7 @@ IMPOSSIBLE = (
     _FOUR
     + _SPEED
     + _MOUNTS
-    + _SHAFTS
+    + SECOND_ORDER_SHAFTS
     + """
 [[constraints]]
 name = "light shafts"
@@ -105,7 +105,7 @@ speed = "2500 rpm"
 weight = 3
 """
     + _MOUNTS
-    + _SHAFTS
+    + SECOND_ORDER_SHAFTS
 )
 
 GIVEN = _FOUR + _SPEED + _MOUNTS

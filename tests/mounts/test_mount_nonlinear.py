@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import check_grad
 
+from cli.scenes import SECOND_ORDER_SHAFTS
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_design import NOTHING_ASKED, mounting_in
@@ -25,24 +26,7 @@ from laufruhe.solvers.unbalances import solve_unbalances
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, problem_of
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
-SHAFTS = """
-[[balancer_shafts]]
-name = "left"
-ratio = 2
-position = ["100 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-radius = "20 mm"
-unbalance = { between = ["0 kg m", "0.05 kg m"] }
-angle = { between = [0, 360] }
-[[balancer_shafts]]
-name = "right"
-ratio = -2
-position = ["-100 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-radius = "20 mm"
-unbalance = { between = ["0 kg m", "0.05 kg m"] }
-angle = { between = [0, 360] }
-"""
+SHAFTS = SECOND_ORDER_SHAFTS.replace("60 mm", "100 mm")
 FORCE = '[objective]\nminimise = "{measure} mount force"\n'
 LIMITS = """
 [[constraints]]
