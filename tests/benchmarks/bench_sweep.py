@@ -5,22 +5,28 @@ Writes results/benchmarks/sweep.md. Ratios are what counts; the times are this m
 
 from __future__ import annotations
 
-import statistics
-import tempfile
-import time
-from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
+import os
 
-import numpy as np
-from scipy.optimize import NonlinearConstraint, differential_evolution, minimize
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    # as in a study's own processes; threads that wait would count as processor time
+    os.environ.setdefault(name, "1")
 
-from laufruhe import load
-from laufruhe.problem.study_reader import load_study
-from laufruhe.solvers.affine import AffineModel, AffineProblem
-from laufruhe.solvers.conic import ConicProgram
-from laufruhe.studies import run
-from laufruhe.studies.speed_sweep import speed_sweep
+import statistics  # noqa: E402
+import tempfile  # noqa: E402
+import time  # noqa: E402
+from collections.abc import Callable  # noqa: E402
+from dataclasses import replace  # noqa: E402
+from pathlib import Path  # noqa: E402
+
+import numpy as np  # noqa: E402
+from scipy.optimize import NonlinearConstraint, differential_evolution, minimize  # noqa: E402
+
+from laufruhe import load  # noqa: E402
+from laufruhe.problem.study_reader import load_study  # noqa: E402
+from laufruhe.solvers.affine import AffineModel, AffineProblem  # noqa: E402
+from laufruhe.solvers.conic import ConicProgram  # noqa: E402
+from laufruhe.studies import run  # noqa: E402
+from laufruhe.studies.speed_sweep import speed_sweep  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[2]
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester-and-moment.toml"

@@ -12,6 +12,8 @@ from laufruhe.solvers.affine import AffineModel
 from laufruhe.solvers.result import Status
 
 FOUND = (Status.OPTIMAL, Status.FEASIBLE)
+STARS_ON_OPEN_MOUNTS = 2
+"""Each of them takes a joint solve, at every fidelity."""
 
 
 def is_open(problem: Problem) -> bool:
@@ -28,12 +30,15 @@ def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
     """The best engine at a fidelity; None where it decides nothing, or finds no design within the limits.
 
     Unbalances alone are decided at `samples` steps over the period of the loads, without
-    refinement. Open stars and mounts are solved as `solve` does, of the latter one start.
+    refinement. Open stars and mounts are solved as `solve` does, of the latter one start, of
+    both together the stars that rank first.
     """
     try:
         if problem.phasing is None and not problem.mount_design.decisions:
             return _balanced(problem, samples)
         one = replace(problem, mount_design=replace(problem.mount_design, starts=1))
+        if one.phasing is not None and one.mount_design.decisions:
+            one = replace(one, phasing=replace(one.phasing, best=STARS_ON_OPEN_MOUNTS))
         result = solve(one)
     except (SolverError, ModelError):
         # cheap physics may leave nothing that solves: it is no choice for deciding then
