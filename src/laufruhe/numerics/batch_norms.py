@@ -1,13 +1,12 @@
 """Norms of many designs at once: rows that are linear in a few numbers per design (F12).
 
-The work is one matrix product per component and a handful of passes over its result.
+The work is one matrix product and two passes over its result.
 Designs go through in blocks that stay in the cache; what a block holds is fixed by the
 shapes alone, so results do not depend on the number of threads.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ Array = NDArray[np.float64]
 CACHE_BYTES = 1 << 19
 """Of the block of rows that one thread works on."""
 _LEAST_BLOCK = 16
+_PARTS_OF_COMPLEX = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,16 +60,17 @@ class BatchNorm:
         -------
         Shape (designs,).
         """
-        width = max(self.rows.shape[2], 1)
-        block = max(cache_bytes // (8 * 2 * width), _LEAST_BLOCK)
+        components, _, k = self.rows.shape
+        block = max(cache_bytes // (8 * (components + 1) * max(k, 1)), _LEAST_BLOCK)
         out = np.empty(len(features))
         starts = range(0, len(features), block)
 
         def work(own: Sequence[int]) -> None:
-            scratch = np.empty((2, min(block, len(features)), width))
+            product, lengths = np.empty((block, components * k)), np.empty((block, k))
             for start in own:
                 part = features[start : start + block]
-                out[start : start + block] = self._block(part, scratch[:, : len(part)])
+                found = np.matmul(part, self._matrix, out=product[: len(part)])
+                out[start : start + block] = self._together(self._lengths(found, lengths[: len(part)]))
 
         if threads <= 1 or len(starts) <= 1:
             work(starts)
@@ -80,47 +81,38 @@ class BatchNorm:
 
     def value(self, features: Array) -> float:
         """The norm of one design, features of shape (n,), in as few calls as there can be."""
-        product = self._flat @ features
-        components, _, k = self.rows.shape
-        if components == 1 and self.norm is not Norm.RMS:
-            return float(self._together(np.abs(product)[None])[0])
-        np.multiply(product, product, out=product)
-        total = product[:k]
-        for j in range(1, components):
-            total += product[j * k : (j + 1) * k]
-        if self.norm is Norm.RMS:
-            return math.sqrt(total @ self.weights)
-        if self.norm is Norm.MAXIMUM:
-            return math.sqrt(total.max())
-        return float(np.sqrt(total, out=total) @ self.weights)
+        return float(self._together(self._lengths(np.dot(features, self._matrix))))
 
     @cached_property
-    def _flat(self) -> Array:
-        """R of all components under each other, shape (components k, features)."""
-        return np.ascontiguousarray(self.rows.transpose(0, 2, 1).reshape(-1, self.rows.shape[1]))
+    def _matrix(self) -> Array:
+        """R as one matrix, shape (features, components k): two components as the parts of a complex number."""
+        components, features, k = self.rows.shape
+        order = (1, 2, 0) if components == _PARTS_OF_COMPLEX else (1, 0, 2)
+        return np.ascontiguousarray(self.rows.transpose(order).reshape(features, components * k))
 
-    def _block(self, features: Array, scratch: Array) -> Array:
-        total, product = scratch
-        if len(self.rows) == 1 and self.norm is not Norm.RMS:
-            # the length of one component is its size: no square, no root
-            np.matmul(features, self.rows[0], out=total)
-            np.abs(total, out=total)
-            return self._together(total)
-        for k, rows in enumerate(self.rows):
-            target = total if k == 0 else product
-            np.matmul(features, rows, out=target)
-            np.multiply(target, target, out=target)
-            if k > 0:
-                np.add(total, target, out=total)
-        if self.norm is Norm.RMS:
-            return np.asarray(np.sqrt(total @ self.weights))
+    def _lengths(self, product: Array, out: Array | None = None) -> Array:
+        """Of the rows of every design, shape (..., k); the products are used up."""
+        components, _, k = self.rows.shape
+        if components == 1:
+            return np.absolute(product, out=out)
+        if components == _PARTS_OF_COMPLEX:
+            # one pass over the numbers in place of four
+            return np.absolute(product.view(np.complex128), out=out)
+        np.multiply(product, product, out=product)
+        total = np.add(product[..., :k], product[..., k : 2 * k], out=out)
+        for j in range(2, components):
+            np.add(total, product[..., j * k : (j + 1) * k], out=total)
+        return np.sqrt(total, out=total)
+
+    def _together(self, lengths: Array) -> Array:
+        """One number for each design."""
         if self.norm is Norm.MAXIMUM:
-            return np.asarray(np.sqrt(total.max(axis=1)))
-        np.sqrt(total, out=total)
-        return self._together(total)
-
-    def _together(self, size: Array) -> Array:
-        return np.asarray(size.max(axis=1) if self.norm is Norm.MAXIMUM else size @ self.weights)
+            return np.asarray(lengths.max(axis=-1))
+        if self.norm is Norm.SUM:
+            total: Array = np.dot(lengths, self.weights)
+            return total
+        squares: Array = np.dot(np.multiply(lengths, lengths, out=lengths), self.weights)
+        return np.sqrt(squares)
 
     @property
     def operations(self) -> int:
