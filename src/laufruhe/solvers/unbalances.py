@@ -29,6 +29,7 @@ MOST_MARGINS = 3
 MOST_ROWS = 60_000
 NEGLIGIBLE = 1e-6
 FEASIBLE = 1e-6
+KEPT = 10.0 * FEASIBLE
 ACTIVE = 1e-5
 FLOOR = 1e-3
 SAME_LOAD = 1e-10
@@ -77,11 +78,11 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     # most designs are given with what is open at zero, and that one is known
     initial = evaluate(problem) if any(problem.start) else model.bare
     modelled = time.perf_counter()
-    optimum = _refine(problem, model, objective_value(problem, initial), cones or _stated)
+    optimum, samples = _refine(problem, model, objective_value(problem, initial), cones or _stated)
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
-        return _infeasible(problem, model, initial, timing)
+        return _infeasible(problem, model.at(samples), initial, timing)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     final = evaluate(problem, problem.design(values), cycle_samples)
@@ -90,20 +91,27 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     return replace(result, timing={**timing, "evaluate": time.perf_counter() - solved})
 
 
-def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSolver) -> _Optimum | None:
-    """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6)."""
+def _refine(
+    problem: Problem, model: AffineModel, initial: float, cones: ConeSolver
+) -> tuple[_Optimum | None, int]:
+    """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6).
+
+    Returns
+    -------
+    The optimum, None where the limits cannot be met, and the angles that told.
+    """
     samples, best = model.full_samples, None
     for _ in range(MOST_DOUBLINGS + 1):
         found = _allowed(problem, model, samples, initial, cones)
         if found is None:
             # fewer angles ask for less: what they cannot meet, all cannot
-            return best
+            return best if best is not None and best.excess <= KEPT else None, samples
         best = found
         rows = len(best.problem.terms[0][1].weights)
         if (best.gap <= problem.tolerance and best.excess <= FEASIBLE) or rows > MOST_ROWS:
             break
         samples *= 2
-    return best
+    return best, samples
 
 
 def _allowed(problem: Problem, model: AffineModel, samples: int, initial: float, cones: ConeSolver) -> _Optimum | None:
@@ -130,8 +138,9 @@ def _attempt(
     if solution.x is None:
         return None
     x = _settled(problem, fine, solution.x)
-    bound = best_bound(fine, coarse, x, solution.multipliers)
-    judge = model.at(PEAK_REFINEMENT * samples) if _has_peaks(problem) else fine
+    bound = best_bound(model.averaged(fine.samples), coarse, x, solution.multipliers)
+    # peaks where the result will be measured
+    judge = model.at(PEAK_REFINEMENT * fine.samples) if _has_peaks(problem) else fine
     value = judge.objective(x)
     gap = (value - bound.value) / _measure(value, initial)
     return _Optimum(x, bound, fine, max(gap, 0.0), _excess(judge, x), samples)
@@ -250,7 +259,7 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         _limit_value(limit.name, limit.quantity.unit, final.value(limit.quantity), limit.maximum, price, value)
         for limit, price in zip(problem.limits, prices, strict=True)
     )
-    feasible = all(limit.value <= limit.limit * (1.0 + 10.0 * FEASIBLE) + 1e-12 for limit in limits)
+    feasible = all(limit.value <= limit.limit * (1.0 + KEPT) + 1e-12 for limit in limits)
     return Result(
         problem=problem,
         status=Status.OPTIMAL
@@ -307,12 +316,12 @@ def decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[Decision
     return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
 
 
-def _infeasible(problem: Problem, model: AffineModel, initial: Evaluation, timing: dict[str, float]) -> Result:
+def _infeasible(problem: Problem, affine: AffineProblem, initial: Evaluation, timing: dict[str, float]) -> Result:
     limits = tuple(
         LimitValue(limit.name, initial.value(limit.quantity), limit.maximum, limit.quantity.unit, False, 0.0)
         for limit in problem.limits
     )
-    conflict = _conflict(model.at(model.full_samples), [limit.name for limit in problem.limits])
+    conflict = _conflict(affine, [limit.name for limit in problem.limits])
     return infeasible(problem, initial, limits, conflict, timing)
 
 
