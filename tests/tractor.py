@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, OperatingPoint, Role, Rotor, Seiliger, Shaft
 from laufruhe.machine.layouts import Mechanism, build, inline
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.physics.shaking_loads import Fidelity
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.model import Drive, Limit, Problem, Term, UnbalanceDecision
 from laufruhe.problem.quantity import Quantity, Subject
 

@@ -20,8 +20,9 @@ from laufruhe import load
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.layouts import Layout, Mechanism, build, even_throws, inline, vee
+from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
-from laufruhe.physics.shaking_loads import EXACT, Fidelity, rotating_loads, shaking_loads
+from laufruhe.physics.shaking_loads import rotating_loads, shaking_loads
 from laufruhe.studies.free_forces import FreeLoad, firing_intervals, free_load
 
 TWO_ORDER = Fidelity(kinematics="two-order")

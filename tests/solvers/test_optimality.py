@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import minimize
 
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.physics.shaking_loads import Fidelity
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Limit, Problem, Term, UnbalanceDecision
 from laufruhe.problem.quantity import Quantity, Subject

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
 
-from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import WRENCH, rotor_wrench
@@ -196,7 +195,7 @@ def _never_there(scale: Scale, chosen: Fidelity) -> list[LeftOut]:
 def repeats(scale: Scale) -> int:
     """Times that all measured signals repeat within the cycle, whatever is decided."""
     ratios = tuple(
-        Fraction(abs(rotor.shaft.ratio)).limit_denominator(1000)
+        as_order(abs(rotor.shaft.ratio))
         for rotor in scale.problem.engine.rotors
         if rotor.unbalance != 0 or any(d.rotor == rotor.name for c in scale.problem.decisions for d in c.drives)
     )

@@ -15,7 +15,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_rotor_loads
@@ -145,7 +145,7 @@ class AffineModel:
         mounting = mounting_of(problem.engine, problem.fidelity)
         changes = [_change(problem, k, direction) for k, d in enumerate(self.domains) for direction in d.directions]
         self.bare, self._changes = bare, changes
-        orders = [Fraction(abs(r.shaft.ratio)).limit_denominator(1000) for rotors in changes for r in rotors]
+        orders = [as_order(abs(r.shaft.ratio)) for rotors in changes for r in rotors]
         self._slopes = {
             subject: [
                 [_slope(rotors, point, problem.engine, mounting, subject, problem.fidelity) for rotors in changes]
