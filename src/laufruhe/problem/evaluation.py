@@ -23,6 +23,7 @@ from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject
 Array = NDArray[np.float64]
 
 PEAK_REFINEMENT = 8
+"""Times as many samples as are asked for, among which maxima are sought (M6)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from laufruhe.problem.error_bounds import (
     gas_doubt,
     half_gas,
     left_out,
+    relative,
     sampling_bound,
 )
 from laufruhe.problem.evaluation import Evaluation, evaluate
@@ -55,11 +56,7 @@ class Scale:
         self.value = sum(term.weight * best.value(term.quantity) for term in problem.objective)
         half = half_gas(problem, best)
         doubt = sum(term.weight * gas_doubt(term.quantity, best, half) for term in self.terms)
-        self.doubt = self.relative(doubt) + ROUNDING
-
-    def relative(self, bound: float) -> float:
-        """A bound over the objective; infinite where that is zero and the bound is not."""
-        return bound / self.value if self.value > 0.0 else (float("inf") if bound > 0.0 else 0.0)
+        self.doubt = relative(doubt, self.value) + ROUNDING
 
     def evaluation(self, fidelity: Fidelity) -> Evaluation:
         """The same design at another fidelity."""
@@ -68,7 +65,8 @@ class Scale:
     def loses(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
         """What a fidelity leaves out at most, relative, of the reference or of another evaluation (F6)."""
         ours, theirs = self.evaluation(fidelity), than or self.best
-        return self.relative(sum(term.weight * left_out(term.quantity, ours, theirs) for term in self.terms))
+        lost = sum(term.weight * left_out(term.quantity, ours, theirs) for term in self.terms)
+        return relative(lost, self.value)
 
     @cached_property
     def mounting(self) -> ElasticMounting | None:
@@ -103,7 +101,8 @@ class Scale:
     def misses(self, fidelity: Fidelity) -> float:
         """What its samples miss at most, relative (F7, F8)."""
         ours = self.evaluation(fidelity)
-        return self.relative(sum(term.weight * sampling_bound(term.quantity, ours) for term in self.terms))
+        missed = sum(term.weight * sampling_bound(term.quantity, ours) for term in self.terms)
+        return relative(missed, self.value)
 
 
 def has_gas(problem: Problem) -> bool:

@@ -173,8 +173,8 @@ class AffineModel:
     def at(self, samples: int) -> AffineProblem:
         """The problem with its load rows at `samples` steps over their common period."""
         problem = self.problem
-        terms = tuple((term.weight, self._norm(term.quantity, samples)) for term in problem.objective)
-        limits = tuple((limit.maximum, self._norm(limit.quantity, samples)) for limit in problem.limits)
+        terms = tuple((term.weight, self.norm(term.quantity, samples)) for term in problem.objective)
+        limits = tuple((limit.maximum, self.norm(limit.quantity, samples)) for limit in problem.limits)
         return AffineProblem(terms, limits, self.domains, samples)
 
     def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
@@ -184,9 +184,6 @@ class AffineModel:
 
     def norm(self, quantity: Quantity, samples: int) -> AffineNorm:
         """A quantity at `samples` steps over the common period."""
-        return self._norm(quantity, samples)
-
-    def _norm(self, quantity: Quantity, samples: int) -> AffineNorm:
         if quantity.subject in MASSES:
             bare = mass_rows(quantity, self.bare.engine.rotors)
             slopes = [mass_rows(quantity, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]

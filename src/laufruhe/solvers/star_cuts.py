@@ -20,7 +20,7 @@ from laufruhe.physics.crank_stars import Array, Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.phasing import ShaftChoice
 from laufruhe.solvers.affine import AffineNorm, AffineProblem
-from laufruhe.solvers.certificate import Multipliers, best_bound, lower_bound
+from laufruhe.solvers.certificate import Multipliers, best_bound
 from laufruhe.solvers.domain import Domain
 from laufruhe.solvers.star_model import StarModel, StarProblem
 
@@ -358,8 +358,3 @@ def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
             turning = True
             turns += np.einsum("kd,tpkdn->tpn", z, norm.turns)
     return Cut(constant, moves, gradient, turns if turning else None, fine.domains)
-
-
-def bound_of(affine: AffineProblem, multipliers: Multipliers) -> float:
-    """The bound of one star by the certificate itself, to compare cuts with."""
-    return lower_bound(affine, multipliers).value
