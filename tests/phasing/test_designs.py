@@ -58,7 +58,7 @@ def test_rows_of_a_star_are_those_of_the_exact_model(tmp_path, name):
     rng = np.random.default_rng(3)
     for star in stars[rng.integers(0, len(stars), 4)]:
         x = np.concatenate([0.2 * d.scale * rng.uniform(0.0, 1.0, d.width) for d in model.domains])
-        given = model.phasing.realise(model.candidate(star))
+        given = model.phasing.realise(model.phasing.star(star, model.space.phases, model.geometry))
         unbalances = [domain.complex_value(x) for domain in model.domains]
         # decisions at any angle are counted from upright in the model: with equal drives that is the same rotor
         turned = [u if not d.free_angle else u * _turn(d) for u, d in zip(unbalances, given.decisions, strict=True)]

@@ -27,6 +27,8 @@ from laufruhe.solvers.domain import Domain, domains_of
 Array = NDArray[np.float64]
 
 NEEDED = 1e3
+FEASIBLE = 1e-6
+"""Relative excess over a limit that counts as none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +111,10 @@ class AffineProblem:
     def objective(self, x: Array) -> float:
         """Weighted sum of the terms."""
         return sum(weight * norm.value(x) for weight, norm in self.terms)
+
+    def excess(self, x: Array) -> float:
+        """Largest relative excess over a limit, negative where all have room; zero without limits."""
+        return max(((norm.value(x) - maximum) / (maximum or 1.0) for maximum, norm in self.limits), default=0.0)
 
 
 def reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
