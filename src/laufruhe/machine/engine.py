@@ -24,6 +24,9 @@ class Cycle(Enum):
     TWO_STROKE = 1
     FOUR_STROKE = 2
 
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", "-")
+
     @property
     def turns(self) -> int:
         """Crank turns a cycle."""

@@ -49,7 +49,13 @@ class Unprinted:
 
     def cycle(self, imep: float, peak_pressure: float) -> Seiliger:
         """The mixed cycle at a load."""
-        return Seiliger(peak_pressure, imep, self.compression_ratio, self.compression_exponent, self.expansion_exponent)
+        return Seiliger(
+            peak_pressure,
+            imep,
+            self.compression_exponent,
+            self.expansion_exponent,
+            compression_ratio=self.compression_ratio,
+        )
 
     @property
     def compression_end(self) -> float:
