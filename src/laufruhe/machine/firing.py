@@ -181,7 +181,11 @@ def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) 
 
 
 def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterator[tuple[int, ...]]:
-    """Firing orders of throws at any angles: each cylinder on one of the turns of the cycle, cylinder 1 first."""
+    """Firing orders of throws at any angles, each once: every cylinder on one of the turns, cylinder 1 first.
+
+    An order says no more than that a cylinder fires at its first dead centre after the one
+    before it: firings that wait for a later one, or come two at once, have no order.
+    """
     cylinders = range(len(layout.positions))
     turns = [float((_own_turn(layout, k) - as_turn(throws[layout.pins[k]])) % 1) for k in cylinders]
     relative = [(t - turns[0]) % 1.0 for t in turns]
@@ -189,7 +193,9 @@ def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterato
     laps = itertools.product(range(cycle.turns), repeat=len(relative) - 1)
     for chosen in itertools.islice(laps, ORDERS_LOOKED_AT):
         whole = [relative[0], *(t + lap for t, lap in zip(relative[1:], chosen, strict=True))]
-        yield tuple(k + 1 for k in sorted(cylinders, key=lambda k: (whole[k], k)))
+        order = sorted(cylinders, key=lambda k: whole[k])
+        if all(_SAME < whole[b] - whole[a] <= 1.0 + _SAME for a, b in itertools.pairwise(order)):
+            yield tuple(k + 1 for k in order)
 
 
 def intervals_of(cycle: Cycle, turns: Sequence[float]) -> tuple[float, ...]:

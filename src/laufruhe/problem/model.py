@@ -14,7 +14,7 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountDesign
 from laufruhe.problem.phasing import Phasing
-from laufruhe.problem.quantity import Quantity
+from laufruhe.problem.quantity import ON_MOUNTS, Quantity, Subject
 
 Array = NDArray[np.float64]
 
@@ -142,6 +142,14 @@ class Problem:
     def start(self) -> tuple[complex, ...]:
         """Decisions of the design as given."""
         return tuple(decision.start for decision in self.decisions)
+
+    @property
+    def feels_gas(self) -> bool:
+        """Whether gas loads what is minimised or limited: its roll moment alone, and all where it drives the speed."""
+        asked = [term.quantity for term in self.objective] + [limit.quantity for limit in self.limits]
+        felt = any(quantity.subject in (*ON_MOUNTS, Subject.ROLL_MOMENT) for quantity in asked)
+        has_gas = self.fidelity.gas and any(point.gas is not None for point in self.points)
+        return has_gas and (felt or self.fidelity.is_uneven)
 
     def at(self, fidelity: Fidelity) -> Problem:
         """The same problem at another fidelity, every design of an open star included."""

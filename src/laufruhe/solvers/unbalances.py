@@ -89,9 +89,7 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     return replace(result, timing={**timing, "evaluate": time.perf_counter() - solved})
 
 
-def _refine(
-    problem: Problem, model: AffineModel, initial: float, cones: ConeSolver
-) -> tuple[_Optimum | None, int]:
+def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSolver) -> tuple[_Optimum | None, int]:
     """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6).
 
     Returns
