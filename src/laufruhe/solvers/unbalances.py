@@ -41,6 +41,8 @@ class _Optimum:
     ----------
     problem
         Rows on the grid that the bound holds on.
+    judge
+        Rows at the angles that its limits are judged at.
     excess
         Largest relative excess over a limit, sought between the angles too.
     """
@@ -48,6 +50,7 @@ class _Optimum:
     x: Array
     bound: Bound
     problem: AffineProblem
+    judge: AffineProblem
     gap: float
     excess: float
     samples: int
@@ -80,7 +83,11 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
-        return _infeasible(problem, model.at(samples), initial, timing)
+        conflict = _conflict(_tightened(model.at(samples), 0.0), [limit.name for limit in problem.limits])
+        return _infeasible(problem, conflict, initial, timing)
+    hopeless = _hopeless(problem, optimum) if optimum.excess > KEPT else ()
+    if hopeless:
+        return _infeasible(problem, hopeless, initial, timing)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     final = evaluate(problem, problem.design(values), cycle_samples)
@@ -139,7 +146,7 @@ def _attempt(
     judge = model.at(PEAK_REFINEMENT * fine.samples) if _has_peaks(problem) else fine
     value = judge.objective(x)
     gap = (value - bound.value) / gap_unit(value, initial)
-    return _Optimum(x, bound, fine, max(gap, 0.0), judge.excess(x), samples)
+    return _Optimum(x, bound, fine, judge, max(gap, 0.0), judge.excess(x), samples)
 
 
 def _stated(affine: AffineProblem) -> ConicSolution:
@@ -154,8 +161,24 @@ def _has_peaks(problem: Problem) -> bool:
 
 
 def _tightened(affine: AffineProblem, margin: float) -> AffineProblem:
-    limits = tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits)
-    return replace(affine, limits=limits) if margin else affine
+    """Limits a little lower; those that nothing open acts on out of the solver's way, for they hold or nothing does."""
+    limits = tuple(
+        (maximum * (1.0 - margin) if norm.slope.any() else 2.0 * max(maximum, _alone(norm)), norm)
+        for maximum, norm in affine.limits
+    )
+    return replace(affine, limits=limits)
+
+
+def _alone(norm: AffineNorm) -> float:
+    return norm.value(np.zeros(norm.slope.shape[-1]))
+
+
+def _hopeless(problem: Problem, optimum: _Optimum) -> tuple[str, ...]:
+    """A limit that is broken and that nothing open acts on; none where there is no such."""
+    for limit, (maximum, norm) in zip(problem.limits, optimum.judge.limits, strict=True):
+        if not norm.slope.any() and _alone(norm) > maximum * (1.0 + KEPT):
+            return (limit.name,)
+    return ()
 
 
 def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
@@ -302,12 +325,11 @@ def decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[Decision
     return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
 
 
-def _infeasible(problem: Problem, affine: AffineProblem, initial: Evaluation, timing: dict[str, float]) -> Result:
+def _infeasible(problem: Problem, conflict: tuple[str, ...], initial: Evaluation, timing: dict[str, float]) -> Result:
     limits = tuple(
         LimitValue(limit.name, initial.value(limit.quantity), limit.maximum, limit.quantity.unit, False, 0.0)
         for limit in problem.limits
     )
-    conflict = _conflict(affine, [limit.name for limit in problem.limits])
     return infeasible(problem, initial, limits, conflict, timing)
 
 
