@@ -93,7 +93,7 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     designs = [(order, built) for built in sets for order in told]
     solved, complete = _solved(problem, phasing, throws, designs)
     if not solved:
-        return no_result(problem, "no firing order and set of shafts that may be built keeps the limits")
+        return no_result(problem, "no firing order and no set of shafts that may be built keeps the limits")
     given = evaluate(problem)
     initial = objective_value(problem, given)
     best = solved[0]
