@@ -41,7 +41,7 @@ class Axis:
 
     @property
     def name(self) -> str:
-        """The end of the path, as a reader says it: a place goes with its list, a side of a limit with what is limited."""
+        """The end of the path, as a reader says it: a place goes with its list, a side with its limit."""
         *before, last = self.quantity.replace("_", " ").split(".")
         if before and last.isdigit():
             return f"{before[-1]} {last}"
