@@ -151,6 +151,22 @@ class Problem:
         has_gas = self.fidelity.gas and any(point.gas is not None for point in self.points)
         return has_gas and (felt or self.fidelity.is_uneven)
 
+    @property
+    def objective_name(self) -> str:
+        """What is minimised, in words; empty where nothing is."""
+        parts = [(term.weight, term.quantity.name) for term in self.objective]
+        parts += [(weight, quantity.name) for quantity, weight in self.mount_design.terms]
+        if len(parts) == 1 and parts[0][0] == 1.0:
+            return parts[0][1]
+        return " + ".join(f"{weight:g} x {name}" for weight, name in parts)
+
+    @property
+    def objective_unit(self) -> str | None:
+        """SI unit of what is minimised, of its first term; None where nothing is."""
+        units = [term.quantity.unit for term in self.objective]
+        units += [quantity.unit for quantity, _ in self.mount_design.terms]
+        return units[0] if units else None
+
     def at(self, fidelity: Fidelity) -> Problem:
         """The same problem at another fidelity, every design of an open star included."""
         if self.phasing is None:

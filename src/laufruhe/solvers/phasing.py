@@ -18,7 +18,7 @@ from laufruhe.solvers.ranking import ORDERS_LISTED, PhasingResult, RankedOrder, 
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.star_answers import searched
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.unbalances import KEPT, objective_name
+from laufruhe.solvers.unbalances import KEPT
 
 
 def solve_phasing(problem: Problem) -> Result:
@@ -118,7 +118,7 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
         best.result,
         problem=replace(best.result.problem, phasing=phasing),
         status=Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=ObjectiveValue(objective_name(problem), best.value, problem.objective[0].quantity.unit, initial),
+        objective=ObjectiveValue(problem.objective_name, best.value, problem.objective[0].quantity.unit, initial),
         certificate=certificate,
         decisions=(*phase_decisions(problem, phasing, candidate, names), *best.result.decisions),
         initial=replace(given, samples=best.result.final.samples),
