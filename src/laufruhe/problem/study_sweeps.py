@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe import units
-from laufruhe.problem.complaints import Refused
+from laufruhe.problem.complaints import Refused, measured
 from laufruhe.problem.study_parts import SweepTable, Value
 from laufruhe.problem.study_paths import field_at
 
@@ -120,15 +120,7 @@ def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str
         return "deg" if field.plain is not None else "1", tuple(plain)
     if plain:
         raise Refused(given, list(values), "mixes numbers with and without a unit", "write all alike")
-    numbers = tuple(_parsed(text, field.unit, given) for text in texts)
+    numbers = tuple(measured(text, field.unit, given) for text in texts)
     unit = units.unit_of(texts[0])
     one = units.parse(f"1 {unit}", field.unit)
     return unit or "1", tuple(float(f"{number / one:.{_DIGITS}g}") for number in numbers)
-
-
-def _parsed(text: str, unit: str, given: str) -> float:
-    try:
-        return units.parse(text, unit)
-    except units.UnitError as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise Refused(given, text, rule, remedy) from None
