@@ -19,6 +19,7 @@ from laufruhe.machine.firing import firing_turns, intervals_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Intervals, OrderCriterion, Phasing
+from laufruhe.problem.quantity import ON_MOUNTS, Subject
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.nonlinear import solve_nonlinear
 from laufruhe.solvers.phasing_result import no_result, phase_decisions, solve_fixed
@@ -27,13 +28,14 @@ from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_objective import amplitude_objective
 from laufruhe.solvers.unbalances import objective_name
-from laufruhe.solvers.uneven_bound import uneven_bound
+from laufruhe.solvers.uneven_bound import steady_bound, uneven_bound
 from laufruhe.solvers.uneven_model import UnevenModel
 from laufruhe.solvers.uneven_program import UnevenProgram, rides_of
 
 Array = NDArray[np.float64]
 
 STARTS = 6
+ORDERS_WITH_GAS = 2
 FLOOR = 1e-3
 FEASIBLE = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
@@ -89,7 +91,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     SolverError
         If no start leads anywhere.
     """
-    starts = starts_of(phasing, even)
+    starts = starts_of(phasing, even, ORDERS_WITH_GAS if _feels_gas(problem) else 1)
     if not starts:
         return no_result(problem, "no star and firing order to start from keeps the firing intervals allowed")
     found = [answer for start in starts[:STARTS] if (answer := local_optimum(phasing, start, phasing.intervals))]
@@ -146,15 +148,26 @@ def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...
     return intervals_of(phasing.cycle, turns)
 
 
-def starts_of(phasing: Phasing, even: Result | None) -> list[Start]:
-    """Designs to start from: the ranked even stars, or the middle of the throws' own bounds."""
+def _feels_gas(problem: Problem) -> bool:
+    """Whether gas loads what is minimised or limited: firing orders of one star then differ."""
+    asked = [*problem.objective, *problem.limits]
+    felt = any(each.quantity.subject in (*ON_MOUNTS, Subject.ROLL_MOMENT) for each in asked)
+    return felt and problem.fidelity.gas and any(point.gas is not None for point in problem.points)
+
+
+def starts_of(phasing: Phasing, even: Result | None, orders_each: int = 1) -> list[Start]:
+    """Designs to start from: the ranked even stars, or the middle of the throws' own bounds.
+
+    Parameters
+    ----------
+    orders_each
+        How many firing orders of a star are started from.
+    """
     if even is not None and even.phasing is not None:
         return [
-            Start(
-                Candidate(s.throws, s.firing_orders[0].order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts))
-            )
+            Start(Candidate(s.throws, firing.order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts)))
             for s in even.phasing.ranking
-            if s.firing_orders
+            for firing in s.firing_orders[:orders_each]
         ]
     out = []
     free = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
@@ -187,11 +200,11 @@ def _left_out(phasing: Phasing, shafts: Sequence[str]) -> tuple[str, ...]:
 
 
 def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> float:
-    """What no design with these intervals goes under, zero where no more is known (S22)."""
+    """What no design with these intervals goes under (S22, S24)."""
     objective = amplitude_objective(problem)
     families, _ = families_of(phasing)
     if objective is None or phasing.throw_bounds is not None or len(families) != 1 or families[0].fixed is not None:
-        return 0.0
+        return steady_bound(problem)
     return uneven_bound(phasing, families[0].space, objective, intervals)
 
 
