@@ -126,9 +126,7 @@ def test_neither_the_origin_of_the_angle_nor_the_numbering_matters(tmp_path):
         objective_value(problem, evaluate(problem))
         for problem in (
             phasing.realise(replace(start, throws=throws)),
-            phasing.realise(
-                replace(start, throws=throws[::-1], firing_order=tuple(6 - k for k in start.firing_order))
-            ),
+            phasing.realise(replace(start, throws=throws[::-1], firing_order=tuple(6 - k for k in start.firing_order))),
         )
     ]
     assert values[0] == pytest.approx(values[1], rel=1e-9)

@@ -150,8 +150,8 @@ def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...
 
 def _feels_gas(problem: Problem) -> bool:
     """Whether gas loads what is minimised or limited: firing orders of one star then differ."""
-    asked = [*problem.objective, *problem.limits]
-    felt = any(each.quantity.subject in (*ON_MOUNTS, Subject.ROLL_MOMENT) for each in asked)
+    asked = [term.quantity for term in problem.objective] + [limit.quantity for limit in problem.limits]
+    felt = any(quantity.subject in (*ON_MOUNTS, Subject.ROLL_MOMENT) for quantity in asked)
     return felt and problem.fidelity.gas and any(point.gas is not None for point in problem.points)
 
 
@@ -199,13 +199,14 @@ def _left_out(phasing: Phasing, shafts: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for names in phasing.shafts.optional for name in names if name not in shafts)
 
 
-def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> float:
-    """What no design with these intervals goes under (S22, S24)."""
+def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[float, str]:
+    """What no design with these intervals goes under, and where that is from (S22, S24)."""
     objective = amplitude_objective(problem)
     families, _ = families_of(phasing)
     if objective is None or phasing.throw_bounds is not None or len(families) != 1 or families[0].fixed is not None:
-        return steady_bound(problem)
-    return uneven_bound(phasing, families[0].space, objective, intervals)
+        return steady_bound(problem), "the steady part of the loads"
+    bound = uneven_bound(phasing, families[0].space, objective, intervals)
+    return bound, "windows around the even steps"
 
 
 def _trade(
@@ -228,7 +229,7 @@ def _trade(
         if not answers:
             continue
         best = min(answers, key=lambda answer: answer.value)
-        bound = _bound(problem, phasing, Intervals(low, high))
+        bound, _ = _bound(problem, phasing, Intervals(low, high))
         if out and out[-1].value < best.value:
             out.append(replace(out[-1], allowed=share * allowed, lower_bound=bound))
             continue
@@ -247,12 +248,13 @@ def _result(
     given = even.initial if even is not None else evaluate(problem)
     initial = objective_value(problem, given)
     measure = max(best.value, FLOOR * initial) or 1.0
-    bound = min(_bound(problem, phasing, phasing.intervals), best.value)
+    bound, source = _bound(problem, phasing, phasing.intervals)
+    bound = min(bound, best.value)
     # no norm lies under zero: who reaches it is done
     gap = (best.value - bound) / measure
     proven = gap <= problem.tolerance
     shafts = [n for names in phasing.shafts.optional for n in names if n not in best.candidate.left_out]
-    method = f"IPOPT from {len(found)} star(s), firing orders kept; bound from windows around the even steps"
+    method = f"IPOPT from {len(found)} start(s), firing orders kept; bound from {source}"
     certificate = Certificate(Proof.GLOBAL if proven else Proof.LOCAL, bound, gap, best.kkt_residual, method)
     details = PhasingResult(
         ranking=tuple(_entry(phasing, answer) for answer in found),

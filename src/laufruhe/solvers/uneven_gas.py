@@ -8,12 +8,11 @@ turns l_k is the firing order's, and stays while the throws move.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import GasModel, OperatingPoint, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum
@@ -38,13 +37,17 @@ class GasMoments:
         self._problem, self._left_out = problem, left_out
         self._kept: dict[tuple[GasModel, int], Spectrum] = {}
 
-    def at(self, point: OperatingPoint, stars: Sequence[Any]) -> list[tuple[float, Any]]:
+    def at(
+        self, point: OperatingPoint, stars: Sequence[Any], gain: Callable[[float], float] | None = None
+    ) -> list[tuple[float, Any]]:
         """Moment (re, im), shape (1, 2), of every order that is kept [N m].
 
         Parameters
         ----------
         stars
             theta + o - beta of every cylinder [rad], counted as its throw in the problem is.
+        gain
+            What a moment of an order counts for; the same for all when left out.
         """
         gas, fidelity = point.gas, self._problem.fidelity
         if gas is None or not fidelity.gas:
@@ -52,6 +55,8 @@ class GasMoments:
         total: dict[float, Any] = {}
         for k, (part, star) in enumerate(zip(self._problem.engine.slider_cranks, stars, strict=True)):
             series = self._series(gas, k)
+            if gain is not None:
+                series = _felt(series, gain, self._left_out)
             orders, c = ca.DM(series.orders), series.coefficients
             phases = orders * (star - math.tau * _turns(part))
             cosine, sine = ca.cos(phases), ca.sin(phases)
@@ -68,14 +73,15 @@ class GasMoments:
         if (gas, alike) not in self._kept:
             whole = gas_coefficients(gas, parts[alike], self._problem.engine.cycle, fidelity)
             whole = whole if fidelity.orders is None else whole.kept(fidelity.orders)
-            self._kept[gas, alike] = Spectrum(whole.base, whole.coefficients[: _count(whole.coefficients, self._left_out)])
+            self._kept[gas, alike] = _felt(whole, lambda _: 1.0, self._left_out)
         return self._kept[gas, alike]
 
 
-def _count(coefficients: NDArray[np.complex128], left_out: float) -> int:
-    """How many of the first orders hold all but a share of the root mean square."""
-    tail = np.sqrt(np.cumsum(np.abs(coefficients[::-1]) ** 2)[::-1])
-    return max(int((tail > left_out * tail[0]).sum()), 1)
+def _felt(series: Spectrum, gain: Callable[[float], float], left_out: float) -> Spectrum:
+    """The first orders, that hold all but a share of the root mean square once each counts for its gain."""
+    sizes = np.abs(series.coefficients) * [gain(float(h)) for h in series.orders]
+    tail = np.sqrt(np.cumsum(sizes[::-1] ** 2)[::-1])
+    return Spectrum(series.base, series.coefficients[: max(int((tail > left_out * tail[0]).sum()), 1)])
 
 
 def _mechanism(part: SliderCrank) -> tuple[object, ...]:

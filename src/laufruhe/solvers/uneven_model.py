@@ -8,7 +8,7 @@ number from the exact model.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.numerics.spectrum import common_base
+from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.mount_forces import RigidMounting
-from laufruhe.physics.mounting import mount_maps, mounting_of
+from laufruhe.physics.mounting import mount_maps, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import inertia_coefficients, rotor_wrench
 from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import MASSES, Quantity, Subject, counted_rotors, radius_of
+from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Subject, counted_rotors, radius_of
 from laufruhe.solvers.domain import Domain, domains_of
 from laufruhe.solvers.mount_rows import SAMPLES_PER_ORDER
 from laufruhe.solvers.mount_symbols import waves
@@ -142,7 +142,7 @@ class UnevenModel:
     def _signal(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[tuple[float, list[Any]]]:
         """Per order, the vectors (re, im), shape (d, 2), of each mount or of the block."""
         counted = self._counted(quantity, point, at)
-        if quantity.subject is not Subject.MOUNT_FORCE:
+        if quantity.subject not in ON_MOUNTS:
             return [(h, [wrench[_PARTS[quantity.subject], :]]) for h, wrench in counted]
         out = []
         for h, wrench in counted:
@@ -153,28 +153,50 @@ class UnevenModel:
 
     def _counted(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[tuple[float, Any]]:
         """Wrench coefficients of the orders that count."""
-        found = sorted(self.wrench(point, at).items())
+        # a block on soft mounts feels the first orders of its gas alone
+        gain = self._gain(quantity, point) if quantity.subject in ON_MOUNTS else None
+        found = sorted(self.wrench(point, at, gain).items())
         counted = [(h, wrench) for h, wrench in found if quantity.orders is None or h in quantity.orders]
         return counted or [(1.0, ca.DM.zeros(6, 2))]
 
     def _maps(self, quantity: Quantity, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
         """Force per wrench of every mount that counts, its directions weighted."""
-        if self._mounting is None:
-            raise ValueError("an engine without mounts has no mount forces")
         weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
         names = [mount.name for mount in self.problem.engine.mounts]
-        every = mount_maps(self._mounting, order, point.speed)
-        return [weights @ every[k] for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts]
+        every = self._map(quantity, order, point.speed)
+        return [
+            weights @ every[k] for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts
+        ]
 
-    def wrench(self, point: OperatingPoint, at: Symbols) -> dict[float, Any]:
-        """Wrench coefficients (re, im) by order, shape (6, 2)."""
+    def _map(self, quantity: Quantity, order: float, speed: float) -> NDArray[np.complex128]:
+        """Forces or travels of all mounts per wrench, shape (mounts, 3, 6)."""
+        if self._mounting is None:
+            raise ValueError("an engine without mounts has no mount forces")
+        if quantity.subject is Subject.MOUNT_FORCE:
+            return mount_maps(self._mounting, order, speed)
+        base = Fraction(order).limit_denominator(1000)
+        units = np.stack([np.zeros((6, 6)), np.eye(6)]).astype(complex)
+        spectra = [Spectrum(base or Fraction(1), units[:, k] if base else units[1:, k]) for k in range(6)]
+        travels = [travel_of(self.problem.engine, self._mounting, unit, speed) for unit in spectra]
+        return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
+
+    def _gain(self, quantity: Quantity, point: OperatingPoint) -> Callable[[float], float] | None:
+        """How much of a roll moment of an order mounts feel; None where that is the same for all."""
+        if isinstance(self._mounting, RigidMounting):
+            return None
+        return lambda h: float(np.abs(self._map(quantity, h, point.speed)[:, :, 3]).max())
+
+    def wrench(
+        self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float] | None = None
+    ) -> dict[float, Any]:
+        """Wrench coefficients (re, im) by order, shape (6, 2); gas of the orders that a gain leaves to matter."""
         total: dict[float, Any] = {}
         parts = self.problem.engine.slider_cranks
         for k, part in enumerate(parts):
             for h, wrench in self._cylinder(k, part, point.speed, at):
                 total[h] = total.get(h, 0.0) + wrench
         stars = [self._star(k, part, at) for k, part in enumerate(parts)]
-        for h, moment in self._gas.at(point, stars):
+        for h, moment in self._gas.at(point, stars, gain):
             wrench = ca.vertcat(ca.DM.zeros(3, 2), moment, ca.DM.zeros(2, 2))
             total[h] = total.get(h, 0.0) + wrench
         for rotor in self.problem.engine.rotors:
