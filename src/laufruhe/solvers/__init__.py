@@ -7,12 +7,13 @@ from collections.abc import Callable
 from functools import partial
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.solvers.accuracy import error_of, solve_within
 from laufruhe.solvers.direct_cones import solve_direct
-from laufruhe.solvers.result import ObjectiveValue, Result, Status
-from laufruhe.solvers.unbalances import objective_name, solve_unbalances
+from laufruhe.solvers.mount_result import objective_of
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.unbalances import solve_unbalances
 
 __all__ = ["Result", "Status", "solve", "state"]
 
@@ -62,15 +63,10 @@ def state(problem: Problem) -> Result:
     """The design as given, evaluated and not changed."""
     started = time.perf_counter()
     evaluation = evaluate(problem)
-    objective = None
-    if problem.objective:
-        value = objective_value(problem, evaluation)
-        unit = problem.objective[0].quantity.unit
-        objective = ObjectiveValue(objective_name(problem), value, unit, value)
     return Result(
         problem=problem,
         status=Status.FEASIBLE,
-        objective=objective,
+        objective=objective_of(problem, evaluation, evaluation),
         certificate=None,
         decisions=(),
         limits=(),
