@@ -95,11 +95,14 @@ def test_shaking_orders_are_amplitudes_of_the_wrench() -> None:
     assert whole[k] == pytest.approx(wrench.at(4.0))
 
 
-def test_infeasible_has_no_objective() -> None:
+def test_infeasible_says_what_was_minimised_and_proves_nothing() -> None:
     written = parsed(scenes.solved(scenes.IMPOSSIBLE))
     assert written["status"] == "infeasible"
-    assert written["objective"] is None
-    assert written["certificate"] is None
+    assert written["objective"]["name"] == "mean mount force"
+    assert written["objective"]["value"] is None
+    assert written["objective"]["initial"] > 0.0
+    assert written["certificate"]["kind"] == "none"
+    assert written["certificate"]["lower_bound"] is None
     assert written["decisions"] == {}
     assert set(written["conflict"]) == {"light shafts", "quiet mounts"}
     assert [entry["met"] for entry in written["constraints"]] == [True, False, True]

@@ -154,10 +154,12 @@ class Problem:
 
     @property
     def objective_unit(self) -> str | None:
-        """SI unit of what is minimised, of its first term; None where nothing is."""
-        units = [term.quantity.unit for term in self.objective]
-        units += [quantity.unit for quantity, _ in self.mount_design.terms]
-        return units[0] if units else None
+        """SI unit of what is minimised, empty where its terms have several; None where nothing is."""
+        units = {term.quantity.unit for term in self.objective}
+        units |= {quantity.unit for quantity, _ in self.mount_design.terms}
+        if not units:
+            return None
+        return units.pop() if len(units) == 1 else ""
 
     def at(self, fidelity: Fidelity) -> Problem:
         """The same problem at another fidelity, every design of an open star included."""

@@ -116,9 +116,7 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
         result,
         problem=replace(result.problem, phasing=phasing),
         status=Status.OPTIMAL if result.certificate is None else result.status,
-        objective=ObjectiveValue(
-            problem.objective_name, value, problem.objective[0].quantity.unit, objective_value(problem, given)
-        ),
+        objective=ObjectiveValue.of(problem, value, objective_value(problem, given)),
         certificate=replace(certificate, method=f"{certificate.method}; {method}"),
         decisions=(*phase_decisions(problem, phasing, candidate, names_of(phasing, built)), *result.decisions),
         initial=replace(given, samples=result.final.samples),
