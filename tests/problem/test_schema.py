@@ -73,7 +73,7 @@ def _drop(*keys: str | int) -> Any:
         _set("counterweights", 0, "mass", value={"between": ["0 kg", "1 kg"], "from": "0 kg"}),
         _set("objective", "minimise", value="mean mount farce"),
         _set("balancer_shafts", 0, "unbalances", value=[]),
-        _set("constraints", 0, "max", value=4),
+        _set("constraints", 0, "max", value=True),
         _drop("title"),
         _drop("engine", "stroke"),
         _drop("operating_points"),

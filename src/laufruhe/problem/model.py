@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.machine import Cycle, Engine, OperatingPoint
 from laufruhe.physics.shaking_loads import EXACT, Fidelity
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountDesign
 from laufruhe.problem.phasing import Phasing
@@ -94,7 +95,7 @@ class Limit:
     maximum: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Problem:
     """Everything that a solver and a report need to know.
 
@@ -137,6 +138,29 @@ class Problem:
     tolerance: float = 1e-4
     mount_design: MountDesign = NOTHING_ASKED
     phasing: Phasing | None = None
+
+    def __repr__(self) -> str:
+        return f"<Problem {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        return f"<strong>{html.escape(self.title)}</strong><br>{html.escape(self.summary)}"
+
+    @property
+    def summary(self) -> str:
+        """What the problem is about and what of it is open, in one line."""
+        engine = self.engine
+        parts = [
+            self.name,
+            f"{len(engine.slider_cranks)} cylinder(s), "
+            + ("two-stroke" if engine.cycle is Cycle.TWO_STROKE else "four-stroke"),
+            f"{len(engine.mounts)} mount(s)",
+            f"{len(self.points)} operating point(s)",
+            f"{len(self.limits) + len(self.mount_design.limits)} constraint(s)",
+        ]
+        names = list(self.phasing.open_names) if self.phasing is not None else []
+        names += [decision.name + ("" if decision.fixed_angle else " and angle") for decision in self.decisions]
+        names += [decision.name for decision in self.mount_design.decisions]
+        return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
 
     @property
     def start(self) -> tuple[complex, ...]:
