@@ -132,7 +132,8 @@ def _along(axes: Axes, values: Any) -> None:
     if len(each) < 4 or each[0] <= 0.0 or not np.allclose(np.diff(np.log(each)), np.log(each[1] / each[0]), rtol=1e-6):
         return
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(10.0, (1.0, 2.0, 5.0), numticks=12))
+    within = (1.0, 2.0, 5.0) if each[-1] > 20.0 * each[0] else (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
+    axes.xaxis.set_major_locator(LogLocator(10.0, within, numticks=12))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.minorticks_off()
 
