@@ -35,7 +35,9 @@ app = typer.Typer(
 ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help="Problem file (TOML).", show_default=False)]
 JsonOption = Annotated[
     Optional[str],  # noqa: UP045  (typer reads it at run time)
-    typer.Option("--json", metavar="FILE", help="Write the result as JSON to FILE; - prints it, and the text goes to stderr."),
+    typer.Option(
+        "--json", metavar="FILE", help="Write the result as JSON to FILE; - prints it, and the text goes to stderr."
+    ),
 ]
 StudyJsonOption = Annotated[
     Optional[str],  # noqa: UP045

@@ -28,7 +28,6 @@ def part(objective: list[float], proof: list[str], **coords: list[object]) -> xr
     return data
 
 
-
 def test_a_case_without_a_design_says_so_in_its_place() -> None:
     figure = study.layout_comparison(part([21050.7, np.nan], ["global", "none"]))
     axes = figure.axes[0]

@@ -386,8 +386,10 @@ class TestOperatingPoints:
     """What the gas does at one of them."""
 
     def test_what_cannot_be_reached_says_where(self, tmp_path: Path) -> None:
-        text = changed(WHOLE, "[gas]", '[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\nimep = "0.1 bar"\n[gas]')
-        with pytest.raises(ModelError, match="^at idle: imep 0.1 bar cannot be reached"):
+        text = changed(
+            WHOLE, "[gas]", '[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\nimep = "0.1 bar"\n[gas]'
+        )
+        with pytest.raises(ModelError, match=r"^at idle: imep 0\.1 bar cannot be reached"):
             evaluate(load(written(tmp_path, text)))
 
     def test_motored_compresses_and_burns_nothing(self, tmp_path: Path) -> None:

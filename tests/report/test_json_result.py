@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -82,6 +83,14 @@ def test_mounts_over_two_points_are_weighted() -> None:
         idle, rated = (point["mounts"][k] for point in written["points"])
         assert mount["mean"] == pytest.approx(0.25 * idle["mean"] + 0.75 * rated["mean"])
         assert mount["max"] == rated["max"]
+
+
+def test_every_key_is_explained() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    written = parsed(scenes.solved(scenes.TIGHT))
+    keys = {*written, *written["objective"], *written["certificate"], *written["constraints"][0], *written["mounts"][0]}
+    keys |= {*written["shaking"], *written["points"][0], *next(iter(written["decisions"].values()))}
+    assert not {key for key in keys if f"`{key}`" not in text}
 
 
 def test_shaking_orders_are_amplitudes_of_the_wrench() -> None:

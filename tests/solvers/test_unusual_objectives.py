@@ -67,13 +67,16 @@ def test_the_conditions_hold_at_an_optimum_of_zero() -> None:
 
 
 def test_a_sum_of_several_units_has_none() -> None:
-    mixed = scenes.TIGHT + """
+    mixed = (
+        scenes.TIGHT
+        + """
 [[objective.terms]]
 quantity = "mean mount force"
 [[objective.terms]]
 quantity = "rms roll moment"
 weight = 2
 """
+    )
     result = scenes.stated(mixed)
     assert result.objective is not None
     assert result.objective.unit == ""
