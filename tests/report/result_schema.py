@@ -30,7 +30,7 @@ SCHEMA = {
     **table(
         problem=TEXT,
         status={"enum": ["optimal", "feasible", "infeasible", "failed"]},
-        objective={"anyOf": [{"type": "null"}, table(name=TEXT, value=MAYBE, unit=TEXT, initial=NUMBER)]},
+        objective={"anyOf": [{"type": "null"}, table(name=TEXT, value=MAYBE, unit=TEXT, initial=MAYBE)]},
         certificate=table(
             kind={"enum": ["global", "global within gap", "local", "none"]},
             lower_bound=MAYBE,

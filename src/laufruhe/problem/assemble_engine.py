@@ -25,7 +25,7 @@ from laufruhe.problem.file_models import (
 )
 from laufruhe.problem.read_trace import trace_of
 
-_CYCLES = {"two-stroke": Cycle.TWO_STROKE, "four-stroke": Cycle.FOUR_STROKE}
+_CYCLES = {str(cycle): cycle for cycle in Cycle}
 _ONLY_FOR = {
     "bank_angle": ("vee",),
     "split_pin_angle": ("vee",),

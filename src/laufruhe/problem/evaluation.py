@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -14,15 +15,17 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.mixed_norms import Norm, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
-from laufruhe.physics.shaking_loads import Fidelity, shaking_loads
+from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
 
 Array = NDArray[np.float64]
 
 PEAK_REFINEMENT = 8
+"""Times as many samples as are asked for, among which maxima are sought (M6)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +71,15 @@ class Evaluation:
         Per operating point.
     samples
         Steps over the cycle at which measures are taken.
+    resonance
+        What has no answer, in words; loads and travel of the orders concerned are infinite.
     """
 
     engine: Engine
     fidelity: Fidelity
     loads: tuple[PointLoads, ...]
     samples: int
+    resonance: str = ""
 
     @cached_property
     def mount_names(self) -> list[str]:
@@ -94,9 +100,13 @@ class Evaluation:
         )
 
     def value(self, quantity: Quantity) -> float:
-        """A quantity of this design [SI]; a maximum is sought between the samples too."""
+        """A quantity of this design [SI]; a maximum is sought between the samples too. Infinite on a resonance."""
         finer = PEAK_REFINEMENT if quantity.norm is Norm.MAXIMUM else 1
-        return self.rows(quantity, finer * self.samples).value
+        if not self.resonance:
+            return self.rows(quantity, finer * self.samples).value
+        with np.errstate(invalid="ignore"):
+            value = self.rows(quantity, finer * self.samples).value
+        return value if math.isfinite(value) else math.inf
 
 
 def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
@@ -174,6 +184,9 @@ def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
 
 def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
     """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
+    forces = evaluation.loads[k].mount_forces
+    if forces is not None and not np.all(np.isfinite(forces.coefficients)):
+        return [CycleMeasures(math.inf, math.inf, math.inf)] * len(evaluation.engine.mounts)
     fine = _one_period(evaluation, k, PEAK_REFINEMENT)
     coarse = fine[::PEAK_REFINEMENT]
     most = lengths(fine).max(axis=0)

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Cycle, Engine, OperatingPoint
-from laufruhe.physics.shaking_loads import EXACT, Fidelity
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountDesign
 from laufruhe.problem.phasing import Phasing
 from laufruhe.problem.quantity import Quantity
@@ -151,8 +151,7 @@ class Problem:
         engine = self.engine
         parts = [
             self.name,
-            f"{len(engine.slider_cranks)} cylinder(s), "
-            + ("two-stroke" if engine.cycle is Cycle.TWO_STROKE else "four-stroke"),
+            f"{len(engine.slider_cranks)} cylinder(s), {engine.cycle}",
             f"{len(engine.mounts)} mount(s)",
             f"{len(self.points)} operating point(s)",
             f"{len(self.limits) + len(self.mount_design.limits)} constraint(s)",

@@ -5,9 +5,8 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from laufruhe import units
 from laufruhe.machine import PressureTrace
-from laufruhe.problem.complaints import Refused
+from laufruhe.problem.complaints import Refused, measured
 from laufruhe.problem.file_models import TraceTable
 
 
@@ -22,19 +21,11 @@ def trace_of(table: TraceTable, folder: Path) -> PressureTrace:
     Refused
         If the file cannot be read, or has a row that is no pair of numbers.
     """
-    angle = _factor("angle_unit", table.angle_unit, "rad")
-    pressure = _factor("pressure_unit", table.pressure_unit, "Pa")
+    angle = measured(f"1 {table.angle_unit}", "rad", "gas.angle_unit", table.angle_unit)
+    pressure = measured(f"1 {table.pressure_unit}", "Pa", "gas.pressure_unit", table.pressure_unit)
     pairs = _pairs(table.file, folder / table.file)
     extra = {} if table.crankcase_pressure is None else {"crankcase_pressure": table.crankcase_pressure}
     return PressureTrace(tuple(a * angle for a, _ in pairs), tuple(p * pressure for _, p in pairs), **extra)
-
-
-def _factor(key: str, unit: str, wanted: str) -> float:
-    try:
-        return units.parse(f"1 {unit}", wanted)
-    except units.UnitError as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise Refused(f"gas.{key}", unit, rule, remedy) from None
 
 
 def _pairs(file: str, path: Path) -> list[tuple[float, float]]:

@@ -15,8 +15,8 @@ from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, evaluate, o
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.affine import AffineModel, AffineNorm, AffineProblem
-from laufruhe.solvers.certificate import Bound, Certificate, Proof, best_bound, kkt_residual
+from laufruhe.solvers.affine import FEASIBLE, AffineModel, AffineNorm, AffineProblem
+from laufruhe.solvers.certificate import Bound, Certificate, Proof, best_bound, gap_unit, kkt_residual
 from laufruhe.solvers.direct_cones import ConicSolution
 from laufruhe.solvers.domain import Domain
 from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible
@@ -28,9 +28,7 @@ MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
 MOST_ROWS = 60_000
 NEGLIGIBLE = 1e-6
-FEASIBLE = 1e-6
 ACTIVE = 1e-5
-FLOOR = 1e-3
 SAME_LOAD = 1e-10
 
 
@@ -133,8 +131,8 @@ def _attempt(
     bound = best_bound(fine, coarse, x, solution.multipliers)
     judge = model.at(PEAK_REFINEMENT * samples) if _has_peaks(problem) else fine
     value = judge.objective(x)
-    gap = (value - bound.value) / _measure(value, initial)
-    return _Optimum(x, bound, fine, max(gap, 0.0), _excess(judge, x), samples)
+    gap = (value - bound.value) / gap_unit(value, initial)
+    return _Optimum(x, bound, fine, max(gap, 0.0), judge.excess(x), samples)
 
 
 def _stated(affine: AffineProblem) -> ConicSolution:
@@ -197,16 +195,6 @@ def _linear(norms: Sequence[tuple[AffineNorm, float]]) -> list[tuple[AffineNorm,
     return [(replace(norm, constant=np.zeros_like(norm.constant)), size) for norm, size in norms]
 
 
-def _excess(affine: AffineProblem, x: Array) -> float:
-    """Largest relative excess over a limit."""
-    return max(((norm.value(x) - maximum) / (maximum or 1.0) for maximum, norm in affine.limits), default=0.0)
-
-
-def _measure(value: float, initial: float) -> float:
-    """What a gap is counted in: a perfectly balanced engine has no objective of its own."""
-    return max(value, FLOOR * initial) or 1.0
-
-
 def _indistinguishable(problem: Problem, affine: AffineProblem) -> Array:
     """Directions in which no load of the problem changes, shape (n, m); none if a mass is minimised."""
     if not affine.size or any(term.quantity.subject in MASSES for term in problem.objective):
@@ -237,7 +225,7 @@ def _triangle(slope: Array) -> Array:
 def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Evaluation) -> Result:
     value, given = objective_value(problem, final), objective_value(problem, initial)
     bound = optimum.bound
-    residual = kkt_residual(optimum.problem, optimum.x, bound, _measure(value, given))
+    residual = kkt_residual(optimum.problem, optimum.x, bound, gap_unit(value, given))
     certificate = Certificate(
         kind=Proof.GLOBAL if optimum.gap <= problem.tolerance else Proof.WITHIN_GAP,
         lower_bound=bound.value,

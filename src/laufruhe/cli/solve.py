@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from laufruhe.cli_screen import complain
+from laufruhe.cli.screen import complain
 from laufruhe.errors import Complaint, InputError, SolverError
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def solved(problem: Problem, say: Callable[[str], None]) -> Result:
     try:
         return solve(problem, say)
     except SolverError as error:
-        return replace(state(problem), status=Status.FAILED, message=str(error))
+        return replace(state(problem, to_start_from=True), status=Status.FAILED, message=str(error))
 
 
 def show_result(result: Result, as_text: bool, folder: Path) -> None:
