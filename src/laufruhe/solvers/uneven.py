@@ -270,7 +270,7 @@ def _result(
         result,
         problem=replace(result.problem, phasing=phasing),
         status=Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=ObjectiveValue(problem.objective_name, best.value, problem.objective[0].quantity.unit, initial),
+        objective=ObjectiveValue.of(problem, best.value, initial),
         certificate=certificate,
         decisions=(*phase_decisions(problem, phasing, best.candidate, shafts), *result.decisions),
         initial=replace(given, samples=result.final.samples),
