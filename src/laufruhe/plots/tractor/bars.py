@@ -5,18 +5,8 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.figure import Figure
 
-from laufruhe.plots.style import page
-from laufruhe.plots.tractor.sheet import (
-    BLUE,
-    FORCE,
-    GREY,
-    ORANGE,
-    SERIES,
-    bar_legend,
-    entitled,
-    group,
-    mounts_and_all,
-)
+from laufruhe.plots.style import BLUE, FAINT, GREY, ORANGE, page
+from laufruhe.plots.tractor.sheet import FORCE, SERIES, bar_legend, entitled, group, mounts_and_all
 from laufruhe.report.wording import with_unit
 from laufruhe.studies.tractor.engines import KILOPOND
 
@@ -89,8 +79,8 @@ def pairs(data: xr.Dataset) -> Figure:
         best = float(curve.idxmin("share"))
         lower.plot(100.0 * best, float(curve.min()), "o", color=colour, markersize=6)
         lower.text(101.0, float(curve[-1]), str(load), color=colour, va="center")
-    lower.axvline(50.0, color="#666666", linewidth=0.8, linestyle=(0, (3, 3)))
-    lower.text(50.5, 2.0, "Φ = 50 % of the study", color="#666666", size=8)
+    lower.axvline(50.0, color=FAINT, linewidth=0.8, linestyle=(0, (3, 3)))
+    lower.text(50.5, 2.0, "Φ = 50 % of the study", color=FAINT, size=8)
     lower.set(xlim=(0, 113), ylim=(0, None), xlabel="share Φ of the moment pair [%]", ylabel="mean force [kp]")
     lower.set_title("Mean force over the share of the moment pair, force pair in place; dots: best share", loc="left")
     legend = bar_legend(["none", "force pair", "+ moment pair", "force, optimum", "both, optimum"], SERIES[: len(mean)])

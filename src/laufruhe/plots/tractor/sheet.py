@@ -14,12 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from laufruhe.plots.style import FAINT, heading
+from laufruhe.plots.style import BLUE, FAINT, GREEN, GREY, ORANGE, SKY, VERMILION, heading
 from laufruhe.report.wording import number
 from laufruhe.studies.tractor.engines import KILOPOND
 
-# Okabe and Ito: told apart by every eye, and by their lightness in print
-GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
 SERIES = (GREY, SKY, ORANGE, BLUE, VERMILION, GREEN)
 FORCE = "force on the mount [kp]"
 SOURCE = "After Hasselgruber 1964, {}. Computed with Laufruhe, exact kinematics."
