@@ -10,6 +10,7 @@ mount beyond its gap (E27).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -27,6 +28,8 @@ from laufruhe.physics.rigid_body import moved_wrench
 Array = NDArray[np.float64]
 
 STEPS_PER_PERIOD = 24
+LEAST_STEPS, MOST_STEPS = 16, 4000
+"""At which a stretch of a run-up is read."""
 MOST_SHOTS = 60
 CLOSED = 1e-9
 
@@ -173,24 +176,26 @@ def periodic_state(
         )  # fmt: skip
         return np.asarray(found.y if times is not None else found.y[:, -1].reshape(12, columns))
 
-    size = _static_size(model, loads)
-    start, step = np.zeros(12), size * 1e-4
-    for _ in range(MOST_SHOTS):
-        ends = run(start[:, None] + np.column_stack([np.zeros(12), step * np.eye(12)]))
-        slope = (ends[:, 1:] - ends[:, :1]) / step
-        gap = ends[:, 0] - start
-        change = np.linalg.solve(np.eye(12) - slope, gap)
-        start = start + change
-        if np.abs(change).max() <= CLOSED * max(np.abs(start).max(), size):
-            break
-    else:
-        raise SolverError("the bump stops let no motion repeat itself in one period; integrate a run-up instead")
+    start = _shot(run, _static_size(model, loads))
     times = np.arange(samples + 1) * (period / samples)
     states = run(start[:, None], np.minimum(times, period))
     y, rate = states[:6, :-1], states[6:, :-1]
     mismatch = float(np.abs(states[:, -1] - start).max() / max(np.abs(states).max(), 1e-300))
     travels = (model.travels @ y).T.reshape(samples, -1, 3)
     return SteadyState(np.asarray(times[:-1] * speed, dtype=float), model.mount_forces(y, rate), travels, mismatch)
+
+
+def _shot(run: Callable[[Array], Array], size: float) -> Array:
+    """The start (y, y'), shape (12,), that one period of `run` ends at again, by Newton's method from rest (E28)."""
+    start, step = np.zeros(12), size * 1e-4
+    for _ in range(MOST_SHOTS):
+        ends = run(start[:, None] + np.column_stack([np.zeros(12), step * np.eye(12)]))
+        slope = (ends[:, 1:] - ends[:, :1]) / step
+        change = np.linalg.solve(np.eye(12) - slope, ends[:, 0] - start)
+        start = start + change
+        if np.abs(change).max() <= CLOSED * max(np.abs(start).max(), size):
+            return start
+    raise SolverError("the bump stops let no motion repeat itself in one period; integrate a run-up instead")
 
 
 def _static_size(model: TimeModel, loads: NDArray[np.complex128]) -> float:
@@ -273,11 +278,8 @@ def run_through(
 
     def load(t: float) -> Array:
         speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
-        orders, coefficients = bases[0]
-        total = speed * speed * (np.exp(1j * orders * angle) @ coefficients).real
-        for orders, coefficients in bases[1:]:
-            total = total + (np.exp(1j * orders * angle) @ coefficients).real
-        return np.asarray(total)[:, None]
+        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in bases]
+        return np.asarray(sum(parts[1:], speed * speed * parts[0]))[:, None]
 
     def rates(t: float, state: Array) -> Array:
         y, rate = state[:6, None], state[6:, None]
@@ -287,9 +289,9 @@ def run_through(
     state, edges = np.zeros(12), np.linspace(0.0, duration, stretches + 1)
     force, travel = np.zeros(stretches), np.zeros(stretches)
     scale = _static_size(model, bases[0][1] * max(first, last) ** 2)
+    count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
     for k, (start, end) in enumerate(pairwise(edges)):
-        count = max(int(STEPS_PER_PERIOD * fastest * (end - start) / (2.0 * np.pi)) + 1, 16)
-        times = np.linspace(start, end, min(count, 4000))
+        times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
         found = solve_ivp(
             rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=1e-3 * tolerance * scale
         )
