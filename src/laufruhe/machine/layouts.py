@@ -310,13 +310,16 @@ def build(
         )
         for k in cylinders
     )
-    throws = tuple(
+    return slider_cranks, _throws_of(layout, mechanism, angles)
+
+
+def _throws_of(layout: Layout, mechanism: Mechanism, angles: Sequence[float]) -> tuple[Throw, ...]:
+    return tuple(
         Throw(
             x,
             angles[pin],
-            tuple(k for k in cylinders if layout.pins[k] == pin),
+            tuple(k for k, own in enumerate(layout.pins) if own == pin),
             mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angles[pin])),
         )
         for pin, x in enumerate(layout.throw_positions)
     )
-    return slider_cranks, throws

@@ -10,7 +10,7 @@ mount beyond its gap (E27).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -276,15 +276,7 @@ def run_through(
     if gas is not None:
         bases.append((gas.orders, gas.coefficients @ model.load.T))
 
-    def load(t: float) -> Array:
-        speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
-        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in bases]
-        return np.asarray(sum(parts[1:], speed * speed * parts[0]))[:, None]
-
-    def rates(t: float, state: Array) -> Array:
-        y, rate = state[:6, None], state[6:, None]
-        return np.concatenate([rate[:, 0], model.accelerations(y, rate, load(t))[:, 0]])
-
+    rates = _run_rates(model, bases, first, gain)
     fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in bases))
     state, edges = np.zeros(12), np.linspace(0.0, duration, stretches + 1)
     force, travel = np.zeros(stretches), np.zeros(stretches)
@@ -300,3 +292,20 @@ def run_through(
         travel[k] = np.linalg.norm((model.travels @ y).T.reshape(len(times), -1, 3), axis=-1).max()
         state = found.y[:, -1]
     return RunUp(first + gain * edges[1:], force, travel)
+
+
+def _run_rates(
+    model: TimeModel, bases: Sequence[tuple[Array, NDArray[np.complex128]]], first: float, gain: float
+) -> Callable[[float, Array], Array]:
+    """Right side of E25 in (y, y') at a crank speed that grows by `gain`; of the loads the first is inertia (E28)."""
+
+    def load(t: float) -> Array:
+        speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
+        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in bases]
+        return np.asarray(sum(parts[1:], speed * speed * parts[0]))[:, None]
+
+    def rates(t: float, state: Array) -> Array:
+        y, rate = state[:6, None], state[6:, None]
+        return np.concatenate([rate[:, 0], model.accelerations(y, rate, load(t))[:, 0]])
+
+    return rates

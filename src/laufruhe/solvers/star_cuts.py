@@ -139,8 +139,7 @@ def search_designs(
     bounds = np.zeros((len(stars), len(sets)))
     open_ = np.ones(bounds.shape, dtype=bool)
     solved: list[Solved] = []
-    infeasible = 0
-    complete = True
+    infeasible, complete = 0, True
     while open_.any():
         values = distinct_values(model.space, solved)
         target = values[count - 1] if len(values) >= count else float("inf")
@@ -161,12 +160,11 @@ def search_designs(
         solved.append(found)
         _raise(bounds, cut, stars, sets, owners)
         bounds[row, column] = max(found.bound, bounds[row, column])
-    beyond = float(np.where(open_, bounds, np.inf).min()) if bounds.size else np.inf
+    beyond = float(np.where(open_, bounds, np.inf).min(initial=np.inf))
     solved.sort(key=lambda s: (s.value, s.star, s.built))
     least = min([beyond, *(s.bound for s in solved)])
-    return CutsFound(
-        tuple(solved), least, beyond, complete, bounds.size, infeasible, time.perf_counter() - started
-    )  # fmt: skip
+    seconds = time.perf_counter() - started
+    return CutsFound(tuple(solved), least, beyond, complete, bounds.size, infeasible, seconds)
 
 
 def _raise(bounds: Array, cut: Cut, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> None:

@@ -158,7 +158,7 @@ def dataset(
     outcomes = [Outcome(**record) for record in records]
     mounts = list(dict.fromkeys(name for o in outcomes for name in o.mounts))
     decided = {name: unit for o in outcomes for name, unit in o.units.items()}
-    metrics = {o.metric: o.unit for o in outcomes if o.metric}
+    metric, unit = _metric(outcomes)
 
     def per_mount(name: str) -> tuple[tuple[str, str], Any, dict[str, str]]:
         rows = [dict(zip(o.mounts, getattr(o, name), strict=True)) for o in outcomes]
@@ -168,9 +168,6 @@ def dataset(
     def each(name: str, words: str) -> tuple[str, Any, dict[str, str]]:
         return "point", np.array([getattr(o, name) for o in outcomes]), {"units": unit, "long_name": words}
 
-    # metrics of one part are of one dimension, or `kinds.swept.checked` has refused them
-    unit = next(iter(metrics.values()), "")
-    metric = next(iter(metrics), "") if len(metrics) == 1 else "objective"
     return xr.Dataset(
         {
             "objective_given": each("objective_given", f"{metric} of the design as given"),
@@ -193,6 +190,12 @@ def dataset(
         },
         attrs={"title": part.title, "kind": part.settings()["kind"], "source": part.source, "metric": metric},
     )  # fmt: skip
+
+
+def _metric(outcomes: Sequence[Outcome]) -> tuple[str, str]:
+    """What the outcomes measure, and its unit: one, or `kinds.swept.checked` has refused them."""
+    metrics = {o.metric: o.unit for o in outcomes if o.metric}
+    return next(iter(metrics), "") if len(metrics) == 1 else "objective", next(iter(metrics.values()), "")
 
 
 def _table(rows: Sequence[Mapping[str, float]], columns: Sequence[str]) -> NDArray[np.float64]:
