@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
+from problem_files import loaded
 
 MOUNTS = """
 [mounts]
@@ -82,6 +82,4 @@ samples = {samples}
 speed = "2000 rpm"
 
 {rest}"""
-    path = folder / "test.toml"
-    path.write_text(text, encoding="utf-8")
-    return load(path)
+    return loaded(folder, text)
