@@ -16,7 +16,6 @@ from laufruhe.problem.study_reader import load_study
 from laufruhe.report.study_kinds import SHOWN
 from laufruhe.studies import run
 from laufruhe.studies.free_forces import printed_agree
-from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.tolerance_study import verdicts
 from laufruhe.studies.worth import worths
 from problem_files import written
@@ -79,10 +78,6 @@ literature = {{ couple_1 = 0.449, couple_2 = 4.9798, force_2 = 0.001 }}
 def part_of(folder: Path, text: str) -> xr.Dataset:
     datasets, _ = run(load_study(written(folder, text, "study")), folder, folder / "kept")
     return next(iter(datasets.values()))
-
-
-def test_every_kind_is_computed_and_shown() -> None:
-    assert KINDS.keys() == SHOWN.keys()
 
 
 def test_economics_by_its_command(tmp_path: Path) -> None:
