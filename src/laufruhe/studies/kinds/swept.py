@@ -55,6 +55,19 @@ def _check_asked(problem: Problem, case: CaseTable, scenes: Scenes) -> None:
         raise refused(scenes, case, "objective", "is missing, so a study has nothing to compare", "give a metric")
 
 
+def refuse_open_phasing(problem: Problem, case: CaseTable, scenes: Scenes) -> None:
+    """Of sets of shafts: an open star has a choice of its own.
+
+    Raises
+    ------
+    InputError
+        If something of the phasing is open.
+    """
+    if problem.phasing is not None:
+        rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
+        raise refused(scenes, case, "phasing", rule, remedy)
+
+
 def refused(scenes: Scenes, case: CaseTable, where: str, rule: str, remedy: str) -> InputError:
     """One line about the scene of a case."""
     return InputError(str(scenes.folder / case.problem), (Complaint(where, "", rule, remedy),))
