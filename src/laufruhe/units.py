@@ -127,6 +127,17 @@ def unit_of(text: str) -> str:
     return (match.group(3) or "").strip() if match else ""
 
 
+def dimension_of(text: str) -> str | None:
+    """SI unit of what a text such as '12 Hz' measures; None where it is no number with a unit known here."""
+    for unit in _EXAMPLES:
+        try:
+            parse(text, unit)
+        except UnitError:
+            continue
+        return unit
+    return None
+
+
 _SHOWN = {
     "rad": ("deg", math.degrees(1.0)),
     "rad/s": ("rpm", 30.0 / math.pi),

@@ -30,7 +30,7 @@ SCHEMA = {
     **table(
         problem=TEXT,
         status={"enum": ["optimal", "feasible", "infeasible", "failed"]},
-        objective={"anyOf": [{"type": "null"}, table(name=TEXT, value=NUMBER, unit=TEXT, initial=NUMBER)]},
+        objective={"anyOf": [{"type": "null"}, table(name=TEXT, value=NUMBER, unit=TEXT, initial=MAYBE)]},
         certificate={
             "anyOf": [
                 {"type": "null"},

@@ -126,7 +126,7 @@ def check(problem: ProblemArgument, json: JsonOption = None) -> None:
         copy = json_file(Request("check", problem, json, None, False), places)
         given = load(problem)
         # a load that no mount carries, or a gas cycle that cannot be met, shows only here
-        stated = state(given)
+        stated = state(given, to_start_from=True)
         if copy is not None:
             files.write(copy, as_json(stated))
         if json == "-":

@@ -23,7 +23,7 @@ from laufruhe.physics.speed_map import SpeedMap, speed_map, split_loads
 from laufruhe.plots.style import AFTER, FAINT, INK, VERMILION, colours_of, heading, names_of, page, source_line
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_design import MountMeasure, mounting_in
-from laufruhe.report.measures import changed, hardest_point
+from laufruhe.report.measures import changed, hardest_point, load_designs
 from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of
 from laufruhe.report.wording import figure, number
 from laufruhe.solvers.result import Result
@@ -71,14 +71,14 @@ def _map_of(design: Evaluation, result: Result, speeds: Array) -> SpeedMap | Non
 
 def transmissibility(result: Result) -> Figure:
     """Foundation over exciting force by order and speed, with limits and operating points."""
-    designs = _designs(result)
+    designs = load_designs(result)
     facts = facts_of(result.final)
     top = _fastest(result, facts)
     speeds = np.linspace(top / SPEEDS, top, SPEEDS)
     drawn = page(1, 1, (6.8, 4.0))
     axes = drawn.panels[0]
     highest, legend = 1.0, list[Artist]()
-    for design, colour in zip(designs, colours_of(result), strict=True):
+    for design, colour in zip(designs, colours_of(result, loads=True), strict=True):
         field = _map_of(design, result, speeds)
         if field is None:
             continue
@@ -88,7 +88,7 @@ def transmissibility(result: Result) -> Figure:
                 curve = field.transmissibility[:, column[0]]
                 highest = max(highest, float(curve.max(initial=0.0)))
                 axes.plot(speeds * _RPM, curve, color=colour, linestyle=_STYLES[k], linewidth=1.6)
-    for colour, name in zip(colours_of(result), names_of(result), strict=True):
+    for colour, name in zip(colours_of(result, loads=True), names_of(result, loads=True), strict=True):
         legend.append(Line2D([], [], color=colour, linewidth=2.0, label=name))
     legend += [
         Line2D([], [], color=INK, linestyle=_STYLES[k], label=f"order {o:g}") for k, o in enumerate(facts.orders)

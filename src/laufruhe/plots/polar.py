@@ -27,7 +27,7 @@ from laufruhe.plots.style import (
     thin,
 )
 from laufruhe.problem.evaluation import mount_samples
-from laufruhe.report.measures import changed, hardest_point
+from laufruhe.report.measures import hardest_point, load_designs
 from laufruhe.report.wording import trimmed
 from laufruhe.solvers.result import Result
 
@@ -40,7 +40,7 @@ PANEL = 2.9
 def figure(result: Result) -> Figure:
     """One panel for each mount, all to one scale."""
     k = hardest_point(result)
-    designs = [result.initial, result.final] if changed(result) else [result.final]
+    designs = load_designs(result)
     paths = [_closed(mount_samples(design, k)) for design in designs]
     mounts = result.problem.engine.mounts[:MOST_PANELS]
     lateral, vertical = _reach(paths, len(mounts))
@@ -50,7 +50,7 @@ def figure(result: Result) -> Figure:
     drawn = page(math.ceil(len(mounts) / columns), columns, panel, len(mounts), gap=0.5, lead=0.3)
     quarters = (len(paths[0]) - 1) // (4 * result.problem.engine.cycle.turns)
     for m, (axes, mount) in enumerate(zip(drawn.panels, mounts, strict=True)):
-        for path, colour, name in zip(paths, colours_of(result), names_of(result), strict=True):
+        for path, colour, name in zip(paths, colours_of(result, loads=True), names_of(result, loads=True), strict=True):
             _path(axes, path[:, m], colour, name, quarters)
         _frame(axes, mount, lateral, vertical)
     _label(drawn, columns)
@@ -122,7 +122,7 @@ def _left_out(paths: list[Array]) -> str:
 def _legend(result: Result) -> list[Artist]:
     lines: list[Artist] = [
         Line2D([], [], color=colour, linewidth=2.0, label=name)
-        for colour, name in zip(colours_of(result), names_of(result), strict=True)
+        for colour, name in zip(colours_of(result, loads=True), names_of(result, loads=True), strict=True)
     ]
     dot = Line2D([], [], color=INK, marker="o", linestyle="none", markersize=3.6, label="every 90° of the crank")
     ring = Line2D(

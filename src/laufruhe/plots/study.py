@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from laufruhe.plots.style import AFTER, BEFORE, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, credit, heading, page
-from laufruhe.report.study_tables import settled, swept_names, with_unit
+from laufruhe.report.study_tables import readable_metric, settled, swept_names, with_unit
 
 COLOURS = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, "#332288", "#999933")
 PANEL = (6.4, 3.6)
@@ -28,6 +28,7 @@ LABELLED: dict[str, Any] = {"marker": "o", "markersize": 6, "linestyle": ""}
 
 def counterweight_fraction(data: xr.Dataset) -> Figure:
     """The metric over the fraction, the proven optimum of every line marked; or the best fraction over speed."""
+    data = readable_metric(data)
     if "optimum" not in data.coords:
         return _best_fraction(data)
     names = swept_names(data)
@@ -66,6 +67,7 @@ def _best_fraction(data: xr.Dataset) -> Figure:
 
 def balancer_sizing(data: xr.Dataset) -> Figure:
     """Bars of every set of shafts, the plain engine drawn once; lines where something is swept."""
+    data = readable_metric(data)
     if swept_names(data):
         return _over_sweep(data, ["shafts"], "Every set of shafts at its own optimum.")
     plain = data["shafts"].values == "none"
@@ -85,9 +87,13 @@ def balancer_sizing(data: xr.Dataset) -> Figure:
 
 def layout_comparison(data: xr.Dataset) -> Figure:
     """Bars of every engine as given and at its optimum; lines where something is swept."""
+    data = readable_metric(data)
     words = f"Engines of {data.attrs['at']}." if data.attrs["at"] == "equal cylinders" else f"At {data.attrs['at']}."
     if swept_names(data):
-        return _over_sweep(data, [], words)
+        alone = len(set(data["case"].values.tolist())) == 1
+        open_points = (data["proof"].values != "as given").any()
+        claim = f"Every point: {_claimed(data)}." if open_points else "As given."
+        return _over_sweep(data, [], claim if alone else words)
     return _bars(data, data["case"].values, words)
 
 
@@ -207,7 +213,8 @@ def _page(panels: int, wide: float = PANEL[0]) -> tuple[Figure, tuple[Axes, ...]
 
 
 def _metric_axis(axes: Axes, data: xr.Dataset, *drawn: str) -> None:
-    axes.set_ylabel(f"{data.attrs['metric']} [{data['objective'].attrs['units']}]")
+    unit = data["objective"].attrs["units"]
+    axes.set_ylabel(f"{data.attrs['metric']} [{unit}]" if unit else data.attrs["metric"])
     top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", *drawn))
     axes.set_ylim(0.0, 1.08 * top or 1.0)
 

@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from laufruhe.report.measures import changed
+from laufruhe.report.measures import changed, load_designs
 from laufruhe.solvers.result import Result
 
 if TYPE_CHECKING:
@@ -149,14 +149,16 @@ def point_name(result: Result, k: int) -> str:
     return points[k].name if len(points) == 1 else f"{points[k].name} (largest loads of {len(points)} points)"
 
 
-def names_of(result: Result) -> tuple[str, ...]:
-    """What the series are called: one where nothing was decided."""
-    return ("as given", "as decided") if changed(result) else ("as given",)
+def names_of(result: Result, loads: bool = False) -> tuple[str, ...]:
+    """What the series are called: one where nothing was decided, or where it is loads that only one design has."""
+    if not changed(result):
+        return ("as given",)
+    return ("as given", "as decided")[-len(load_designs(result)) :] if loads else ("as given", "as decided")
 
 
-def colours_of(result: Result) -> tuple[str, ...]:
+def colours_of(result: Result, loads: bool = False) -> tuple[str, ...]:
     """One colour for each of `names_of`."""
-    return (BEFORE, AFTER) if changed(result) else (AFTER,)
+    return (BEFORE, AFTER)[-len(names_of(result, loads)) :]
 
 
 def save(figure: Figure, path: Path) -> None:

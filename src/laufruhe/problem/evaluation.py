@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -69,12 +70,15 @@ class Evaluation:
         Per operating point.
     samples
         Steps over the cycle at which measures are taken.
+    resonance
+        What has no answer, in words; loads and travel of the orders concerned are infinite.
     """
 
     engine: Engine
     fidelity: Fidelity
     loads: tuple[PointLoads, ...]
     samples: int
+    resonance: str = ""
 
     @cached_property
     def mount_names(self) -> list[str]:
@@ -95,9 +99,13 @@ class Evaluation:
         )
 
     def value(self, quantity: Quantity) -> float:
-        """A quantity of this design [SI]; a maximum is sought between the samples too."""
+        """A quantity of this design [SI]; a maximum is sought between the samples too. Infinite on a resonance."""
         finer = PEAK_REFINEMENT if quantity.norm is Norm.MAXIMUM else 1
-        return self.rows(quantity, finer * self.samples).value
+        if not self.resonance:
+            return self.rows(quantity, finer * self.samples).value
+        with np.errstate(invalid="ignore"):
+            value = self.rows(quantity, finer * self.samples).value
+        return value if math.isfinite(value) else math.inf
 
 
 def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
@@ -168,6 +176,9 @@ def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
 
 def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
     """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
+    forces = evaluation.loads[k].mount_forces
+    if forces is not None and not np.all(np.isfinite(forces.coefficients)):
+        return [CycleMeasures(math.inf, math.inf, math.inf)] * len(evaluation.engine.mounts)
     fine = _one_period(evaluation, k, PEAK_REFINEMENT)
     coarse = fine[::PEAK_REFINEMENT]
     most = lengths(fine).max(axis=0)

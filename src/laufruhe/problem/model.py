@@ -143,6 +143,22 @@ class Problem:
         """Decisions of the design as given."""
         return tuple(decision.start for decision in self.decisions)
 
+    @property
+    def objective_name(self) -> str:
+        """What is minimised, in words; empty where nothing is."""
+        parts = [(term.weight, term.quantity.name) for term in self.objective]
+        parts += [(weight, quantity.name) for quantity, weight in self.mount_design.terms]
+        if len(parts) == 1 and parts[0][0] == 1.0:
+            return parts[0][1]
+        return " + ".join(f"{weight:g} x {name}" for weight, name in parts)
+
+    @property
+    def objective_unit(self) -> str | None:
+        """SI unit of what is minimised, of its first term; None where nothing is."""
+        units = [term.quantity.unit for term in self.objective]
+        units += [quantity.unit for quantity, _ in self.mount_design.terms]
+        return units[0] if units else None
+
     def at(self, fidelity: Fidelity) -> Problem:
         """The same problem at another fidelity, every design of an open star included."""
         if self.phasing is None:

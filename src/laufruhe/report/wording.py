@@ -94,6 +94,9 @@ def headline(result: Result) -> str:
         return f"{name} of the design as given: {figure(o.value, o.unit)}."
     if abs(o.reduction) < UNFELT:
         return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
+    if math.isinf(o.initial):
+        found = f"{name} is {figure(o.value, o.unit)}, {_proven(result.certificate)}"
+        return f"{found}; the design as given stands on a resonance."
     change = percent(-o.reduction)
     given, decided = figure(o.initial, o.unit), figure(o.value, o.unit, scale=o.initial)
     sentence = f"{name} falls from {given} to {decided}"

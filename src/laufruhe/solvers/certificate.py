@@ -8,6 +8,7 @@ form. Any Z and mu give a valid bound; the solver only proposes good ones.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -63,6 +64,11 @@ class Certificate:
     gap: float
     kkt_residual: float
     method: str
+
+
+def gap_scale(value: float, given: float) -> float:
+    """What a gap is relative to: the objective, or a thousandth of that of the design as given if it has one."""
+    return max(abs(value), 1e-3 * abs(given) if math.isfinite(given) else 0.0)
 
 
 @dataclass(frozen=True, eq=False)

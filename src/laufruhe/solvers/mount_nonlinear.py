@@ -13,10 +13,11 @@ from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
+from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.phasing import Candidate
 from laufruhe.solvers.accuracy import sampling_error
-from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.certificate import Certificate, Proof, gap_scale
 from laufruhe.solvers.domain import domains_of
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mount_program import JointProgram
@@ -103,7 +104,7 @@ def _solved(
 ) -> tuple[Result, Array]:
     """Result, and deviations of the throws."""
     started = time.perf_counter()
-    initial = evaluate(problem)
+    initial = evaluate_start(problem)
     points = start_points(problem)
     points = points if first is None else [first, *points[1:]]
     joint = JointProgram(problem, moves=moves)
@@ -261,7 +262,7 @@ def _result(
     timing: dict[str, float],
 ) -> Result:
     objective = objective_of(problem, initial, design.evaluation)
-    scale = max(abs(design.value), 1e-3 * abs(objective.initial)) if objective else 1.0
+    scale = gap_scale(design.value, objective.initial) if objective else 1.0
     # throws that move are not in the bound
     bound = _bound(problem) if joint.moves is None else 0.0
     gap = max(design.value - bound, 0.0) / (scale or 1.0)
@@ -290,7 +291,7 @@ def _result(
 def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design, float] | None) -> str:
     usable = [o for o in optima if o.usable]
     apart = distinct(optima, scale)
-    text = f"IPOPT from {len(optima)} starts, {len(usable)} of which ended at "
+    text = f"IPOPT from {len(optima)} start{'s' if len(optima) > 1 else ''}, {len(usable)} of which ended at "
     text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
     if len(apart) > 1 and apart[-1].value > WORTH_SAYING * apart[0].value > 0.0:
         text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"

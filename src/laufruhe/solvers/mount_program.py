@@ -26,7 +26,6 @@ from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.rigid_body import moved_wrench
-from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import (
     MountLimit,
@@ -35,7 +34,7 @@ from laufruhe.problem.mount_design import (
     mounting_in,
     torque_roll_rows,
 )
-from laufruhe.problem.mount_values import whole_objective
+from laufruhe.problem.mount_resonance import objective_size, off_resonance
 from laufruhe.problem.quantity import ON_MOUNTS, Quantity
 from laufruhe.solvers.affine import AffineModel
 from laufruhe.solvers.gathered import Gathered
@@ -71,7 +70,8 @@ class JointProgram:
 
     def __init__(self, problem: Problem, margin: float = 0.0, moves: ThrowMoves | None = None) -> None:
         self.problem, self._margin, self.moves = problem, margin, moves
-        self.model = AffineModel(problem)
+        # loads and unbalances alone are taken from it, whatever the mounts
+        self.model = AffineModel(off_resonance(problem))
         self._mounting = mounting_in(problem.engine)
         design = problem.mount_design
         self._count = len(design.decisions)
@@ -93,7 +93,7 @@ class JointProgram:
         )
         self._vectors, self._squares = ca.MX.sym("V", 36 * self._modal), ca.MX.sym("l", 6 * self._modal)
         self._square_unit = float(np.trace(self._root @ self._mounting.stiffness @ self._root.T)) / 6.0
-        self._unit = abs(whole_objective(problem, evaluate(problem))) or 1.0
+        self._unit = objective_size(problem)
         self.program = self._built()
 
     def _loads_of(self, moves: ThrowMoves | None) -> Loads:

@@ -18,7 +18,6 @@ from laufruhe.solvers.ranking import PhasingResult, ranked_orders, ranked_star
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.star_answers import searched
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.unbalances import objective_name
 
 
 def solve_phasing(problem: Problem) -> Result:
@@ -117,7 +116,7 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
         problem=replace(result.problem, phasing=phasing),
         status=Status.OPTIMAL if result.certificate is None else result.status,
         objective=ObjectiveValue(
-            objective_name(problem), value, problem.objective[0].quantity.unit, objective_value(problem, given)
+            problem.objective_name, value, problem.objective[0].quantity.unit, objective_value(problem, given)
         ),
         certificate=replace(certificate, method=f"{certificate.method}; {method}"),
         decisions=(*phase_decisions(problem, phasing, candidate, names_of(phasing, built)), *result.decisions),

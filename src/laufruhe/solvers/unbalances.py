@@ -246,7 +246,7 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         else Status.FEASIBLE
         if feasible
         else Status.FAILED,
-        objective=ObjectiveValue(objective_name(problem), value, problem.objective[0].quantity.unit, given),
+        objective=ObjectiveValue(problem.objective_name, value, problem.objective[0].quantity.unit, given),
         certificate=certificate,
         decisions=tuple(
             entry for domain in optimum.problem.domains for entry in decision_values(domain, optimum.x, bound.gradient)
@@ -257,13 +257,6 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         message="" if feasible else "the design found breaks a limit between the angles it was solved at",
         error_estimate=error_of(problem, final),
     )
-
-
-def objective_name(problem: Problem) -> str:
-    """The objective in words."""
-    if len(problem.objective) == 1 and problem.objective[0].weight == 1.0:
-        return problem.objective[0].quantity.name
-    return " + ".join(f"{term.weight:g} x {term.quantity.name}" for term in problem.objective)
 
 
 def _limit_value(name: str, unit: str, value: float, maximum: float, price: float, objective: float) -> LimitValue:

@@ -71,9 +71,9 @@ def solved(problem: Problem) -> Outcome:
     try:
         result = solve(problem, many=True)
     except SolverError:
-        return _outcome(state(problem), FAILED, "none")
+        return _outcome(state(problem, to_start_from=True), FAILED, "none")
     if result.objective is None:
-        return _outcome(state(problem), str(result.status), "none")
+        return _outcome(state(problem, to_start_from=True), str(result.status), "none")
     proof = str(result.certificate.kind) if result.certificate else AS_GIVEN if _is_closed(problem) else "none"
     return _outcome(result, str(result.status), proof)
 
@@ -88,17 +88,22 @@ def _outcome(shown: Result, status: str, proof: str) -> Outcome:
         unit=objective.unit if objective else "",
         status=status,
         proof=proof,
-        objective_given=objective.initial if objective else nothing,
+        objective_given=_finite(objective.initial) if objective else nothing,
         objective=objective.value if objective and designed else nothing,
         lower_bound=shown.certificate.lower_bound if shown.certificate else nothing,
         mounts=shown.initial.mount_names if shown.initial.engine.mounts else [],
-        mean_given=[mean for mean, _ in before],
-        maximum_given=[most for _, most in before],
+        mean_given=[_finite(mean) for mean, _ in before],
+        maximum_given=[_finite(most) for _, most in before],
         mean=[mean for mean, _ in after],
         maximum=[most for _, most in after],
         decisions={decision.name: decision.value for decision in shown.decisions},
         units={decision.name: decision.unit for decision in shown.decisions},
     )
+
+
+def _finite(value: float) -> float:
+    """NaN for what has no size: loads of a design as given that stands on a resonance."""
+    return value if math.isfinite(value) else math.nan
 
 
 def _is_closed(problem: Problem) -> bool:

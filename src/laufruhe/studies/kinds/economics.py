@@ -76,7 +76,9 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
         refuse_open_phasing(problem, point.case, scenes)
         objective = tuple(problem.objective)
         if not objective:
-            raise refused(scenes, point.case, "objective", "is missing, so shafts have nothing to lower", "add one")
+            rule = f"is {problem.objective_name}, which is no load" if problem.objective_name else "is missing"
+            remedy = "minimise a load, such as mean mount force"
+            raise refused(scenes, point.case, "objective", f"{rule}, so shafts have nothing to lower", remedy)
         asked.setdefault(str(objective), point)
     if len(asked) > 1:
         first, second = list(asked.values())[:2]
