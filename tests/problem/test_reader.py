@@ -13,21 +13,10 @@ from laufruhe.errors import InputError, ModelError, UncarriedLoadError
 from laufruhe.machine import Cycle, PressureTrace, Seiliger
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.reader import load
+from problem_files import FOUR, MOUNTS, changed, open_unbalance, shaft, written
 
-WHOLE = """
-title = "Four in line"
-
-[engine]
-layout = "inline"
-cycle = "four-stroke"
-bore = "100 mm"
-stroke = "120 mm"
-rod_ratio = 0.26
-reciprocating_mass = "1.25 kg"
-cylinder_spacing = "125 mm"
-throws = [0, 180, 180, 0]
-firing_order = [1, 3, 4, 2]
-
+WHOLE = "".join([
+    FOUR, 'bore = "100 mm"\nthrows = [0, 180, 180, 0]\n', """
 [[operating_points]]
 name = "rated"
 speed = "2500 rpm"
@@ -36,43 +25,22 @@ speed = "2500 rpm"
 model = "seiliger"
 peak_pressure = "80 kp/cm^2"
 imep = "5.5 kp/cm^2"
-
-[mounts]
-positions = [
-    ["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"],
-    ["-1 m", "250 mm", "0 mm"], ["-1 m", "-250 mm", "0 mm"],
-]
-
+""", MOUNTS, """
 [[counterweights]]
 name = "web"
 opposite_throw = 1
 radius = "80 mm"
 mass = { between = ["0 kg", "3 kg"] }
 angle = { between = [0, 360] }
-
-[[balancer_shafts]]
-name = "left"
-ratio = 2
-position = ["100 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-radius = "20 mm"
-unbalance = { between = ["0 kg m", "0.05 kg m"] }
-angle = { between = [0, 360] }
-
-[[balancer_shafts]]
-name = "right"
-ratio = -2
-position = ["-100 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-coupled = { to = "left", as = "mirrored" }
-
+""", shaft("left", 2, "100 mm", open_unbalance()),
+    shaft("right", -2, "-100 mm", 'coupled = { to = "left", as = "mirrored" }'), """
 [objective]
 minimise = "mean mount force"
 
 [[constraints]]
 limit = "balancer mass"
 max = "4 kg"
-"""
+"""])  # fmt: skip
 PARTS = """
 title = "Two geared cranks"
 [engine]
@@ -86,17 +54,6 @@ slider_cranks = [{ x = "0 mm" }, { x = "0 mm", shaft = "second", throw = 180, ba
 [[operating_points]]
 speed = "3000 rpm"
 """
-
-
-def written(folder: Path, text: str) -> Path:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def changed(text: str, old: str, new: str) -> str:
-    assert text.count(old) >= 1, old
-    return text.replace(old, new, 1)
 
 
 def complaint_about(path: Path) -> str:

@@ -65,7 +65,9 @@ def test_numbers_are_those_of_the_result() -> None:
 
 def test_mounts_agree_with_the_model() -> None:
     result = scenes.solved(scenes.TIGHT)
-    for mount in parsed(result)["mounts"]:
+    mounts = parsed(result)["mounts"]
+    assert [mount["name"] for mount in mounts] == result.final.mount_names
+    for mount in mounts:
         for measure, key in (("mean", "mean"), ("maximum", "max"), ("rms", "rms")):
             quantity = Quantity(Subject.MOUNT_FORCE, MEASURES[measure], mounts=(mount["name"],))
             assert mount[key] == pytest.approx(result.final.value(quantity), rel=1e-12)

@@ -21,7 +21,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.run_up import RunUp, run_through
 from laufruhe.physics.speed_map import SpeedMap, speed_map, split_loads
-from laufruhe.plots.style import AFTER, FAINT, INK, colours_of, heading, names_of, page, source_line
+from laufruhe.plots.style import AFTER, FAINT, INK, VERMILION, colours_of, heading, names_of, page, source_line
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_design import MountMeasure, mounting_in
 from laufruhe.report.measures import changed, hardest_point, load_designs
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 SPEEDS = 400
 REACH = 1.25
-LIMIT = "#D55E00"
+LIMIT = VERMILION
 # styles tell orders apart in print as well
 _STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 _RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))

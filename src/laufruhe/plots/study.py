@@ -16,11 +16,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from laufruhe.plots.style import AFTER, BEFORE, heading, page
+from laufruhe.plots.style import AFTER, BEFORE, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, credit, heading, page
 from laufruhe.report.study_tables import readable_metric, settled, swept_names, with_unit
 from laufruhe.report.wording import number
 
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#332288", "#999933")
+COLOURS = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, "#332288", "#999933")
 PANEL = (6.4, 3.6)
 # width of a letter of a tick [inch], and the points of a line from which on dots would hide it
 LETTER, MOST_DOTS = 0.066, 40
@@ -241,6 +241,5 @@ def _metric_axis(axes: Axes, data: xr.Dataset, *drawn: str) -> None:
 
 
 def _headed(figure: Figure, data: xr.Dataset, legend: Sequence[Artist], words: str) -> Figure:
-    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
-    heading(figure, data.attrs["title"], words, _legend(legend), f"{source}Computed with Laufruhe.")
+    heading(figure, data.attrs["title"], words, _legend(legend), credit(data))
     return figure

@@ -195,21 +195,8 @@ def _free_part(table: EngineTable, part: SliderCrankTable, k: int, shafts: dict[
         mechanism = _mechanism(merged)
         rotating = part.rotating_mass if part.rotating_mass is not None else table.rotating_mass
         first = (part.bank_angle - part.throw) / shaft.ratio % (math.tau / abs(shaft.ratio))
-        return SliderCrank(
-            name=f"cylinder {k + 1}",
-            x=part.x,
-            crank_radius=mechanism.crank_radius,
-            rod_length=mechanism.rod_length,
-            reciprocating_mass=mechanism.reciprocating_mass,
-            throw=part.throw,
-            bank=part.bank_angle,
-            offset=mechanism.offset,
-            rotating_mass=rotating + mechanism.rod_rotating_mass,
-            rod_inertia_deficit=mechanism.rod_inertia_deficit,
-            bore=mechanism.bore,
-            firing_angle=part.firing_angle if part.firing_angle is not None else first,
-            shaft=shaft,
-        )
+        fires = part.firing_angle if part.firing_angle is not None else first
+        return mechanism.cylinder(k + 1, part.x, part.throw, part.bank_angle, fires, rotating, shaft)
 
 
 def all_different(things: list[Any], where: str, rule: str) -> None:

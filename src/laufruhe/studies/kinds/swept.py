@@ -58,6 +58,19 @@ def _check_asked(problem: Problem, case: CaseTable, scenes: Scenes) -> None:
         raise refused(scenes, case, "objective", "is missing, so a study has nothing to compare", "give a metric")
 
 
+def refuse_open_phasing(problem: Problem, case: CaseTable, scenes: Scenes) -> None:
+    """Of sets of shafts: an open star has a choice of its own.
+
+    Raises
+    ------
+    InputError
+        If something of the phasing is open.
+    """
+    if problem.phasing is not None:
+        rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
+        raise refused(scenes, case, "phasing", rule, remedy)
+
+
 def check_moved_by_loads(problems: Sequence[Problem], part: SweptPartTable, scenes: Scenes, what: str) -> None:
     """Whether balancing can change what is minimised: the sag of a block, or the stiffness under it, knows no loads.
 
