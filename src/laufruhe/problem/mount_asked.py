@@ -49,7 +49,12 @@ def asked_of_mounts(file: ProblemFile, found: MountsFound, points: Sequence[str]
     ]
     _check_together(limits)
     return replace(
-        found.design, terms=tuple(terms), limits=tuple(limits), starts=file.search.starts, seed=file.search.seed
+        found.design,
+        terms=tuple(terms),
+        limits=tuple(limits),
+        starts=file.search.starts,
+        seed=file.search.seed,
+        boxes=file.search.boxes,
     )
 
 

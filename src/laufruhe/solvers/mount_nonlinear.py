@@ -31,6 +31,7 @@ from laufruhe.solvers.mount_result import (
 from laufruhe.solvers.mount_starts import columns_of, start_points, unbalances_of
 from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
+from laufruhe.solvers.subdivision import Divided, divided_bound, divides
 from laufruhe.solvers.throw_moves import ThrowMoves
 from laufruhe.solvers.transmitted_bound import transmitted_bound
 from laufruhe.solvers.unbalances import decision_values, solve_unbalances
@@ -39,6 +40,8 @@ Array = NDArray[np.float64]
 
 SLACK = 1e-5
 WORTH_SAYING = 1.01
+# a bound from boxes that is nearer than this is called a proof within its gap
+SMALL_GAP = 0.05
 MOST_MARGINS = 3
 ITERATIONS = 150
 MOST_AROUND = 3
@@ -264,13 +267,15 @@ def _result(
     objective = objective_of(problem, initial, design.evaluation)
     scale = gap_scale(design.value, objective.initial) if objective else 1.0
     # throws that move are not in the bound
-    bound = _bound(problem) if joint.moves is None else 0.0
-    gap = max(design.value - bound, 0.0) / (scale or 1.0)
-    certificate = Certificate(
-        Proof.GLOBAL if gap <= problem.tolerance else Proof.LOCAL, bound, gap, best.kkt_residual,
-        _method(optima, scale, proven),
-    )  # fmt: skip
     met = design.excess <= 10.0 * FEASIBLE
+    divided = Divided(_bound(problem) if joint.moves is None else 0.0, 0)
+    if joint.moves is None and met and divides(problem):
+        divided = divided_bound(problem, design.value, problem.tolerance * scale, divided.bound)
+    gap = max(design.value - divided.bound, 0.0) / (scale or 1.0)
+    certificate = Certificate(
+        _proof(gap, problem.tolerance, divided), divided.bound, gap, best.kkt_residual,
+        _method(optima, scale, proven, divided),
+    )  # fmt: skip
     prices = [joint.price(limit.name, best.multipliers) for limit in problem.mount_design.limits]
     status = Status.FAILED if not met else Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     return Result(
@@ -288,7 +293,15 @@ def _result(
     )
 
 
-def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design, float] | None) -> str:
+def _proof(gap: float, tolerance: float, divided: Divided) -> Proof:
+    if gap <= tolerance:
+        return Proof.GLOBAL
+    return Proof.WITHIN_GAP if divided.boxes and gap <= SMALL_GAP else Proof.LOCAL
+
+
+def _method(
+    optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design, float] | None, divided: Divided
+) -> str:
     usable = [o for o in optima if o.usable]
     apart = distinct(optima, scale)
     text = f"IPOPT from {len(optima)} start{'s' if len(optima) > 1 else ''}, {len(usable)} of which ended at "
@@ -297,6 +310,8 @@ def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design,
         text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
     if proven is not None:
         text += f"; balance on these mounts proven within {proven[1]:.0e}"
+    if divided.boxes:
+        text += f"; bounds of stiffness divided into {divided.boxes} boxes"
     return text
 
 
