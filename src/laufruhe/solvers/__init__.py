@@ -45,6 +45,8 @@ def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many
         from laufruhe.solvers.mount_stars import solve_star_mounts
 
         return solve_star_mounts(problem, say)
+    if problem.phasing is None and not problem.decisions and not problem.mount_design.decisions:
+        return state(problem)
     if problem.mount_design.asked:
         from laufruhe.solvers.mounts import solve_mounts
 
@@ -55,8 +57,6 @@ def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many
         return solve_within(problem, solve_phasing)
     if problem.decisions and not problem.objective:
         raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
-    if not problem.decisions:
-        return state(problem)
     return solve_within(problem, partial(solve_unbalances, cones=solve_direct if many else None))
 
 

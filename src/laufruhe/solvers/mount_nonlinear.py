@@ -277,6 +277,7 @@ def _result(
         _method(optima, scale, proven, divided),
     )  # fmt: skip
     prices = [joint.price(limit.name, best.multipliers) for limit in problem.mount_design.limits]
+    limits = (*_load_limits(problem, design, joint, best), *mount_limits(problem, design.evaluation, prices))
     status = Status.FAILED if not met else Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     return Result(
         problem=design.problem,
@@ -284,10 +285,10 @@ def _result(
         objective=objective,
         certificate=certificate,
         decisions=(*mount_decisions(problem, design.mounts), *_unbalance_values(problem, design.unbalances)),
-        limits=(*_load_limits(problem, design, joint, best), *mount_limits(problem, design.evaluation, prices)),
+        limits=limits,
         initial=initial,
         final=design.evaluation,
-        message="" if met else "the best design found breaks a limit",
+        message="" if met else f"the best design found breaks {_broken_among(limits)}; relax it, or open more",
         error_estimate=sampling_error(problem, design.evaluation) if problem.objective else 0.0,
         timing=timing,
     )
@@ -313,6 +314,16 @@ def _method(
     if divided.boxes:
         text += f"; bounds of stiffness divided into {divided.boxes} boxes"
     return text
+
+
+def _broken_among(limits: Sequence[LimitValue]) -> str:
+    """Names of the limits that a design breaks."""
+    names = []
+    for limit in limits:
+        sign = 1.0 if limit.side == "at most" else -1.0
+        if sign * (limit.value - limit.limit) > 10.0 * FEASIBLE * abs(limit.limit):
+            names.append(f"'{limit.name}'")
+    return " and ".join(names) or "a limit"
 
 
 def _load_limits(problem: Problem, design: _Design, joint: JointProgram, best: LocalOptimum) -> tuple[LimitValue, ...]:
