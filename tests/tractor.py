@@ -7,16 +7,14 @@ from collections.abc import Sequence
 
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, OperatingPoint, Role, Rotor, Seiliger, Shaft
 from laufruhe.machine.layouts import Mechanism, build, inline
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.physics.shaking_loads import Fidelity
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.model import Drive, Limit, Problem, Term, UnbalanceDecision
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.quantity import MEAN_MOUNT_FORCE
 
 RADIUS, LAMBDA, MASS, SPACING = 0.06, 0.26, 1.25, 0.125
 SPEED = 2500 * math.pi / 30
 TWO_ORDER = Fidelity("two-order", 720)
 GAS = Seiliger(peak_pressure=78.5e5, imep=5.4e5)
-MEAN_MOUNT_FORCE = Quantity(Subject.MOUNT_FORCE, Norm.SUM)
 
 
 def mounts(cylinders: int) -> tuple[Mount, ...]:

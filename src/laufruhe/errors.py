@@ -27,6 +27,12 @@ class Complaint:
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{self.where}{shown}: {self.rule}{remedy}"
 
+    @classmethod
+    def of(cls, error: Exception, where: str, value: str = "", remedy: str = "") -> Complaint:
+        """Of an error whose text is a rule, and a remedy after '; '; `remedy` where it names none."""
+        rule, _, own = str(error).partition("; ")
+        return cls(where, value, rule, own or remedy)
+
 
 class InputError(LaufruheError, ValueError):
     """Bad input: one line a complaint, each led by the file it stands in."""

@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
 from laufruhe.machine import OperatingPoint  # noqa: E402
+from laufruhe.numerics.cores import processors  # noqa: E402
 from laufruhe.physics.shaking_loads import shaking_loads  # noqa: E402
 from laufruhe.physics.speed_map import speed_map, split_loads  # noqa: E402
 from laufruhe.problem.evaluation import evaluate  # noqa: E402
@@ -27,7 +28,7 @@ from laufruhe.problem.reader import load  # noqa: E402
 from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint  # noqa: E402
 from laufruhe.solvers.mount_program import JointProgram  # noqa: E402
 from laufruhe.solvers.mount_starts import start_points  # noqa: E402
-from laufruhe.solvers.nonlinear import NonlinearProgram, processors, solve_nonlinear  # noqa: E402
+from laufruhe.solvers.nonlinear import NonlinearProgram, solve_nonlinear  # noqa: E402
 from mounts.test_moving_block import simulated_forces  # noqa: E402
 
 PROBLEM = ROOT / "problems" / "tractor-four-elastic.toml"

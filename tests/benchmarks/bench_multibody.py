@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.physics.mount_forces import rigid_mount_maps
+from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.problem.model import Drive, Problem, Term, UnbalanceDecision
 from laufruhe.problem.quantity import Quantity, Subject
@@ -92,7 +92,7 @@ class Scene:
 
 def mount_forces(engine: Engine, wrench: FloatArray) -> FloatArray:
     """Forces on rigid mounts, shape (samples, mounts, 3) [N]."""
-    return np.asarray(np.einsum("mij,nj->nmi", rigid_mount_maps(engine.mounts), wrench))
+    return np.asarray(np.einsum("mij,nj->nmi", rigid_mounting(engine.mounts).maps, wrench))
 
 
 def scene() -> Scene:

@@ -59,7 +59,7 @@ def test_memory_limit_changes_a_rounding_only() -> None:
 
 def test_automatic_holds_over_the_bounds() -> None:
     """Chosen for the design as given: a thousand others are within the tolerance in 99 of 100."""
-    problem = load(Path("problems/tractor-four-lanchester.toml"))
+    problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     values = random_decisions(problem, 1000)
     cheap = prepare(automatic(problem, 1e-3)).objective(values)
     exact = prepare(replace(problem, fidelity=Fidelity(samples=2880))).objective(values)
@@ -68,7 +68,7 @@ def test_automatic_holds_over_the_bounds() -> None:
 
 @pytest.mark.parametrize("with_gas", [False, True])
 def test_engines_agree_with_evaluations(with_gas: bool) -> None:
-    problem = load(Path("problems/tractor-three.toml"))
+    problem = load(PROBLEMS / "tractor-three.toml")
     gas = problem.points[0].gas if with_gas else None
     quantity = problem.objective[0].quantity
     template = replace(
@@ -111,7 +111,7 @@ def test_engines_agree_with_evaluations(with_gas: bool) -> None:
 
 
 def test_rod_ratios_do_not_go_with_gas() -> None:
-    problem = load(Path("problems/tractor-three.toml"))
+    problem = load(PROBLEMS / "tractor-three.toml")
     family = EngineFamily(problem.engine, problem.objective[0].quantity, Fidelity(samples=360), problem.points[0].gas)
     with pytest.raises(ModelError, match="rod ratios"):
         family.values(EngineArrays(np.ones(2), rod_ratio=np.array([0.2, 0.3])))

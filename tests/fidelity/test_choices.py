@@ -28,6 +28,9 @@ from laufruhe.problem.model import Problem
 from laufruhe.problem.reader import load
 from laufruhe.solvers import solve
 
+ROOT = Path(__file__).parents[2]
+PROBLEMS = ROOT / "problems"
+
 POINT = OperatingPoint("rated", tractor.SPEED, tractor.GAS)
 
 
@@ -106,10 +109,9 @@ print(found.objective.value, found.certificate.lower_bound, choose(found.problem
 
 def test_threads_of_the_machine_change_a_rounding() -> None:
     """Optimum, bound and estimate to a rounding, whatever the threads of its libraries."""
-    root = Path(__file__).parents[2]
     answers = [
         subprocess.run(
-            [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True, cwd=root,
+            [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True, cwd=ROOT,
             env={**os.environ, **dict.fromkeys(NAMES, count)},
         ).stdout
         for count in ("1", "3")
@@ -123,7 +125,7 @@ NAMES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NU
 
 
 def test_automatic_finds_what_is_not_there() -> None:
-    text = "\n".join(part.what for part in choose(load(Path("problems/tractor-six.toml")), 1e-2).left_out)
+    text = "\n".join(part.what for part in choose(load(PROBLEMS / "tractor-six.toml"), 1e-2).left_out)
     assert "Fx, Fy" in text
     assert "2, 2.5" in text
     assert "1 of 2 parts of the cycle" in text

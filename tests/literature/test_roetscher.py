@@ -15,7 +15,8 @@ from scipy.optimize import minimize_scalar
 
 from laufruhe.machine import Cycle, Engine, OperatingPoint, SliderCrank
 from laufruhe.physics import slider_crank
-from laufruhe.physics.shaking_loads import EXACT, Fidelity, reciprocating_loads, shaking_loads
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 
 TWO_ORDER = Fidelity(kinematics="two-order")
 RATIOS = (1 / 5, 1 / 4.5, 1 / 4)

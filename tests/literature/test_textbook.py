@@ -16,7 +16,8 @@ from scipy.optimize import brentq
 from laufruhe.machine import Cycle, Engine, Rod, SliderCrank
 from laufruhe.machine.layouts import Mechanism, build, even_throws, inline
 from laufruhe.physics import slider_crank
-from laufruhe.physics.shaking_loads import EXACT, Fidelity, reciprocating_loads, rotating_loads
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.shaking_loads import reciprocating_loads, rotating_loads
 
 TWO_ORDER = Fidelity(kinematics="two-order")
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank
 from laufruhe.machine.similarity import EqualPowerScale, equal_power_scale
-from laufruhe.physics.shaking_loads import Fidelity, shaking_loads
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.shaking_loads import shaking_loads
 
 COUNTS = st.integers(1, 48)
 

@@ -133,7 +133,9 @@ class TestSeiliger:
     @pytest.mark.parametrize("exponents", [(1.35, 1.30), (1.0, 1.25), (1.4, 1.0), (0.8, 1.6), (1 + 1e-9, 1 - 1e-9)])
     @pytest.mark.parametrize("cut_off", [1.0, 1.4, 8.0])
     def test_closed_form(self, cycle: Cycle, exponents: tuple[float, float], cut_off: float) -> None:
-        gas = Seiliger(90 * BAR, 0.0, 14.0, *exponents, intake_pressure=1.4 * BAR, exhaust_pressure=1.1 * BAR)
+        gas = Seiliger(
+            90 * BAR, 0.0, *exponents, compression_ratio=14.0, intake_pressure=1.4 * BAR, exhaust_pressure=1.1 * BAR
+        )
         wanted = _seiliger_loop(gas, cycle, cut_off)
         assert seiliger_imep(gas, cycle, cut_off) == pytest.approx(wanted, rel=1e-13, abs=1e-13 * gas.peak_pressure)
 
@@ -148,7 +150,7 @@ class TestSeiliger:
     def test_cut_off_meets_the_mean_pressure(
         self, share: float, ratio: float, exponents: tuple[float, float], rise: float, exhaust: float, cycle: Cycle
     ) -> None:
-        gas = Seiliger(1.0, 0.0, ratio, *exponents, exhaust_pressure=exhaust * BAR)
+        gas = Seiliger(1.0, 0.0, *exponents, compression_ratio=ratio, exhaust_pressure=exhaust * BAR)
         gas = replace(gas, peak_pressure=rise * compression_end_pressure(gas))
         least, most = seiliger_imep(gas, cycle, 1.0), seiliger_imep(gas, cycle, ratio)
         assert least < most
@@ -215,7 +217,9 @@ class TestSeiliger:
     @every_cycle
     def test_no_heat_and_equal_exponents_do_no_work(self, cycle: Cycle) -> None:
         end = 1.1 * BAR * 15.0**1.35
-        gas = Seiliger(end, 0.0, 15.0, 1.35, 1.35, intake_pressure=1.1 * BAR, exhaust_pressure=1.1 * BAR)
+        gas = Seiliger(
+            end, 0.0, 1.35, 1.35, compression_ratio=15.0, intake_pressure=1.1 * BAR, exhaust_pressure=1.1 * BAR
+        )
         assert abs(seiliger_imep(gas, cycle, 1.0)) < 1e-14 * end
         # within rounding of the least that can be reached: not refused
         assert seiliger_cut_off(gas, cycle) == pytest.approx(1.0, abs=1e-7)
@@ -340,7 +344,7 @@ class TestWiebe:
     def test_heat_is_linear_in_the_mean_pressure(
         self, imep: float, start: float, duration: float, shape: float, ratio: float
     ) -> None:
-        gas = Wiebe(imep * BAR, math.radians(start), math.radians(duration), shape, 0.999, ratio)
+        gas = Wiebe(imep * BAR, math.radians(start), math.radians(duration), shape, compression_ratio=ratio)
         try:
             heat = wiebe_heat(gas, PARTS["offset"], Cycle.TWO_STROKE)
         except ModelError:

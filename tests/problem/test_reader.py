@@ -438,6 +438,18 @@ class TestTrace:
     def test_bad_rows(self, content: str, said: str, tmp_path: Path) -> None:
         assert complaint_about(trace(tmp_path, content)).startswith(said)
 
+    @pytest.mark.parametrize(
+        ("key", "unit", "said"),
+        [
+            ("angle_unit", "bar", """gas.angle_unit = "bar": 'bar' is not a unit of an angle; write"""),
+            ("pressure_unit", "deg", """gas.pressure_unit = "deg": 'deg' is not a unit of a pressure; write"""),
+        ],
+    )
+    def test_units_of_another_dimension(self, key: str, unit: str, said: str, tmp_path: Path) -> None:
+        text = trace(tmp_path, rows(360)).read_text("utf-8")
+        text = changed(text, 'file = "pressure.csv"', f'file = "pressure.csv"\n{key} = "{unit}"')
+        assert complaint_about(written(tmp_path, text)).startswith(said)
+
     def test_no_file(self, tmp_path: Path) -> None:
         path = trace(tmp_path, rows(360))
         (tmp_path / "pressure.csv").unlink()

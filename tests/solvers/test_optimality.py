@@ -10,15 +10,15 @@ import pytest
 from scipy.optimize import minimize
 
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.physics.shaking_loads import Fidelity
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Limit, Problem, Term, UnbalanceDecision
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.quantity import MEAN_MOUNT_FORCE, Quantity, Subject
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.affine import AffineModel
 from laufruhe.solvers.certificate import Proof, best_bound, kkt_residual
 from laufruhe.solvers.conic import ConicProgram
-from tractor import GAS, MEAN_MOUNT_FORCE, engine, free_unbalance, problem, shaft_rotor, web
+from tractor import GAS, engine, free_unbalance, problem, shaft_rotor, web
 
 EXACT = Fidelity("exact", 720)
 PEAK = Quantity(Subject.MOUNT_FORCE, Norm.MAXIMUM)

@@ -19,8 +19,8 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import laufruhe.studies.scenes
-from laufruhe import cli_study
 from laufruhe.cli import app
+from laufruhe.cli import study as cli_study
 from laufruhe.errors import InputError
 from laufruhe.problem.model import Limit
 from laufruhe.problem.reader import load

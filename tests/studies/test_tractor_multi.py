@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from laufruhe.studies.free_forces import firing_intervals
 from laufruhe.studies.tractor import balancing, four_cylinder, layouts
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.designs import fall, mean_of
@@ -50,10 +49,9 @@ class TestEqualCylinders:
     @pytest.mark.parametrize("cylinders", [1, 3, 4, 6])
     def test_study_engines_fire_evenly(self, cylinders: int) -> None:
         """All but two cylinders, which the study says fire 180 and 540 degrees apart."""
-        least, most = firing_intervals(study.inline_engine(cylinders))
-        assert math.degrees(least) == pytest.approx(720.0 / cylinders)
-        assert math.degrees(most) == pytest.approx(720.0 / cylinders)
-        two = [math.degrees(angle) for angle in firing_intervals(study.inline_engine(2))]
+        intervals = [math.degrees(angle) for angle in study.inline_engine(cylinders).firing_intervals]
+        assert intervals == pytest.approx([720.0 / cylinders] * cylinders)
+        two = [math.degrees(angle) for angle in study.inline_engine(2).firing_intervals]
         assert two == pytest.approx([180.0, 540.0])
 
     def test_largest_force_of_six_is_least(self, figure: Data) -> None:

@@ -25,7 +25,7 @@ from laufruhe.physics.shaking_loads import gas_torque, reciprocating_loads, shak
 from laufruhe.problem.model import Term
 from laufruhe.problem.quantity import Quantity, Subject
 from laufruhe.solvers import solve
-from laufruhe.studies.digits import acceleration_orders
+from many_digits import acceleration_orders
 
 EPS = float(np.finfo(float).eps)
 

@@ -2,7 +2,7 @@
 
 from laufruhe.machine.block import Block
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
-from laufruhe.machine.gas import GasModel, PressureTrace, Seiliger, Wiebe
+from laufruhe.machine.gas import Charge, GasModel, PressureTrace, Seiliger, Wiebe
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.slider_crank import Rod, SliderCrank
@@ -10,6 +10,7 @@ from laufruhe.machine.slider_crank import Rod, SliderCrank
 __all__ = [
     "CRANKSHAFT",
     "Block",
+    "Charge",
     "Cycle",
     "Engine",
     "GasModel",

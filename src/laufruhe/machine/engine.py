@@ -14,7 +14,8 @@ from laufruhe.machine.gas import GasModel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.numerics.turns import as_turn, within
+from laufruhe.numerics.spectrum import as_order
+from laufruhe.numerics.turns import as_turn, cis, within
 
 
 class Cycle(Enum):
@@ -22,6 +23,9 @@ class Cycle(Enum):
 
     TWO_STROKE = 1
     FOUR_STROKE = 2
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", "-")
 
     @property
     def turns(self) -> int:
@@ -106,7 +110,7 @@ class Engine:
             self._check_firing(part)
 
     def _check_period(self, shaft: Shaft) -> None:
-        turns = Fraction(shaft.ratio).limit_denominator(1000) * self.cycle.turns
+        turns = as_order(shaft.ratio) * self.cycle.turns
         if turns.denominator != 1 or turns == 0:
             raise ModelError(
                 f"shaft '{shaft.name}' with ratio {shaft.ratio:g} does not return within the cycle of "
@@ -126,6 +130,20 @@ class Engine:
         """Every shaft that something turns with, in order of first use."""
         used = [part.shaft for part in self.slider_cranks] + [rotor.shaft for rotor in self.rotors]
         return tuple(dict.fromkeys(used))
+
+    @property
+    def pins(self) -> tuple[Rotor, ...]:
+        """Rotating masses at the crank pins, as the rotors that they are."""
+        return tuple(
+            Rotor(
+                f"pin of {part.name}",
+                part.x,
+                part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)),
+                part.shaft,
+            )
+            for part in self.slider_cranks
+            if part.rotating_mass > 0.0
+        )
 
     @property
     def firing_intervals(self) -> tuple[float, ...]:

@@ -15,23 +15,14 @@ MAX_HEAT_RATIO = 1.7
 MAX_SHAPE = 20.0
 
 
-@dataclass(frozen=True)
-class Seiliger:
-    """Mixed cycle, its heat given at constant volume and then at constant pressure.
-
-    Constant volume goes up to the peak pressure, constant pressure up to the cut-off that
-    gives the indicated mean pressure wanted.
+@dataclass(frozen=True, kw_only=True)
+class Charge:
+    """What every computed cycle says of the charge and of the gas exchange.
 
     Attributes
     ----------
-    peak_pressure
-        Absolute [Pa].
-    imep
-        Indicated mean effective pressure of the whole cycle, gas exchange included [Pa].
     compression_ratio
         Largest over smallest volume.
-    compression_exponent, expansion_exponent
-        Polytropic exponents.
     intake_pressure, exhaust_pressure
         Absolute [Pa]; of the gas exchange and the start of compression. A two-stroke
         cycle has no exhaust stroke and makes no use of the exhaust pressure.
@@ -44,18 +35,51 @@ class Seiliger:
         If a value is out of its range.
     """
 
-    peak_pressure: float
-    imep: float
     compression_ratio: float = 17.0
-    compression_exponent: float = 1.35
-    expansion_exponent: float = 1.30
     intake_pressure: float = AMBIENT_PRESSURE
     exhaust_pressure: float = AMBIENT_PRESSURE
     crankcase_pressure: float = AMBIENT_PRESSURE
 
     def __post_init__(self) -> None:
-        _check_pressures(self, "peak_pressure", "intake_pressure", "exhaust_pressure", "crankcase_pressure")
-        _check_charge(self.imep, self.compression_ratio)
+        _check_pressures(self, "intake_pressure", "exhaust_pressure", "crankcase_pressure")
+        if not 1.0 < self.compression_ratio <= MAX_COMPRESSION_RATIO:
+            raise ModelError(
+                f"compression_ratio {self.compression_ratio:g} must be over 1 and at most {MAX_COMPRESSION_RATIO:g}; "
+                "give the largest over the smallest volume"
+            )
+
+
+@dataclass(frozen=True)
+class Seiliger(Charge):
+    """Mixed cycle, its heat given at constant volume and then at constant pressure.
+
+    Constant volume goes up to the peak pressure, constant pressure up to the cut-off that
+    gives the indicated mean pressure wanted.
+
+    Attributes
+    ----------
+    peak_pressure
+        Absolute [Pa].
+    imep
+        Indicated mean effective pressure of the whole cycle, gas exchange included [Pa].
+    compression_exponent, expansion_exponent
+        Polytropic exponents.
+
+    Raises
+    ------
+    ModelError
+        If a value is out of its range.
+    """
+
+    peak_pressure: float
+    imep: float
+    compression_exponent: float = 1.35
+    expansion_exponent: float = 1.30
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_pressures(self, "peak_pressure")
+        _check_imep(self.imep)
         for name in ("compression_exponent", "expansion_exponent"):
             exponent = getattr(self, name)
             if not 0.0 < exponent <= MAX_EXPONENT:
@@ -66,7 +90,7 @@ class Seiliger:
 
 
 @dataclass(frozen=True)
-class Wiebe:
+class Wiebe(Charge):
     """Finite heat release: burnt fraction 1 - exp(-a x^(m+1)) over the burn.
 
     Attributes
@@ -80,16 +104,9 @@ class Wiebe:
         Exponent m.
     completeness
         Fraction burnt at the end; a = -ln(1 - completeness).
-    compression_ratio
-        Largest over smallest volume.
     heat_ratio
         Ratio of specific heats of the charge, from the start of compression to the end
         of expansion.
-    intake_pressure, exhaust_pressure
-        Absolute [Pa]; of the gas exchange and the start of compression. A two-stroke
-        cycle has no exhaust stroke and makes no use of the exhaust pressure.
-    crankcase_pressure
-        Absolute [Pa], on the underside of the piston.
 
     Raises
     ------
@@ -102,15 +119,11 @@ class Wiebe:
     duration: float
     shape: float = 2.0
     completeness: float = 0.999
-    compression_ratio: float = 17.0
     heat_ratio: float = 1.35
-    intake_pressure: float = AMBIENT_PRESSURE
-    exhaust_pressure: float = AMBIENT_PRESSURE
-    crankcase_pressure: float = AMBIENT_PRESSURE
 
     def __post_init__(self) -> None:
-        _check_pressures(self, "intake_pressure", "exhaust_pressure", "crankcase_pressure")
-        _check_charge(self.imep, self.compression_ratio)
+        super().__post_init__()
+        _check_imep(self.imep)
         self._check_burn()
         if not 0.0 <= self.shape <= MAX_SHAPE:
             raise ModelError(f"shape {self.shape:g} must be between 0 and {MAX_SHAPE:g}; 0.5 to 3 is usual")
@@ -191,18 +204,13 @@ class PressureTrace:
 GasModel: TypeAlias = Seiliger | Wiebe | PressureTrace
 
 
-def _check_pressures(gas: GasModel, *names: str) -> None:
+def _check_pressures(gas: Charge | PressureTrace, *names: str) -> None:
     for name in names:
         pressure = getattr(gas, name)
         if not 0.0 < pressure < math.inf:
             raise ModelError(f"{name} {pressure * 1e-5:g} bar must be positive and finite; give an absolute pressure")
 
 
-def _check_charge(imep: float, compression_ratio: float) -> None:
+def _check_imep(imep: float) -> None:
     if not math.isfinite(imep):
         raise ModelError(f"imep {imep} must be finite; give the mean pressure wanted")
-    if not 1.0 < compression_ratio <= MAX_COMPRESSION_RATIO:
-        raise ModelError(
-            f"compression_ratio {compression_ratio:g} must be over 1 and at most {MAX_COMPRESSION_RATIO:g}; "
-            "give the largest over the smallest volume"
-        )

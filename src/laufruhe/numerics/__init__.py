@@ -1,1 +1,1 @@
-"""Mathematics without engines: exact turns, spectra, sampling."""
+"""What knows no engine: exact turns, spectra, norms, maths namespaces, processors."""

@@ -12,6 +12,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+MAX_ORDER_DENOMINATOR = 1000
+
+
+def as_order(order: float) -> Fraction:
+    """An order, or a speed over crank speed, as the fraction that it is a rounding of."""
+    return Fraction(order).limit_denominator(MAX_ORDER_DENOMINATOR)
+
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -35,7 +42,7 @@ class Spectrum:
 
     def at(self, order: float) -> NDArray[np.complex128]:
         """Coefficient of one order; zero where the signal holds none."""
-        index = Fraction(order).limit_denominator(1000) / self.base
+        index = as_order(order) / self.base
         if index.denominator == 1 and 0 <= index < len(self.coefficients):
             return np.asarray(self.coefficients[int(index)])
         return np.zeros(self.coefficients.shape[1:], dtype=complex)

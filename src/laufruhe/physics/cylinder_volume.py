@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, Seiliger, SliderCrank, Wiebe
+from laufruhe.machine import Charge, Cycle, SliderCrank
 from laufruhe.physics import slider_crank
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -96,45 +96,41 @@ class ChargedCylinder:
     it, lowest - 2 pi to lowest; exhaust and intake strokes follow in a four-stroke cycle.
     """
 
+    gas: Charge
     part: SliderCrank
     cycle: Cycle
-    compression_ratio: float
 
     @property
     def smallest(self) -> float:
         """V_c / V_h."""
-        return 1.0 / (self.compression_ratio - 1.0)
+        return 1.0 / (self.gas.compression_ratio - 1.0)
 
     @property
     def largest(self) -> float:
         """(V_c + V_h) / V_h."""
-        return self.compression_ratio / (self.compression_ratio - 1.0)
+        return self.gas.compression_ratio / (self.gas.compression_ratio - 1.0)
 
     def volume(self, angles: FloatArray) -> FloatArray:
         """V / V_h (G1)."""
         return self.smallest + swept_volume(self.part, angles)
 
-    def pressure(
-        self, gas: Seiliger | Wiebe, closed: Callable[[FloatArray], FloatArray], angles: FloatArray
-    ) -> FloatArray:
+    def pressure(self, closed: Callable[[FloatArray], FloatArray], angles: FloatArray) -> FloatArray:
         """Pressure over the cycle from that of the closed period, the mean of both sides at a jump [Pa]."""
-        before = self._one_sided(gas, closed, angles - _JUMP_WIDTH)
-        after = self._one_sided(gas, closed, angles + _JUMP_WIDTH)
+        before = self._one_sided(closed, angles - _JUMP_WIDTH)
+        after = self._one_sided(closed, angles + _JUMP_WIDTH)
         return 0.5 * (before + after)
 
-    def _one_sided(
-        self, gas: Seiliger | Wiebe, closed: Callable[[FloatArray], FloatArray], angles: FloatArray
-    ) -> FloatArray:
+    def _one_sided(self, closed: Callable[[FloatArray], FloatArray], angles: FloatArray) -> FloatArray:
         top, bottom = dead_centres(self.part)
         first = bottom - math.tau
         local = first + np.mod(angles - first, self.cycle.angle)
-        pressures = np.where(local < top + math.tau, gas.exhaust_pressure, gas.intake_pressure)
+        pressures = np.where(local < top + math.tau, self.gas.exhaust_pressure, self.gas.intake_pressure)
         is_closed = local < bottom
         pressures[is_closed] = closed(local[is_closed])
         return pressures
 
 
-def gas_exchange_pressure(gas: Seiliger | Wiebe, cycle: Cycle) -> float:
+def gas_exchange_pressure(gas: Charge, cycle: Cycle) -> float:
     """Mean pressure of the exhaust and intake strokes [Pa]; none in a two-stroke cycle (G6, G11)."""
     return gas.intake_pressure - gas.exhaust_pressure if cycle is Cycle.FOUR_STROKE else 0.0
 

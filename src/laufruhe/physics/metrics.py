@@ -1,4 +1,4 @@
-"""Measures of mount forces that engineers read (M4-M6)."""
+"""Measures of mount forces that engineers read (M4, M5)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.mixed_norms import lengths
-from laufruhe.numerics.spectrum import Spectrum
 
 Array = NDArray[np.float64]
 
@@ -45,14 +44,6 @@ def order_amplitude(coefficient: NDArray[np.complex128]) -> Array:
     return np.asarray(np.sqrt(0.5 * (total + alternating)))
 
 
-def peak(spectrum: Spectrum, samples: int) -> float:
-    """Largest magnitude over the cycle of one vector signal (n, components), between samples too (M6)."""
-    values = lengths(spectrum.sample(samples))
-    top = int(np.argmax(values))
-    step = 2.0 * np.pi / float(spectrum.base) / samples
-    centre, width = top * step, step
-    for _ in range(4):
-        angles = centre + np.linspace(-width, width, 17)
-        near = lengths(spectrum.values(angles))
-        centre, width = float(angles[int(np.argmax(near))]), width / 8.0
-    return max(float(values[top]), float(near.max()))
+def turning_parts(lateral: complex, vertical: complex) -> tuple[float, float]:
+    """Amplitudes of the parts of z + i y that turn with the crank, as e^{ix}, and against it (C4, C8)."""
+    return 0.5 * float(abs(vertical + 1j * lateral)), 0.5 * float(abs(vertical - 1j * lateral))

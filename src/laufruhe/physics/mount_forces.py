@@ -93,10 +93,5 @@ def _rigid_mounting(mounts: tuple[Mount, ...]) -> RigidMounting:
     return RigidMounting(maps, right[rank:], arm)
 
 
-def rigid_mount_maps(mounts: Sequence[Mount]) -> NDArray[np.float64]:
-    """The maps of `rigid_mounting` alone, shape (mounts, 3, 6)."""
-    return rigid_mounting(mounts).maps
-
-
 def _scales(arm: float) -> NDArray[np.float64]:
     return np.array([1.0, 1.0, 1.0, arm, arm, arm])

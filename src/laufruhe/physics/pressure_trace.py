@@ -18,23 +18,10 @@ MAX_TRACE_GAP = math.radians(30.0)
 
 
 def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: FloatArray) -> FloatArray:
-    """Measured pressure, interpolated with the period of the cycle (G12).
+    """Measured pressure [Pa] at crank angles gamma [rad], shape of `angles`, with the period of the cycle (G12).
 
     Monotone cubics between the points (Fritsch and Carlson 1980) stay within their
     neighbours: a jump does not ring.
-
-    Parameters
-    ----------
-    gas
-        The trace.
-    cycle
-        Two- or four-stroke.
-    angles
-        Shape (n,), crank angles gamma [rad].
-
-    Returns
-    -------
-    Shape (n,) [Pa].
 
     Raises
     ------
@@ -61,7 +48,7 @@ def _one_period(gas: PressureTrace, cycle: Cycle) -> tuple[FloatArray, FloatArra
     if missing < -1e-3 * step:
         raise ModelError(
             f"the trace runs from {_degrees(points[0])} to {_degrees(points[-1])} deg, more than the "
-            f"{_degrees(cycle.angle)} deg of a {cycle.name.lower().replace('_', '-')} cycle; cut it to one cycle"
+            f"{_degrees(cycle.angle)} deg of a {cycle} cycle; cut it to one cycle"
         )
     if missing > 1e-3 * step:
         return points, pressures
@@ -76,7 +63,7 @@ def _check_gaps(points: FloatArray, cycle: Cycle) -> None:
     if outer > min(2.0 * float(inner.max()), MAX_TRACE_GAP):
         raise ModelError(
             f"the trace runs from {_degrees(points[0])} to {_degrees(points[-1])} deg, so {_degrees(outer)} of the "
-            f"{_degrees(cycle.angle)} deg of a {cycle.name.lower().replace('_', '-')} cycle are missing; "
+            f"{_degrees(cycle.angle)} deg of a {cycle} cycle are missing; "
             "give the whole cycle"
         )
     k = int(np.argmax(inner))

@@ -18,22 +18,7 @@ _ROUNDING = 1e-12
 
 
 def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: FloatArray) -> FloatArray:
-    """Pressure of the mixed cycle (G4, G5).
-
-    Parameters
-    ----------
-    gas
-        Model with the indicated mean pressure wanted.
-    part
-        The slider-crank whose piston the gas works on.
-    cycle
-        Two- or four-stroke.
-    angles
-        Shape (n,), crank angles gamma [rad].
-
-    Returns
-    -------
-    Shape (n,) [Pa].
+    """Pressure [Pa] of the mixed cycle at crank angles gamma [rad], shape of `angles` (G4, G5).
 
     Raises
     ------
@@ -41,7 +26,7 @@ def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: Fl
         If the peak pressure is below the end of compression, or no cut-off gives the
         indicated mean pressure.
     """
-    cylinder = ChargedCylinder(part, cycle, gas.compression_ratio)
+    cylinder = ChargedCylinder(gas, part, cycle)
     top, _ = dead_centres(part)
     cut_off = cylinder.smallest * seiliger_cut_off(gas, cycle)
 
@@ -51,7 +36,7 @@ def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: Fl
         expansion = gas.peak_pressure * np.minimum(1.0, cut_off / volume) ** gas.expansion_exponent
         return np.where(local < top, compression, expansion)
 
-    return cylinder.pressure(gas, closed, angles)
+    return cylinder.pressure(closed, angles)
 
 
 def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:

@@ -9,18 +9,17 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from fractions import Fraction
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank
-from laufruhe.numerics.spectrum import Spectrum, spectrum_of
+from laufruhe.numerics.spectrum import Spectrum, as_order, spectrum_of
 from laufruhe.numerics.turns import Turn, as_turn, cancelling_sum, cis, star_sum
 from laufruhe.physics import order_coefficients, slider_crank
-from laufruhe.physics.fidelity import EXACT as EXACT
-from laufruhe.physics.fidelity import Fidelity as Fidelity
+from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import cylinder_pressure
 
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
@@ -115,14 +114,7 @@ def rod_inertia_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) 
 
 def rotating_loads(engine: Engine, speed: float) -> Spectrum:
     """Loads of rotating masses at the crank pins and of every rotor (L1)."""
-    pins = [
-        Rotor(
-            f"pin of {part.name}", part.x, part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft
-        )
-        for part in engine.slider_cranks
-        if part.rotating_mass > 0.0
-    ]
-    return rotor_loads((*pins, *engine.rotors), speed, engine.cycle)
+    return rotor_loads((*engine.pins, *engine.rotors), speed, engine.cycle)
 
 
 def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum:
@@ -209,10 +201,10 @@ def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> 
 _ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 
 
-def plane_wrench(lateral: complex, vertical: complex, x: float, shaft: Shaft) -> NDArray[np.complex128]:
-    """Wrench of a force in the plane at x through a shaft's axis (C2)."""
+def plane_wrench(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> NDArray[Any]:
+    """Wrench of a force in the plane at x through a shaft's axis, shape (6, ...) of forces (...) (C2)."""
     roll = shaft.y * vertical - shaft.z * lateral
-    return np.array([0.0, lateral, vertical, roll, -x * vertical, x * lateral])
+    return np.array([lateral - lateral, lateral, vertical, roll, -x * vertical, x * lateral])
 
 
 def _axial(part: SliderCrank) -> NDArray[np.float64]:
@@ -304,4 +296,4 @@ def _spread(load: NDArray[np.complex128], step: int, cycle: Cycle) -> Spectrum:
 
 @lru_cache(maxsize=1024)
 def _index(cycle: Cycle, order: float) -> int:
-    return int(Fraction(order).limit_denominator(1000) / cycle.base_order)
+    return int(as_order(order) / cycle.base_order)

@@ -45,6 +45,11 @@ class StarSpace:
         return len(self.places)
 
     @property
+    def first(self) -> tuple[int, ...]:
+        """One of the stars: throws on the steps in their order."""
+        return tuple(step for step, times in enumerate(self.patterns[0]) for _ in range(times))
+
+    @property
     def size(self) -> int:
         """Stars with the first throw on step 0, images counted."""
         total = 0

@@ -21,6 +21,7 @@ from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.physics import slider_crank
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.shaking_loads import gas_loads, plane_wrench
 
 Array = NDArray[np.float64]
 
@@ -107,12 +108,7 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
     wrench = sum(
         (_slider_loads(part, motion, fidelity) for part in engine.slider_cranks), np.zeros((len(motion.angle), 6))
     )
-    pins = tuple(
-        Rotor(part.name, part.x, part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
-        for part in engine.slider_cranks
-        if part.rotating_mass > 0.0
-    )
-    wrench = wrench + _rotor_loads((*pins, *engine.rotors), motion)
+    wrench = wrench + _rotor_loads((*engine.pins, *engine.rotors), motion)
     _, torque = _work_series(engine, point, fidelity)
     if torque is not None:
         wrench[:, 3] += torque.values(motion.angle)
@@ -133,16 +129,12 @@ def _last_rotor_order(engine: Engine) -> int:
 
 
 def _mean_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> float:
-    from laufruhe.physics.shaking_loads import gas_loads
-
     assert point.gas is not None
     return float(gas_loads(engine, point.gas, fidelity).coefficients[0, 3].real)
 
 
 def _work_series(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum | None, Spectrum | None]:
     """Work of gas less load over the crank angle, and the torque that does it (F2)."""
-    from laufruhe.physics.shaking_loads import gas_loads
-
     if point.gas is None or not fidelity.gas:
         return None, None
     # the roll moment of the gas is its torque (L5); the load takes the mean of it
@@ -235,7 +227,7 @@ def _slider_loads(part: SliderCrank, motion: CrankMotion, fidelity: Fidelity) ->
     acceleration = slider_crank.piston_acceleration(*shape) * square + velocity * turning
     force = -part.reciprocating_mass * part.crank_radius * acceleration
     axis = cis(as_turn(part.bank))
-    wrench = _moved(force * axis.imag, force * axis.real, part)
+    wrench = plane_wrench(force * axis.imag, force * axis.real, part.x, part.shaft).T
     arm = ratio * velocity + (part.offset / part.crank_radius)
     wrench[:, 3] += force * part.crank_radius * arm
     if fidelity.rod == "rigid" and part.rod_inertia_deficit:
@@ -252,12 +244,5 @@ def _rotor_loads(rotors: Sequence[Rotor], motion: CrankMotion) -> Array:
         ratio = rotor.shaft.ratio
         force = rotor.unbalance * ((ratio * motion.speed) ** 2 - 1j * ratio * motion.acceleration)
         force = force * np.exp(1j * ratio * motion.angle)
-        wrench += _moved(force.imag, force.real, rotor)
+        wrench += plane_wrench(force.imag, force.real, rotor.x, rotor.shaft).T
     return wrench
-
-
-def _moved(lateral: Array, vertical: Array, part: SliderCrank | Rotor) -> Array:
-    """Wrench of forces through the axis of a part's shaft (C2)."""
-    shaft, none = part.shaft, np.zeros(len(lateral))
-    roll = shaft.y * vertical - shaft.z * lateral
-    return np.stack([none, lateral, vertical, roll, -part.x * vertical, part.x * lateral], axis=1)

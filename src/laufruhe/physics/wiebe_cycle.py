@@ -23,22 +23,7 @@ _ROUNDING = 1e-12
 
 
 def wiebe_pressure(gas: Wiebe, part: SliderCrank, cycle: Cycle, angles: FloatArray) -> FloatArray:
-    """Pressure with finite heat release (G7-G9).
-
-    Parameters
-    ----------
-    gas
-        Model with the indicated mean pressure wanted.
-    part
-        The slider-crank whose piston the gas works on.
-    cycle
-        Two- or four-stroke.
-    angles
-        Shape (n,), crank angles gamma [rad].
-
-    Returns
-    -------
-    Shape (n,) [Pa].
+    """Pressure [Pa] with finite heat release at crank angles gamma [rad], shape of `angles` (G7-G9).
 
     Raises
     ------
@@ -46,7 +31,7 @@ def wiebe_pressure(gas: Wiebe, part: SliderCrank, cycle: Cycle, angles: FloatArr
         If the burn leaves the closed period, or no heat that a charge can hold gives the
         indicated mean pressure.
     """
-    cylinder = ChargedCylinder(part, cycle, gas.compression_ratio)
+    cylinder = ChargedCylinder(gas, part, cycle)
     heat = wiebe_heat(gas, part, cycle)
 
     def closed(local: FloatArray) -> FloatArray:
@@ -56,7 +41,7 @@ def wiebe_pressure(gas: Wiebe, part: SliderCrank, cycle: Cycle, angles: FloatArr
         added = heat * (gas.heat_ratio - 1.0) * _stored_heat(gas, cylinder, burnt)
         return np.asarray(motored + added / volume**gas.heat_ratio)
 
-    return cylinder.pressure(gas, closed, angles)
+    return cylinder.pressure(closed, angles)
 
 
 def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
@@ -70,7 +55,7 @@ def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
     ModelError
         With the range that can be reached.
     """
-    cylinder = ChargedCylinder(part, cycle, gas.compression_ratio)
+    cylinder = ChargedCylinder(gas, part, cycle)
     _check_burn(gas, part)
     places, weights = _unit_quadrature()
 

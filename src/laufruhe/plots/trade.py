@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.collections import PathCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 
 from laufruhe.plots.style import FAINT, INK, Page, heading, page
 from laufruhe.studies.trade import Row, Trade
@@ -19,8 +19,12 @@ from laufruhe.studies.trade import Row, Trade
 Array = NDArray[np.float64]
 
 LEAST_ERROR, LEAST_REGRET = 1e-7, 1e-8
-LABEL_WIDTH, LABEL_HEIGHT = 0.28, 0.03
+PANEL, NAMES = (5.2, 4.4), 2.0
+"""Width and height of the panel, width of the names beside it [inch]."""
+NAME_HEIGHT = 0.036
 """Of a name, over the panel."""
+_FEW_DECADES = 30.0
+_PLAIN = FuncFormatter(lambda value, _: f"{value:g}")
 
 
 def has_picture(found: Trade) -> bool:
@@ -30,13 +34,14 @@ def has_picture(found: Trade) -> bool:
 
 def figure(found: Trade) -> Figure:
     """One panel: evaluation time of another design against error, the front joined."""
-    drawn = page(1, 1, (6.6, 4.4))
+    drawn = page(1, 1, (PANEL[0] + NAMES, PANEL[1]))
     axes, rows = drawn.panels[0], found.rows
+    place = axes.get_position()
+    axes.set_position((place.x0, place.y0, PANEL[0] / (PANEL[0] + NAMES) * place.width, place.height))
     times = np.array([1e6 * row.evaluation for row in rows])
     errors = np.array([max(row.error, LEAST_ERROR) for row in rows])
-    front = _front(rows)
-    joined = [(1e6 * row.evaluation, max(row.error, LEAST_ERROR)) for row in front]
-    axes.plot(*zip(*joined, strict=True), color=FAINT, lw=0.9, zorder=1)
+    joined = [(1e6 * row.evaluation, max(row.error, LEAST_ERROR)) for row in _front(rows)]
+    axes.plot(*zip(*joined, strict=True), color=FAINT, lw=1.1, zorder=2)
     decides = np.array([not math.isnan(row.regret) for row in rows])
     axes.scatter(times[~decides], errors[~decides], s=55, zorder=3, facecolors="white", edgecolors=INK, linewidths=0.8)
     regrets = [max(row.regret, LEAST_REGRET) for row in rows if not math.isnan(row.regret)]
@@ -45,16 +50,16 @@ def figure(found: Trade) -> Figure:
         edgecolors=INK, linewidths=0.5,
     )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="time of another design [µs]", ylabel="relative error of the objective")
-    axes.set_xlim(0.75 * times.min(), 3.2 * times.max())
-    axes.set_ylim(_lowest(errors), 3.0 * errors.max())
-    _name(axes, rows, times, errors)
-    plain = FuncFormatter(lambda value, _: f"{value:g}")
-    scales: list[Axis] = [axes.xaxis, axes.yaxis]
-    if regrets:
-        scales.append(_colour_bar(drawn, dots))
-    for axis in scales:
-        axis.set_major_formatter(plain)
+    axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
+    axes.set_ylim(0.5 * errors.min(), 2.0 * errors.max())
+    if times.max() < _FEW_DECADES * times.min():
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(_PLAIN)
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
+    _name(axes, rows, times, errors)
+    if regrets:
+        _colour_bar(drawn, dots)
     hollow = "" if decides.all() else " Hollow: nothing decided."
     heading(
         drawn.figure, "Speed against accuracy", found.problem.title, [],
@@ -64,21 +69,14 @@ def figure(found: Trade) -> Figure:
     return drawn.figure
 
 
-def _lowest(errors: Array) -> float:
-    """Lower end of the scale: names of all that lie at the edge stand under each other."""
-    share = LABEL_HEIGHT * (2.0 + float(np.sum(errors == LEAST_ERROR)))
-    top, edge = math.log10(3.0 * errors.max()), math.log10(LEAST_ERROR)
-    return float(10.0 ** ((edge - share * top) / (1.0 - share)))
-
-
-def _colour_bar(drawn: Page, dots: PathCollection) -> Axis:
-    """The scale of regret beside the panel."""
-    axes = drawn.panels[0]
-    place = axes.get_position()
-    axes.set_position((place.x0, place.y0, 0.86 * place.width, place.height))
-    side = drawn.figure.add_axes((place.x0 + 0.89 * place.width, place.y0, 0.022 * place.width, place.height))
-    drawn.figure.colorbar(dots, cax=side).set_label("regret of its optimum")
-    return side.yaxis
+def _colour_bar(drawn: Page, dots: PathCollection) -> None:
+    """The scale of regret above the panel."""
+    place, high = drawn.panels[0].get_position(), drawn.figure.get_size_inches()[1]
+    above = drawn.figure.add_axes((place.x0 + 0.3 * place.width, place.y1 + 0.3 / high, 0.7 * place.width, 0.1 / high))
+    bar = drawn.figure.colorbar(dots, cax=above, orientation="horizontal", format=_PLAIN)
+    bar.ax.tick_params(labelsize=7, which="major")
+    bar.ax.minorticks_off()
+    bar.ax.text(-0.02, 0.5, "regret of its optimum", transform=bar.ax.transAxes, ha="right", va="center", fontsize=9)
 
 
 def _front(rows: tuple[Row, ...]) -> list[Row]:
@@ -91,21 +89,23 @@ def _front(rows: tuple[Row, ...]) -> list[Row]:
 
 
 def _name(axes: Axes, rows: tuple[Row, ...], times: Array, errors: Array) -> None:
-    """Names beside the dots, moved down where two would cover each other, to the left at the right edge."""
-    (left, right), (low, high) = np.log10(axes.get_xlim()), np.log10(axes.get_ylim())
-    width, height = right - left, high - low
-    taken: list[tuple[float, float]] = []
-    for k in np.argsort(-errors):
-        x, y, shift = math.log10(times[k]), math.log10(errors[k]), 0.0
-        leftwards = x + LABEL_WIDTH * width > right
-        start = x - (LABEL_WIDTH * width if leftwards else 0.0)
-        while any(
-            abs(y + shift - v) < LABEL_HEIGHT * height and abs(start - u) < LABEL_WIDTH * width for u, v in taken
-        ):
-            shift -= 0.25 * LABEL_HEIGHT * height
-        taken.append((start, y + shift))
-        gap = -0.012 * width if leftwards else 0.012 * width
+    """Names in a column beside the panel, each joined to its dot."""
+    low, high = np.log10(axes.get_ylim())
+    # of dots at one height the nearest to the names is named lowest: no line crosses another dot's name
+    heights = (np.log10(errors) - low) / (high - low) - 1e-6 * np.argsort(np.argsort(times))
+    for row, time, error, height in zip(rows, times, errors, _spread(heights, NAME_HEIGHT), strict=True):
         axes.annotate(
-            rows[k].name, (times[k], errors[k]), xytext=(10 ** (x + gap), 10 ** (y + shift)), fontsize=7,
-            va="center", ha="right" if leftwards else "left", color=INK,
+            row.name, (time, error), xytext=(1.03, height), textcoords="axes fraction", fontsize=7, va="center",
+            ha="left", color=INK, annotation_clip=False, zorder=1,
+            arrowprops={"arrowstyle": "-", "color": "#c4c4c4", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 3.0},
         )  # fmt: skip
+
+
+def _spread(heights: Array, least: float) -> Array:
+    """Heights in 0 ... 1 at least so far apart, their order kept, moved by the least squares."""
+    order = np.argsort(heights)
+    steps = least * np.arange(len(heights))
+    moved = np.clip(isotonic_regression(heights[order] - steps).x, 0.0, 1.0 - steps[-1])
+    spread = np.empty(len(heights))
+    spread[order] = moved + steps
+    return spread

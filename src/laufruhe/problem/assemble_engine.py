@@ -14,7 +14,7 @@ from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
 from laufruhe.machine.layouts import Layout, Mechanism, Throw, boxer, build, even_throws, inline, vee
 from laufruhe.machine.slider_crank import radius_for_stroke
 from laufruhe.physics.seiliger_cycle import motored_cycle
-from laufruhe.problem.complaints import Refused, blamed_on, nearest
+from laufruhe.problem.complaints import Refused, blamed_on, measured, nearest
 from laufruhe.problem.file_models import (
     EngineTable,
     OperatingPointTable,
@@ -25,7 +25,7 @@ from laufruhe.problem.file_models import (
     WiebeTable,
 )
 
-_CYCLES = {"two-stroke": Cycle.TWO_STROKE, "four-stroke": Cycle.FOUR_STROKE}
+_CYCLES = {str(cycle): cycle for cycle in Cycle}
 _ONLY_FOR = {
     "bank_angle": ("vee",),
     "split_pin_angle": ("vee",),
@@ -294,11 +294,8 @@ def _trace(table: TraceTable, folder: Path) -> PressureTrace:
         raise Refused(
             "gas.file", table.file, f"cannot be read ({_why(error)})", "give a CSV file beside the problem"
         ) from None
-    try:
-        angle, pressure = units.parse(f"1 {table.angle_unit}", "rad"), units.parse(f"1 {table.pressure_unit}", "Pa")
-    except units.UnitError as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise Refused("gas.pressure_unit", table.pressure_unit, rule, remedy) from None
+    angle = measured(f"1 {table.angle_unit}", "rad", "gas.angle_unit", table.angle_unit)
+    pressure = measured(f"1 {table.pressure_unit}", "Pa", "gas.pressure_unit", table.pressure_unit)
     numbers = []
     for line, row in enumerate(rows):
         try:

@@ -11,6 +11,7 @@ from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from laufruhe import units
 from laufruhe.errors import Complaint, LaufruheError, ModelError
 
 _CLOSE = 0.6
@@ -149,11 +150,33 @@ class Refused(LaufruheError):
         super().__init__(str(self.complaint))
 
 
+def measured(text: str, unit: str, where: str, given: str | None = None) -> float:
+    """SI value of a text such as '120 mm' in the dimension of `unit`.
+
+    Parameters
+    ----------
+    where
+        Key that it stands at.
+    given
+        What stands there, if the text is only made of it.
+
+    Raises
+    ------
+    Refused
+        If it is no such value.
+    """
+    try:
+        return units.parse(text, unit)
+    except units.UnitError as error:
+        found = Complaint.of(error, where)
+        raise Refused(where, given or text, found.rule, found.remedy) from None
+
+
 @contextmanager
 def blamed_on(where: str) -> Iterator[None]:
     """A machine that cannot exist is the fault of this key."""
     try:
         yield
     except ModelError as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise Refused(where, None, rule, remedy or "correct it") from None
+        found = Complaint.of(error, where, remedy="correct it")
+        raise Refused(where, None, found.rule, found.remedy) from None

@@ -47,13 +47,7 @@ def signals(quantity: Quantity, evaluation: Evaluation) -> list[Spectrum]:
 
 def shares(quantity: Quantity, evaluation: Evaluation) -> Array:
     """Weight of every operating point in a quantity, zero where it does not count."""
-    weights = np.array(
-        [
-            loads.point.weight if quantity.points is None or loads.point.name in quantity.points else 0.0
-            for loads in evaluation.loads
-        ]
-    )
-    return np.asarray(weights / weights.sum())
+    return quantity.shares([loads.point for loads in evaluation.loads])
 
 
 def norm_above(quantity: Quantity, found: Sequence[Spectrum], share: Array) -> float:
@@ -127,17 +121,19 @@ def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> f
     bound = value = 0.0
     half = half_gas(problem, best)
     for term in problem.objective:
-        if term.quantity.subject in MASSES:
-            value += term.weight * evaluation.value(term.quantity)
-            continue
         value += term.weight * evaluation.value(term.quantity)
-        bound += term.weight * (
-            left_out(term.quantity, evaluation, best)
-            + sampling_bound(term.quantity, evaluation, best.samples)
-            + gas_doubt(term.quantity, best, half)
-        )
-    floor = ROUNDING * value
-    return (bound + floor) / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
+        if term.quantity.subject not in MASSES:
+            bound += term.weight * (
+                left_out(term.quantity, evaluation, best)
+                + sampling_bound(term.quantity, evaluation, best.samples)
+                + gas_doubt(term.quantity, best, half)
+            )
+    return relative(bound + ROUNDING * value, value)
+
+
+def relative(bound: float, value: float) -> float:
+    """A bound over a value; infinite where that is zero and the bound is not."""
+    return bound / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
 
 
 def left_out(quantity: Quantity, evaluation: Evaluation, best: Evaluation) -> float:

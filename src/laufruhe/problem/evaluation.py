@@ -14,15 +14,17 @@ from numpy.typing import NDArray
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.mixed_norms import Norm, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
-from laufruhe.physics.shaking_loads import Fidelity, shaking_loads
+from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
 
 Array = NDArray[np.float64]
 
 PEAK_REFINEMENT = 8
+"""Times as many samples as are asked for, among which maxima are sought (M6)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -154,21 +154,26 @@ class OperatingPointTable(Table):
     weight: f.Positive = 1.0
 
 
-class SeiligerTable(Table):
-    """Mixed cycle, its cut-off solved for the indicated mean pressure."""
+class ChargeTable(Table):
+    """What every computed cycle says of the charge and of the gas exchange."""
 
-    model: Literal["seiliger"]
-    peak_pressure: f.PositivePressure
-    imep: f.Pressure
     compression_ratio: f.Positive | None = None
-    compression_exponent: f.Positive | None = None
-    expansion_exponent: f.Positive | None = None
     intake_pressure: f.PositivePressure | None = None
     exhaust_pressure: f.PositivePressure | None = None
     crankcase_pressure: f.PositivePressure | None = None
 
 
-class WiebeTable(Table):
+class SeiligerTable(ChargeTable):
+    """Mixed cycle, its cut-off solved for the indicated mean pressure."""
+
+    model: Literal["seiliger"]
+    peak_pressure: f.PositivePressure
+    imep: f.Pressure
+    compression_exponent: f.Positive | None = None
+    expansion_exponent: f.Positive | None = None
+
+
+class WiebeTable(ChargeTable):
     """Finite heat release, the heat solved for the indicated mean pressure."""
 
     model: Literal["wiebe"]
@@ -177,11 +182,7 @@ class WiebeTable(Table):
     duration: f.Angle
     shape: f.NonNegative | None = None
     completeness: f.Positive | None = None
-    compression_ratio: f.Positive | None = None
     heat_ratio: f.Positive | None = None
-    intake_pressure: f.PositivePressure | None = None
-    exhaust_pressure: f.PositivePressure | None = None
-    crankcase_pressure: f.PositivePressure | None = None
 
 
 class TraceTable(Table):

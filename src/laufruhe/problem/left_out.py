@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
 
-from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import WRENCH, rotor_wrench
@@ -19,6 +18,7 @@ from laufruhe.problem.error_bounds import (
     gas_doubt,
     half_gas,
     left_out,
+    relative,
     sampling_bound,
 )
 from laufruhe.problem.evaluation import Evaluation, evaluate
@@ -56,11 +56,7 @@ class Scale:
         self.value = sum(term.weight * best.value(term.quantity) for term in problem.objective)
         half = half_gas(problem, best)
         doubt = sum(term.weight * gas_doubt(term.quantity, best, half) for term in self.terms)
-        self.doubt = self.relative(doubt) + ROUNDING
-
-    def relative(self, bound: float) -> float:
-        """A bound over the objective; infinite where that is zero and the bound is not."""
-        return bound / self.value if self.value > 0.0 else (float("inf") if bound > 0.0 else 0.0)
+        self.doubt = relative(doubt, self.value) + ROUNDING
 
     def evaluation(self, fidelity: Fidelity) -> Evaluation:
         """The same design at another fidelity."""
@@ -69,7 +65,8 @@ class Scale:
     def loses(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
         """What a fidelity leaves out at most, relative, of the reference or of another evaluation (F6)."""
         ours, theirs = self.evaluation(fidelity), than or self.best
-        return self.relative(sum(term.weight * left_out(term.quantity, ours, theirs) for term in self.terms))
+        lost = sum(term.weight * left_out(term.quantity, ours, theirs) for term in self.terms)
+        return relative(lost, self.value)
 
     @cached_property
     def mounting(self) -> ElasticMounting | None:
@@ -104,7 +101,8 @@ class Scale:
     def misses(self, fidelity: Fidelity) -> float:
         """What its samples miss at most, relative (F7, F8)."""
         ours = self.evaluation(fidelity)
-        return self.relative(sum(term.weight * sampling_bound(term.quantity, ours) for term in self.terms))
+        missed = sum(term.weight * sampling_bound(term.quantity, ours) for term in self.terms)
+        return relative(missed, self.value)
 
 
 def has_gas(problem: Problem) -> bool:
@@ -196,7 +194,7 @@ def _never_there(scale: Scale, chosen: Fidelity) -> list[LeftOut]:
 def repeats(scale: Scale) -> int:
     """Times that all measured signals repeat within the cycle, whatever is decided."""
     ratios = tuple(
-        Fraction(abs(rotor.shaft.ratio)).limit_denominator(1000)
+        as_order(abs(rotor.shaft.ratio))
         for rotor in scale.problem.engine.rotors
         if rotor.unbalance != 0 or any(d.rotor == rotor.name for c in scale.problem.decisions for d in c.drives)
     )

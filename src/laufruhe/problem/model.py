@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, OperatingPoint
-from laufruhe.physics.shaking_loads import EXACT, Fidelity
+from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountDesign
 from laufruhe.problem.phasing import Phasing
 from laufruhe.problem.quantity import Quantity

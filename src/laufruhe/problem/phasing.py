@@ -9,6 +9,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from laufruhe.machine import Cycle
+from laufruhe.machine.firing import even_orders, star_throws
 from laufruhe.machine.layouts import Layout
 
 if TYPE_CHECKING:
@@ -96,6 +97,13 @@ class ShaftChoice:
     most: float = math.inf
     most_mass: float = math.inf
 
+    @property
+    def allowed(self) -> tuple[tuple[int, ...], ...]:
+        """Every choice of the sets that keeps the limits."""
+        count = len(self.optional)
+        every = (tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count))
+        return tuple(built for built in every if self.allows(built))
+
     def allows(self, built: Sequence[int]) -> bool:
         """Whether these sets keep the limits on number and mass."""
         number = sum(len(self.optional[k]) for k in built)
@@ -178,6 +186,28 @@ class Phasing:
             (f"which of {sum(map(len, self.shafts.optional))} shaft(s) are built", bool(self.shafts.optional)),
         )
         return tuple(name for name, is_open in found if is_open)
+
+    def star(
+        self,
+        steps: Sequence[int],
+        phases: int,
+        geometry: tuple[float | None, float | None],
+        left_out: tuple[str, ...] = (),
+    ) -> Candidate:
+        """The design of an even star, with the first of its firing orders.
+
+        Parameters
+        ----------
+        steps
+            Of the throws, of `phases` to a turn.
+        geometry
+            Bank angle and split pin [rad].
+        left_out
+            Optional shafts that are not built.
+        """
+        layout = self.layout(*geometry)
+        order = self.firing_order or next(even_orders(self.cycle, layout, steps), None)
+        return Candidate(star_throws(layout, steps, phases), order, *geometry, left_out)
 
     @property
     def geometries(self) -> tuple[tuple[float | None, float | None], ...]:

@@ -55,6 +55,8 @@ COMPONENTS: Mapping[Subject, slice] = {
     Subject.ROLL_MOMENT: slice(3, 4),
     Subject.ROCKING_COUPLE: slice(4, 6),
 }
+# orders are told apart to a thousandth
+_PER_ORDER = 1000
 MEASURES: Mapping[str, Norm] = {"mean": Norm.SUM, "maximum": Norm.MAXIMUM, "rms": Norm.RMS}
 
 
@@ -104,6 +106,20 @@ class Quantity:
     def unit(self) -> str:
         """SI unit."""
         return self.subject.unit
+
+    def shares(self, points: Sequence[OperatingPoint]) -> Array:
+        """Weight of every operating point, shape (points,); zero where it does not count, one in all."""
+        weights = np.array([p.weight if self.points is None or p.name in self.points else 0.0 for p in points])
+        return np.asarray(weights / weights.sum())
+
+    def counted(self, orders: Array) -> NDArray[np.bool_]:
+        """Which orders of crank speed count, shape of `orders`."""
+        if self.orders is None:
+            return np.ones(np.shape(orders), dtype=bool)
+        return np.isin(np.round(orders * _PER_ORDER), np.round(np.array(self.orders) * _PER_ORDER))
+
+
+MEAN_MOUNT_FORCE = Quantity(Subject.MOUNT_FORCE, Norm.SUM)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,14 +171,13 @@ def load_rows(
     Rows of (points, mounts, samples) in that order; weights add up to one.
     """
     blocks, weights = [], []
-    chosen = [k for k, p in enumerate(points) if quantity.points is None or p.name in quantity.points]
-    whole = sum(points[k].weight for k in chosen)
-    for k in chosen:
-        signal = selected(quantity, signals[k], mount_names)
-        values = signal.sample(samples)
+    for signal, share in zip(signals, quantity.shares(points), strict=True):
+        if share == 0.0:
+            continue
+        values = selected(quantity, signal, mount_names).sample(samples)
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
         blocks.append(rows)
-        weights.append(np.full(len(rows), points[k].weight / whole / len(rows)))
+        weights.append(np.full(len(rows), share / len(rows)))
     return Rows(quantity.norm, np.concatenate(blocks), np.concatenate(weights))
 
 
@@ -177,8 +192,7 @@ def selected(quantity: Quantity, signal: Spectrum, mount_names: Sequence[str]) -
     else:
         c = c[:, None, COMPONENTS[quantity.subject]]
     if quantity.orders is not None:
-        keep = np.isin(np.round(signal.orders * 1000), np.round(np.array(quantity.orders) * 1000))
-        c = np.where(keep[:, None, None], c, 0.0)
+        c = np.where(quantity.counted(signal.orders)[:, None, None], c, 0.0)
     return Spectrum(signal.base, c)
 
 

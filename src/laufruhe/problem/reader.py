@@ -9,14 +9,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from laufruhe import units
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.problem.assemble_engine import cycle_of, moving_parts, operating_points
 from laufruhe.problem.assemble_mounts import mounts_of
 from laufruhe.problem.assemble_rotors import RotorList, balancer_shafts, counterweights
-from laufruhe.problem.complaints import Refused, complaints_of, nearest
+from laufruhe.problem.complaints import Refused, complaints_of, measured, nearest
 from laufruhe.problem.file_models import LOAD_NAMES, MASS_NAMES, ConstraintTable, ProblemFile, QuantityTable
 from laufruhe.problem.model import Limit, Problem, Term
 from laufruhe.problem.mount_asked import asked_of_mounts
@@ -59,8 +58,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
     except Refused as refused:
         raise InputError(str(path), (refused.complaint,)) from None
     except ModelError as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise InputError(str(path), (Complaint("engine", "", rule, remedy),)) from None
+        raise InputError(str(path), (Complaint.of(error, "engine"),)) from None
 
 
 def tables_of(path: Path) -> dict[str, Any]:
@@ -222,11 +220,7 @@ def _limit(table: ConstraintTable, k: int, scene: _Scene) -> Limit:
             raise Refused(f"{where}.{key}", None, rule, "give max")
     if table.max is None:
         raise Refused(f"{where}.max", None, "is missing", "add it")
-    try:
-        maximum = units.parse(table.max, quantity.unit)
-    except units.UnitError as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise Refused(f"{where}.max", table.max, rule, remedy) from None
+    maximum = measured(table.max, quantity.unit, f"{where}.max")
     if maximum < 0.0:
         raise Refused(f"{where}.max", table.max, "is negative, and no norm is", "give a value of zero or more")
     return Limit(table.name or quantity.name, quantity, maximum)

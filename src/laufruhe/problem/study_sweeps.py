@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe import units
-from laufruhe.problem.complaints import Refused
+from laufruhe.problem.complaints import Refused, measured
 from laufruhe.problem.study_parts import SweepTable, Value
 from laufruhe.problem.study_paths import field_at
 
@@ -129,7 +129,7 @@ def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str
         return "deg" if field is not None and field.plain is not None else "1", tuple(plain)
     if plain:
         raise Refused(given, list(values), "mixes numbers with and without a unit", "write all alike")
-    numbers = tuple(_parsed(text, wanted, given) for text in texts)
+    numbers = tuple(measured(text, wanted, given) for text in texts)
     unit = units.unit_of(texts[0])
     one = units.parse(f"1 {unit}", wanted)
     return unit or "1", tuple(float(f"{number / one:.{_DIGITS}g}") for number in numbers)
@@ -143,11 +143,3 @@ def _is_limit(quantity: str) -> bool:
 
 def _limited_unit(quantity: str, texts: Sequence[str]) -> str | None:
     return units.dimension_of(texts[0]) if texts and _is_limit(quantity) else None
-
-
-def _parsed(text: str, unit: str, given: str) -> float:
-    try:
-        return units.parse(text, unit)
-    except units.UnitError as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise Refused(given, text, rule, remedy) from None

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from typing import Any
 
 from laufruhe.problem.automatic import Choice
 from laufruhe.problem.model import Problem
+from laufruhe.report.strict_json import strict
 
 
 def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
@@ -38,19 +38,17 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
 
 def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
     """The same for scripts."""
-    fidelity = asdict(choice.fidelity)
-    fidelity["crank_inertia"] = choice.fidelity.crank_inertia if choice.fidelity.is_uneven else None
     content: dict[str, Any] = {
         "problem": problem.name,
         "tolerance": tolerance,
         "error_estimate": choice.error_estimate,
-        "fidelity": fidelity,
+        "fidelity": asdict(choice.fidelity),
         "kept": list(choice.kept),
         "left_out": [{"what": part.what, "why": part.why, "share": part.share} for part in choice.left_out],
         "numbers": {"kept": choice.numbers[0], "exact": choice.numbers[1]},
         "milliseconds": {"kept": milliseconds[0], "exact": milliseconds[1]},
     }
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return strict(content)
 
 
 def _line(what: str, why: str, share: float) -> str:

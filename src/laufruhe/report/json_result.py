@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict
 from typing import Any
@@ -11,7 +10,6 @@ import numpy as np
 
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures
 from laufruhe.physics.shaking_loads import WRENCH
 from laufruhe.problem.evaluation import measured
@@ -24,13 +22,14 @@ from laufruhe.report.measures import (
 )
 from laufruhe.report.mounting import is_elastic, modes_as_dict
 from laufruhe.report.ranking import phasing_record
+from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
 from laufruhe.solvers.result import Result
 
 
 def as_json(result: Result) -> str:
     """Strict JSON, one line feed at its end."""
-    return json.dumps(_finite(as_dict(result)), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return strict(as_dict(result))
 
 
 def as_dict(result: Result) -> dict[str, Any]:
@@ -58,29 +57,14 @@ def as_dict(result: Result) -> dict[str, Any]:
         "firing_intervals": list(engine.firing_intervals),
         **phasing_record(result),
         "fidelity": {
-            **fidelity_dict(problem.fidelity),
+            # the crank inertia is null where the crank turns evenly
+            **asdict(problem.fidelity),
             "measured_at": result.final.samples,
             "error_estimate": result.error_estimate,
         },
         "timing": dict(result.timing),
         "versions": versions(),
     }
-
-
-def fidelity_dict(fidelity: Fidelity) -> dict[str, Any]:
-    """Every choice; the crank inertia is null where the crank turns evenly."""
-    return asdict(fidelity)
-
-
-def _finite(value: Any) -> Any:
-    """NumPy numbers as Python's, and null for what is no number: JSON has no NaN."""
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    return value
 
 
 def _objective(result: Result) -> dict[str, Any] | None:

@@ -59,11 +59,6 @@ class MountingFacts:
     torque_roll_axis: Array
     torque_roll_coupling: float
 
-    @property
-    def excited_names(self) -> tuple[str, ...]:
-        """Names of the modes that are driven."""
-        return tuple(self.modes.names[j] for j in self.excited)
-
 
 def is_elastic(evaluation: Evaluation) -> bool:
     """Whether a design has a block on elastic mounts."""

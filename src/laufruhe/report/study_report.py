@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from laufruhe.problem.study_models import StudyFile
 from laufruhe.report import files
+from laufruhe.report.strict_json import strict
 from laufruhe.report.tractor_study import figure_files, write_figures
 
 if TYPE_CHECKING:
@@ -94,12 +94,4 @@ def as_json(study: StudyFile, datasets: Mapping[str, xr.Dataset], seconds: Mappi
         name: {"seconds": seconds[name], **data.to_dict(data="list", encoding=False)} for name, data in datasets.items()
     }
     content = {"title": study.title, "source": study.source, "assumptions": study.assumptions, "parts": parts}
-    return json.dumps(_finite(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not abs(value) < float("inf") else value
+    return strict(content, indent=1)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from typing import Any
 
 from laufruhe.report.markdown import escaped
+from laufruhe.report.strict_json import strict
 from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade
 from laufruhe.studies.trade_optima import is_local
 
@@ -106,15 +105,15 @@ def as_json(found: Trade) -> str:
     """The table for scripts."""
     content = {
         "problem": found.problem.name,
-        "reference": {"objective": found.value, "optimum": _finite(found.optimum)},
+        "reference": {"objective": found.value, "optimum": found.optimum},
         "rigid_part": asdict(found.rigid_part),
         "uneven_speed": None
         if found.flywheel is None
         else dict(zip(("crank_inertia", "change"), found.flywheel, strict=True)),
         "time_domain": None if found.time_domain is None else asdict(found.time_domain),
-        "rows": [_entry(row) for row in found.rows],
+        "rows": [asdict(row) for row in found.rows],
     }
-    return json.dumps(content, indent=2, allow_nan=False) + "\n"
+    return strict(content)
 
 
 def index(trades: Sequence[Trade]) -> str:
@@ -222,12 +221,3 @@ def _regret(row: Row | None) -> str:
         return DASH
     # the cone solver's own digits
     return "0" if abs(row.regret) < 1e-8 else f"{row.regret:.1e}"
-
-
-def _entry(row: Row) -> dict[str, Any]:
-    keys = ("name", "error", "estimate", "evaluation", "gradient", "solve", "fresh", "memory", "regret")
-    return {key: _finite(getattr(row, key)) for key in keys}
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from laufruhe.machine import Cycle
 from laufruhe.problem.model import Problem
 from laufruhe.report.measures import breaks_a_limit, changed
 from laufruhe.solvers.certificate import Certificate, Proof
@@ -70,10 +69,9 @@ def percent(share: float) -> str:
 def one_line(problem: Problem) -> str:
     """What a problem is about, for the screen."""
     engine = problem.engine
-    stroke = "two-stroke" if engine.cycle is Cycle.TWO_STROKE else "four-stroke"
     parts = [
         problem.name,
-        f"{len(engine.slider_cranks)} cylinder(s), {stroke}",
+        f"{len(engine.slider_cranks)} cylinder(s), {engine.cycle}",
         f"{len(engine.mounts)} mount(s)",
         f"{len(problem.points)} operating point(s)",
         f"{len(problem.limits) + len(problem.mount_design.limits)} constraint(s)",

@@ -15,7 +15,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_rotor_loads
@@ -27,6 +27,8 @@ from laufruhe.solvers.domain import Domain, domains_of
 Array = NDArray[np.float64]
 
 NEEDED = 1e3
+FEASIBLE = 1e-6
+"""Relative excess over a limit that counts as none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +112,10 @@ class AffineProblem:
         """Weighted sum of the terms."""
         return sum(weight * norm.value(x) for weight, norm in self.terms)
 
+    def excess(self, x: Array) -> float:
+        """Largest relative excess over a limit, negative where all have room; zero without limits."""
+        return max(((norm.value(x) - maximum) / (maximum or 1.0) for maximum, norm in self.limits), default=0.0)
+
 
 def reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
     """A size of these norms that is not zero: at no decisions, or at large ones."""
@@ -145,7 +151,7 @@ class AffineModel:
         mounting = mounting_of(problem.engine, problem.fidelity)
         changes = [_change(problem, k, direction) for k, d in enumerate(self.domains) for direction in d.directions]
         self.bare, self._changes = bare, changes
-        orders = [Fraction(abs(r.shaft.ratio)).limit_denominator(1000) for rotors in changes for r in rotors]
+        orders = [as_order(abs(r.shaft.ratio)) for rotors in changes for r in rotors]
         self._slopes = {
             subject: [
                 [_slope(rotors, point, problem.engine, mounting, subject, problem.fidelity) for rotors in changes]
@@ -173,8 +179,8 @@ class AffineModel:
     def at(self, samples: int) -> AffineProblem:
         """The problem with its load rows at `samples` steps over their common period."""
         problem = self.problem
-        terms = tuple((term.weight, self._norm(term.quantity, samples)) for term in problem.objective)
-        limits = tuple((limit.maximum, self._norm(limit.quantity, samples)) for limit in problem.limits)
+        terms = tuple((term.weight, self.norm(term.quantity, samples)) for term in problem.objective)
+        limits = tuple((limit.maximum, self.norm(limit.quantity, samples)) for limit in problem.limits)
         return AffineProblem(terms, limits, self.domains, samples)
 
     def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
@@ -184,9 +190,6 @@ class AffineModel:
 
     def norm(self, quantity: Quantity, samples: int) -> AffineNorm:
         """A quantity at `samples` steps over the common period."""
-        return self._norm(quantity, samples)
-
-    def _norm(self, quantity: Quantity, samples: int) -> AffineNorm:
         if quantity.subject in MASSES:
             bare = mass_rows(quantity, self.bare.engine.rotors)
             slopes = [mass_rows(quantity, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]

@@ -21,6 +21,14 @@ from laufruhe.solvers.affine import AffineNorm, AffineProblem
 
 Array = NDArray[np.float64]
 
+FLOOR = 1e-3
+"""Share of the objective as given beside which a gap is counted: a balanced engine has none of its own."""
+
+
+def gap_unit(value: float, given: float) -> float:
+    """What a gap of an objective is counted in, beside that of the design as given; never zero."""
+    return max(value, FLOOR * given) or 1.0
+
 
 class Proof(StrEnum):
     """What has been proven of a design."""

@@ -1,7 +1,7 @@
 """Least weighted sum of norms under limits, as a second-order cone program (P1).
 
-The only room that knows cvxpy. The program is built once for a set of slopes; constants
-and limits are parameters, so a sweep solves again without building again.
+The program is built once for a set of slopes; constants and limits may be parameters, so
+that a sweep solves again without building again.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class _Cone:
     """One norm in the program, its rows in units of `unit`."""
 
     constant: Any
-    heads: Any
+    value: Any
     cone: Any
     unit: float
     shape: tuple[int, int]
@@ -66,16 +66,13 @@ class ConicProgram:
             self._number(np.array(maximum / cone.unit))
             for (maximum, _), cone in zip(problem.limits, self._limits, strict=True)
         ]
-        least = [weight * _value(norm, cone) for (weight, norm), cone in zip(problem.terms, self._terms, strict=True)]
+        least = [weight * cone.value for (weight, _), cone in zip(problem.terms, self._terms, strict=True)]
         constraints = [cone.cone for cone in (*self._terms, *self._limits)]
-        constraints += [
-            _value(norm, cone) <= most
-            for (_, norm), cone, most in zip(problem.limits, self._limits, self._maxima, strict=True)
-        ]
+        constraints += [cone.value <= most for cone, most in zip(self._limits, self._maxima, strict=True)]
         constraints += [
             c
             for domain in problem.domains
-            for c in _membership(domain, self._y[domain.columns], float(problem.units[domain.start]))
+            for c in membership(domain, self._y[domain.columns], float(problem.units[domain.start]))
         ]
         self._program = cp.Problem(cp.Minimize(sum(least)), constraints)
 
@@ -85,14 +82,9 @@ class ConicProgram:
         constant = self._number(norm.constant / unit)
         slope = (norm.slope * (self._problem.units / unit)).reshape(k * d, -1)
         rows = cp.reshape(slope @ self._y, (k, d), order="C") + constant
-        if norm.norm is Norm.RMS:
-            factors = np.sqrt(norm.weights)
-            head = cp.Variable()
-            cone = cp.SOC(head, cp.vec(cp.multiply(factors[:, None], rows), order="C"))
-            return _Cone(constant, head, cone, unit, (k, d), factors)
-        heads = cp.Variable(k) if norm.norm is Norm.SUM else cp.Variable()
-        tops = heads if norm.norm is Norm.SUM else heads * np.ones(k)
-        return _Cone(constant, heads, cp.SOC(tops, rows, axis=1), unit, (k, d), np.ones(k))
+        value, cone = held_norm(norm.norm, norm.weights, rows)
+        factors = np.sqrt(norm.weights) if norm.norm is Norm.RMS else np.ones(k)
+        return _Cone(constant, value, cone, unit, (k, d), factors)
 
     def _number(self, value: Array) -> Any:
         return cp.Parameter(value.shape, value=value) if self._reusable else cp.Constant(value)
@@ -142,15 +134,23 @@ class ConicProgram:
         return ConicSolution(x, Multipliers(terms, limits), seconds, iterations)
 
 
-def _value(norm: AffineNorm, cone: _Cone) -> Any:
-    return norm.weights @ cone.heads if norm.norm is Norm.SUM else cone.heads
+def held_norm(norm: Norm, weights: Array, rows: Any) -> tuple[Any, Any]:
+    """A norm of rows (k, d) as a linear expression, and the cones that hold it: one a row, or one for all (P1)."""
+    if norm is Norm.RMS:
+        head = cp.Variable()
+        return head, cp.SOC(head, cp.vec(cp.multiply(np.sqrt(weights)[:, None], rows), order="C"))
+    count = len(weights)
+    heads = cp.Variable(count) if norm is Norm.SUM else cp.Variable()
+    tops = heads if norm is Norm.SUM else heads * np.ones(count)
+    return weights @ heads if norm is Norm.SUM else heads, cp.SOC(tops, rows, axis=1)
 
 
-def _membership(domain: Domain, y: Any, unit: float) -> list[Any]:
-    """The decision's own set, in units of a size (P4)."""
+def membership(domain: Domain, y: Any, unit: float, on: Any = 1.0) -> list[Any]:
+    """The decision's own set, in units of a size (P4), shrunk to nothing where `on` is zero (S10)."""
+    low, high = domain.decision.lower / unit, domain.decision.upper / unit
     if domain.width == 1:
-        return [y >= domain.decision.lower / unit, y <= domain.decision.upper / unit]
-    inside: list[Any] = [cp.SOC(cp.Constant(domain.decision.upper / unit), y)]
+        return [y >= low * on, y <= high * on]
+    inside: list[Any] = [cp.SOC(high * cp.Constant(1.0) * on, y)]
     if len(domain.edges):
         (ax, ay), (bx, by) = domain.edges
         inside += [ax * y[1] - ay * y[0] >= 0.0, bx * y[1] - by * y[0] <= 0.0]
@@ -184,7 +184,7 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
         w * unit / max(units) * cp.norm(y[d.columns])
         for w, unit, d in zip(weights, units, problem.domains, strict=True)
     ]
-    held = [c for d, unit in zip(problem.domains, units, strict=True) for c in _membership(d, y[d.columns], unit)]
+    held = [c for d, unit in zip(problem.domains, units, strict=True) for c in membership(d, y[d.columns], unit)]
     for maximum, norm in problem.limits:
         moves = np.einsum("kdn,nm->kdm", norm.slope, step)
         if np.any(moves != 0.0) and norm.norm is Norm.SUM:

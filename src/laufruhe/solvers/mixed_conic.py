@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
 from laufruhe.numerics import mixed_norms
-from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.physics.star_space import StarSpace
-from laufruhe.solvers.domain import Domain
+from laufruhe.solvers.conic import held_norm, membership
 from laufruhe.solvers.star_model import StarNorm, StarProblem
 
 Array = NDArray[np.float64]
@@ -93,24 +92,25 @@ def solve_program(
     y = cp.Variable(max(size, 1))
     built = cp.Variable(max(len(shaft_counts), 1), boolean=True)
     held = [*_stars(steps, space), *_shafts(built, shaft_counts, shaft_masses, most, most_mass)]
-    held += [
-        c for d, own in zip(problem.domains, owners, strict=True) for c in _membership(d, y[d.columns], built, own)
-    ]
+    for domain, own in zip(problem.domains, owners, strict=True):
+        held += membership(domain, y[domain.columns], domain.scale, 1.0 if own < 0 else built[own])
     if not size:
         held.append(y == 0.0)
     unit = max((_reach(norm) for _, norm in problem.terms), default=0.0) or 1.0
-    rows = _Rows(steps, y, scales, size)
-    least = []
-    for weight, norm in problem.terms:
-        value, cones = rows.value(norm, unit)
-        least.append(weight * value)
-        held += cones
+    objective, cones = _weighed(problem, _Rows(steps, y, scales, size), unit)
+    program = cp.Problem(cp.Minimize(objective), [*held, *cones])
+    return _answer(program, steps, built, unit, bool(shaft_counts), time_limit)
+
+
+def _weighed(problem: StarProblem, rows: _Rows, unit: float) -> tuple[Any, list[Any]]:
+    """The objective in units of `unit`, and the cones of it and of the limits."""
+    terms = [(weight, *rows.value(norm, unit)) for weight, norm in problem.terms]
+    held = [cones for _, _, cones in terms]
     for maximum, norm in problem.limits:
         own = _reach(norm) or 1.0
         value, cones = rows.value(norm, own)
-        held += [*cones, value <= maximum / own]
-    program = cp.Problem(cp.Minimize(sum(least)), held)
-    return _answer(program, steps, built, unit, bool(shaft_counts), time_limit)
+        held += [cones, value <= maximum / own]
+    return sum(weight * value for weight, value, _ in terms), held
 
 
 def _answer(program: Any, steps: Any, built: Any, unit: float, choosing: bool, time_limit: float) -> ProgramFound:
@@ -140,21 +140,14 @@ class _Rows:
     def __init__(self, steps: Any, y: Any, scales: Array, size: int) -> None:
         self._steps, self._y, self._scales, self._size = cp.vec(steps, order="C"), y, scales, size
 
-    def value(self, norm: StarNorm, unit: float) -> tuple[Any, list[Any]]:
+    def value(self, norm: StarNorm, unit: float) -> tuple[Any, Any]:
         """The norm in units of `unit`, and the cones that hold it."""
         k, d = norm.constant.shape
         moves = norm.moves.reshape(-1, k * d).T / unit
         flat = norm.constant.reshape(-1) / unit + moves @ self._steps
         if self._size:
             flat = flat + (norm.slope * (self._scales / unit)).reshape(k * d, -1) @ self._y
-        if norm.norm is Norm.RMS:
-            head = cp.Variable()
-            factors = np.repeat(np.sqrt(norm.weights), d)
-            return head, [cp.SOC(head, cp.multiply(factors, flat))]
-        heads = cp.Variable(k) if norm.norm is Norm.SUM else cp.Variable()
-        tops = heads if norm.norm is Norm.SUM else heads * np.ones(k)
-        cones = [cp.SOC(tops, cp.reshape(flat, (k, d), order="C"), axis=1)]
-        return (norm.weights @ heads if norm.norm is Norm.SUM else heads), cones
+        return held_norm(norm.norm, norm.weights, cp.reshape(flat, (k, d), order="C"))
 
 
 def _stars(steps: Any, space: StarSpace) -> list[Any]:
@@ -181,19 +174,6 @@ def _shafts(built: Any, counts: Sequence[int], masses: Sequence[float], most: fl
     if np.isfinite(most_mass):
         held.append(np.array(masses) @ built <= most_mass)
     return held
-
-
-def _membership(domain: Domain, y: Any, built: Any, own: int) -> list[Any]:
-    """The decision's own set, shrunk to nothing where its shaft is not built (S10)."""
-    low, high = domain.decision.lower / domain.scale, domain.decision.upper / domain.scale
-    on = 1.0 if own < 0 else built[own]
-    if domain.width == 1:
-        return [y >= low * on, y <= high * on]
-    inside: list[Any] = [cp.SOC(high * on if own >= 0 else cp.Constant(high), y)]
-    if len(domain.edges):
-        (ax, ay), (bx, by) = domain.edges
-        inside += [ax * y[1] - ay * y[0] >= 0.0, bx * y[1] - by * y[0] <= 0.0]
-    return inside
 
 
 def _reach(norm: StarNorm) -> float:

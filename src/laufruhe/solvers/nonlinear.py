@@ -37,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
+from laufruhe.numerics.cores import processors
 
 Array = NDArray[np.float64]
 
@@ -254,11 +255,6 @@ def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = 1e
         if not kept or optimum.value - kept[-1].value > tolerance * scale:
             kept.append(optimum)
     return tuple(kept)
-
-
-def processors() -> int:
-    """As many processes as may run side by side."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float) -> _Task:

@@ -12,14 +12,12 @@ from laufruhe.machine.layouts import Layout
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Phasing
-from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.phasing_result import final_result, names_of, no_design, no_result, phase_decisions, solve_fixed
 from laufruhe.solvers.ranking import PhasingResult, ranked_orders, ranked_star
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.star_answers import searched
 from laufruhe.solvers.star_families import families_of
-
-FLOOR = 1e-3
 
 
 def solve_phasing(problem: Problem) -> Result:
@@ -88,7 +86,8 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     orders, count = ranked_orders(phasing, layout, throws, None)
     if not orders:
         return no_result(problem, _no_order(phasing, layout, throws))
-    sets = [b for b in _all_sets(len(phasing.shafts.optional)) if phasing.shafts.allows(b)]
+    # the small ones first: a shaft that buys nothing is not built
+    sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
     best: tuple[tuple[int, ...], Result] | None = None
     for built in sets:
         names = names_of(phasing, built)
@@ -97,7 +96,7 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
         result = solve_fixed(replace(phasing.realise(candidate), tolerance=problem.tolerance))
         if result.objective is None:
             continue
-        worth = problem.tolerance * max(result.objective.value, FLOOR * result.objective.initial)
+        worth = problem.tolerance * gap_unit(result.objective.value, result.objective.initial)
         if best is None or result.objective.value < _value(best[1]) - worth:
             best = built, result
     if best is None:
@@ -128,12 +127,6 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
 
 def _value(result: Result) -> float:
     return result.objective.value if result.objective is not None else math.inf
-
-
-def _all_sets(count: int) -> list[tuple[int, ...]]:
-    """Every set, the small ones first."""
-    every = [tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count)]
-    return sorted(every, key=lambda chosen: (len(chosen), chosen))
 
 
 def _no_order(phasing: Phasing, layout: Layout, throws: Sequence[float]) -> str:

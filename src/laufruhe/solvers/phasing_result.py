@@ -9,7 +9,7 @@ from dataclasses import replace
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Phasing
-from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.certificate import FLOOR, Certificate, Proof, gap_unit
 from laufruhe.solvers.ranking import PhasingResult, RankedStar, ranked_orders, ranked_star
 from laufruhe.solvers.result import DecisionValue, ObjectiveValue, Result, Status
 from laufruhe.solvers.star_answers import Answer, Decided
@@ -17,8 +17,6 @@ from laufruhe.solvers.star_cuts import owners_of, solve_design
 from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_model import StarModel
 from laufruhe.solvers.unbalances import solve_unbalances
-
-FLOOR = 1e-3
 
 
 def final_result(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
@@ -31,10 +29,9 @@ def final_result(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     chosen = replace(phasing.realise(candidate), tolerance=problem.tolerance, phasing=None)
     result = solve_fixed(chosen)
     given = evaluate(problem)
-    floor = FLOOR * objective_value(problem, given)
     value = result.objective.value if result.objective else best.value
     bound = min(answer.bound, value)
-    gap = (value - bound) / (max(value, floor) or 1.0)
+    gap = (value - bound) / gap_unit(value, objective_value(problem, given))
     proven = gap <= 2.0 * problem.tolerance and answer.complete
     certificate = Certificate(
         Proof.GLOBAL if proven else Proof.WITHIN_GAP,

@@ -13,6 +13,7 @@ from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Method, Phasing
+from laufruhe.solvers.certificate import FLOOR
 from laufruhe.solvers.star_cuts import CutsFound, owners_of, search_designs, solve_design
 from laufruhe.solvers.star_families import Family
 from laufruhe.solvers.star_model import StarModel
@@ -23,7 +24,6 @@ MOST_LISTED = 1_000_000
 # looking at every star is as quick as a search up to here
 FEW_STARS = 60_000
 PROGRAM_SAMPLES = 24
-FLOOR = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

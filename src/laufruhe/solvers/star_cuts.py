@@ -19,13 +19,12 @@ from laufruhe.numerics import mixed_norms
 from laufruhe.physics.crank_stars import Array, Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.phasing import ShaftChoice
-from laufruhe.solvers.affine import AffineNorm, AffineProblem
-from laufruhe.solvers.certificate import Multipliers, best_bound, lower_bound
+from laufruhe.solvers.affine import FEASIBLE, AffineNorm, AffineProblem
+from laufruhe.solvers.certificate import Multipliers, best_bound
 from laufruhe.solvers.domain import Domain
 from laufruhe.solvers.star_model import StarModel, StarProblem
 
 COARSE = 48
-FEASIBLE = 1e-6
 _CHUNK = 1 << 17
 
 
@@ -93,13 +92,9 @@ def allowed_sets(choice: ShaftChoice, domains: Sequence[Domain], owners: Sequenc
     domains, owners
         Decisions, and the set that each belongs to (-1 for none).
     """
-    count = len(choice.optional)
-    every = [tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count)]
-    kept = [built for built in every if choice.allows(built)]
-    at_least = any(own >= 0 and d.decision.lower > 0.0 for d, own in zip(domains, owners, strict=True))
-    if at_least:
-        return tuple(kept)
-    return tuple(b for b in kept if not any(set(b) < set(other) for other in kept))
+    if any(own >= 0 and d.decision.lower > 0.0 for d, own in zip(domains, owners, strict=True)):
+        return choice.allowed
+    return tuple(b for b in choice.allowed if not any(set(b) < set(other) for other in choice.allowed))
 
 
 def owners_of(model: StarModel) -> tuple[int, ...]:
@@ -217,8 +212,7 @@ def solve_design(
             return None
         bound = best_bound(judged, coarse, solution.x, solution.multipliers)
         value = judged.objective(solution.x)
-        excess = max(((n.value(solution.x) - m) / (m or 1.0) for m, n in judged.limits), default=0.0)
-        met = excess <= FEASIBLE
+        met = judged.excess(solution.x) <= FEASIBLE
         found = Solved(star, built, value, bound.value, _spread(solution.x, whole, kept))
         best = (found, bound.multipliers)
         if met and value - bound.value <= 0.25 * tolerance * max(value, floor):
@@ -358,8 +352,3 @@ def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
             turning = True
             turns += np.einsum("kd,tpkdn->tpn", z, norm.turns)
     return Cut(constant, moves, gradient, turns if turning else None, fine.domains)
-
-
-def bound_of(affine: AffineProblem, multipliers: Multipliers) -> float:
-    """The bound of one star by the certificate itself, to compare cuts with."""
-    return lower_bound(affine, multipliers).value

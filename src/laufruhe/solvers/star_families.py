@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.firing import even_orders, even_patterns, firing_lattice, star_throws
+from laufruhe.machine.firing import even_patterns, firing_lattice, star_throws
 from laufruhe.machine.layouts import Layout, even_throws
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
@@ -33,9 +33,7 @@ class Family:
     @property
     def first(self) -> tuple[int, ...]:
         """One of the stars."""
-        if self.fixed is not None:
-            return self.fixed
-        return tuple(step for step, times in enumerate(self.space.patterns[0]) for _ in range(times))
+        return self.space.first if self.fixed is None else self.fixed
 
     def throws(self, steps: Sequence[int]) -> tuple[float, ...]:
         """Angles of a star [rad] (C3)."""
@@ -43,8 +41,7 @@ class Family:
 
     def candidate(self, phasing: Phasing, steps: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
         """The design of a star, with the first of its firing orders."""
-        order = phasing.firing_order or next(even_orders(phasing.cycle, self.layout, steps), None)
-        return Candidate(self.throws(steps), order, *self.geometry, left_out)
+        return phasing.star(steps, self.space.phases, self.geometry, left_out)
 
     @property
     def stars(self) -> Stars:

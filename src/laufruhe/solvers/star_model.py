@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine.firing import even_orders, star_throws
+from laufruhe.machine.firing import star_throws
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.spectrum import common_base
@@ -99,9 +99,8 @@ class StarModel:
     ) -> None:
         self.phasing, self.space, self.geometry = phasing, space, geometry
         self.layout: Layout = phasing.layout(*geometry)
-        first = tuple(step for step, times in enumerate(space.patterns[0]) for _ in range(times))
-        self._origin = first if origin is None else origin
-        self.problem = _normalised(phasing.realise(self.candidate(self._origin)))
+        self._origin = space.first if origin is None else origin
+        self.problem = _normalised(phasing.realise(phasing.star(self._origin, space.phases, geometry)))
         self._whole = AffineModel(self.problem, keep_all=True)
         self._still = self._motored(self._origin)
         self._moved = {
@@ -121,12 +120,6 @@ class StarModel:
     def samples(self) -> int:
         """Steps of the problem's fidelity that fall into one period of the loads."""
         return self._whole.full_samples
-
-    def candidate(self, star: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
-        """The design of a star, with the first of its firing orders."""
-        throws = star_throws(self.layout, star, self.space.phases)
-        order = self.phasing.firing_order or next(even_orders(self.phasing.cycle, self.layout, star), None)
-        return Candidate(throws, order, *self.geometry, left_out)
 
     def _motored(self, star: Sequence[int]) -> AffineModel:
         throws = star_throws(self.layout, star, self.space.phases)

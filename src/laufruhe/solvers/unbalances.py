@@ -15,8 +15,8 @@ from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, evaluate, o
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.affine import AffineModel, AffineNorm, AffineProblem
-from laufruhe.solvers.certificate import Bound, Certificate, Proof, best_bound, kkt_residual
+from laufruhe.solvers.affine import FEASIBLE, AffineModel, AffineNorm, AffineProblem
+from laufruhe.solvers.certificate import Bound, Certificate, Proof, best_bound, gap_unit, kkt_residual
 from laufruhe.solvers.direct_cones import ConicSolution
 from laufruhe.solvers.domain import Domain
 from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible
@@ -28,9 +28,7 @@ MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
 MOST_ROWS = 60_000
 NEGLIGIBLE = 1e-6
-FEASIBLE = 1e-6
 ACTIVE = 1e-5
-FLOOR = 1e-3
 SAME_LOAD = 1e-10
 
 
@@ -133,8 +131,8 @@ def _attempt(
     bound = best_bound(fine, coarse, x, solution.multipliers)
     judge = model.at(PEAK_REFINEMENT * samples) if _has_peaks(problem) else fine
     value = judge.objective(x)
-    gap = (value - bound.value) / _measure(value, initial)
-    return _Optimum(x, bound, fine, max(gap, 0.0), _excess(judge, x), samples)
+    gap = (value - bound.value) / gap_unit(value, initial)
+    return _Optimum(x, bound, fine, max(gap, 0.0), judge.excess(x), samples)
 
 
 def _stated(affine: AffineProblem) -> ConicSolution:
@@ -195,16 +193,6 @@ def _keeps_limits(affine: AffineProblem, x: Array, without: Array) -> bool:
 def _linear(norms: Sequence[tuple[AffineNorm, float]]) -> list[tuple[AffineNorm, float]]:
     """The norms without their constants: what decisions alone make."""
     return [(replace(norm, constant=np.zeros_like(norm.constant)), size) for norm, size in norms]
-
-
-def _excess(affine: AffineProblem, x: Array) -> float:
-    """Largest relative excess over a limit."""
-    return max(((norm.value(x) - maximum) / (maximum or 1.0) for maximum, norm in affine.limits), default=0.0)
-
-
-def _measure(value: float, initial: float) -> float:
-    """What a gap is counted in: a perfectly balanced engine has no objective of its own."""
-    return max(value, FLOOR * initial) or 1.0
 
 
 def _indistinguishable(problem: Problem, affine: AffineProblem) -> Array:

@@ -8,15 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, Role, Rotor
-from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.quantity import MEAN_MOUNT_FORCE
 from laufruhe.studies.tolerance import Tolerances
 
 Array = NDArray[np.float64]
-
-MEAN_MOUNT_FORCE = Quantity(Subject.MOUNT_FORCE, Norm.SUM)
 
 
 def built(engine: Engine, tolerances: Tolerances, random: np.random.Generator) -> Engine:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
-from laufruhe.machine.firing import intervals_of
+from laufruhe.physics.metrics import order_amplitude, turning_parts
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import reciprocating_loads
 
@@ -67,25 +67,8 @@ def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
     unit = part.reciprocating_mass * part.crank_radius * SPEED**2 * float(amplitude)
     load = reciprocating_loads(engine, SPEED).at(order)
     force, couple = load[1:3] / unit, load[4:6] / (unit * spacing)
-    return FreeLoad(_largest(force), _largest(couple), _against(force), _against(couple))
-
-
-def _largest(vector: NDArray[np.complex128]) -> float:
-    """Largest length of Re c e^{ix} over a turn: the long half axis of its ellipse."""
-    return float(np.linalg.norm(np.array([vector.real, vector.imag]), ord=2))
-
-
-def _against(vector: NDArray[np.complex128]) -> float:
-    """Amplitude of the part of z + i y that turns as e^{-ix} (C4, C8)."""
-    y, z = vector
-    return 0.5 * float(abs(z - 1j * y))
-
-
-def firing_intervals(engine: Engine) -> tuple[float, float]:
-    """Least and largest crank angle from one firing to the next [rad]."""
-    turns = sorted(float(part.firing_angle) / math.tau for part in engine.slider_cranks)
-    intervals = intervals_of(engine.cycle, turns)
-    return min(intervals), max(intervals)
+    (_, force_against), (_, couple_against) = turning_parts(*force), turning_parts(*couple)
+    return FreeLoad(float(order_amplitude(force)), float(order_amplitude(couple)), force_against, couple_against)
 
 
 @dataclass(frozen=True)
@@ -100,7 +83,8 @@ class Layout:
 def layout(engine: Engine, spacing: float) -> Layout:
     """Free loads of the orders 1 and 2, couples in units of a spacing [m]."""
     loads = tuple(free_load(engine, order, spacing) for order in ORDERS)
-    return Layout(loads, firing_intervals(engine), len(engine.slider_cranks))
+    intervals = engine.firing_intervals
+    return Layout(loads, (min(intervals), max(intervals)), len(engine.slider_cranks))
 
 
 def compared(layouts: Mapping[str, Layout], literature: Mapping[str, Mapping[str, float]]) -> xr.Dataset:

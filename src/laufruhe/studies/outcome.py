@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 AS_GIVEN, FAILED = "as given", "failed"
-LABELS = ("mount", "decision", "case", "status", "proof")
 
 
 @dataclass(frozen=True)
@@ -173,7 +172,7 @@ def dataset(
     def each(name: str, words: str) -> tuple[str, Any, dict[str, str]]:
         return "point", np.array([getattr(o, name) for o in outcomes]), {"units": unit, "long_name": words}
 
-    # metrics of one part are of one dimension, or `check_metrics` has refused them
+    # metrics of one part are of one dimension, or `kinds.swept.checked` has refused them
     unit = next(iter(metrics.values()), "")
     metric = next(iter(metrics), "") if len(metrics) == 1 else "objective"
     values = np.array([[o.decisions.get(name, np.nan) for name in decided] for o in outcomes], dtype=float)

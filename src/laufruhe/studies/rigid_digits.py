@@ -24,8 +24,8 @@ from laufruhe.physics.shaking_loads import gas_torque, plane_wrench
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import COMPONENTS, MASSES, Quantity, Subject
-from laufruhe.studies.digits import DIGITS
 
+DIGITS = 50
 STEPS, GAS_STEPS = 24, 360
 FREE = 1e-20
 """Of a stiffness over the largest: what is under it is a direction that no mount carries."""
@@ -192,7 +192,7 @@ def _measure(quantity: Quantity, problem: Problem, wrenches: Sequence[list[Vecto
     """A quantity from wrenches at equal steps (P1)."""
     import mpmath
 
-    weights = [p.weight if quantity.points is None or p.name in quantity.points else 0.0 for p in problem.points]
+    weights = [float(share) for share in quantity.shares(problem.points)]
     squares = [_squares(quantity, problem.engine, wrench) for wrench in wrenches]
     if quantity.norm is Norm.MAXIMUM:
         return mpmath.sqrt(max(max(s) for s, weight in zip(squares, weights, strict=True) if weight > 0.0))

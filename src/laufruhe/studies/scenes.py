@@ -88,9 +88,8 @@ class Scenes:
         try:
             yield
         except ModelError as error:
-            rule, _, remedy = str(error).partition("; ")
             path = self.folder / point.case.problem
-            raise InputError(str(path), (Complaint(where, f'"{point}"', rule, remedy),)) from None
+            raise InputError(str(path), (Complaint.of(error, where, f'"{point}"'),)) from None
 
     def fingerprint(self, point: Point, settings: Mapping[str, Any]) -> str:
         """Of everything that a point hangs on: scene, files that it names, what is asked, and this package."""

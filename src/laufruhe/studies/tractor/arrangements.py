@@ -9,7 +9,7 @@ import xarray as xr
 
 from laufruhe.machine import Cycle, Engine
 from laufruhe.machine.layouts import Layout, boxer, build, inline, vee
-from laufruhe.physics.metrics import order_amplitude
+from laufruhe.physics.metrics import order_amplitude, turning_parts
 from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.verdict import Verdict
@@ -39,11 +39,7 @@ def vee_by_angle() -> xr.Dataset:
 
 def _turning(bank_angle: float) -> list[list[float]]:
     load = reciprocating_loads(_engine(vee(2, study.SPACING, bank_angle) if bank_angle else _twin()), _SPEED)
-    rows = []
-    for order in (1, 2):
-        lateral, vertical = load.at(order)[1:3]
-        rows.append([abs(vertical + 1j * lateral) / 2.0, abs(vertical - 1j * lateral) / 2.0])
-    return rows
+    return [list(turning_parts(*load.at(order)[1:3])) for order in (1, 2)]
 
 
 def _twin() -> Layout:

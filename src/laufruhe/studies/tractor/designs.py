@@ -11,16 +11,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, OperatingPoint, Rotor
-from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.physics.metrics import cycle_measures
-from laufruhe.problem.evaluation import Evaluation, evaluate, over
+from laufruhe.problem.evaluation import Evaluation, evaluate, mount_samples
 from laufruhe.problem.model import Drive, Problem, Term, UnbalanceDecision
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.quantity import MEAN_MOUNT_FORCE
 from laufruhe.solvers import solve
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.shafts import SHAFT_PLACE
 
-MEAN_MOUNT_FORCE = Quantity(Subject.MOUNT_FORCE, Norm.SUM)
 MOST_UNBALANCE = 0.15
 ASSUMED = " ".join(study.ASSUMPTIONS)
 
@@ -47,9 +45,7 @@ class Design:
     @property
     def forces(self) -> NDArray[np.float64]:
         """Mount forces over the cycle, shape (samples, mounts, 3) [N]."""
-        signal = self.evaluation.loads[0].mount_forces
-        assert signal is not None
-        return over(self.evaluation.engine.cycle.base_order, [signal])[0].sample(self.evaluation.samples)
+        return mount_samples(self.evaluation, 0)
 
     @property
     def mean(self) -> float:

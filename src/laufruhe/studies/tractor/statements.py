@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, Seiliger
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.order_coefficients import inertia_roll_orders
 from laufruhe.physics.seiliger_cycle import compression_end_pressure, motored_cycle, seiliger_imep
-from laufruhe.physics.shaking_loads import Fidelity, gas_torque, rotor_loads, shaking_loads
+from laufruhe.physics.shaking_loads import gas_torque, rotor_loads, shaking_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
 
@@ -48,7 +49,13 @@ class Unprinted:
 
     def cycle(self, imep: float, peak_pressure: float) -> Seiliger:
         """The mixed cycle at a load."""
-        return Seiliger(peak_pressure, imep, self.compression_ratio, self.compression_exponent, self.expansion_exponent)
+        return Seiliger(
+            peak_pressure,
+            imep,
+            self.compression_exponent,
+            self.expansion_exponent,
+            compression_ratio=self.compression_ratio,
+        )
 
     @property
     def compression_end(self) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from laufruhe.cli_screen import complain
+from laufruhe.cli.screen import complain
 from laufruhe.errors import Complaint, InputError, SolverError
 
 if TYPE_CHECKING:

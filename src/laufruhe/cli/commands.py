@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated, NoReturn, Optional
 
 import typer
 
-from laufruhe.cli_screen import DONE, FAILED, exit_statuses, hand_out, progress
-from laufruhe.cli_solve import Answer, Request, checked_tolerance, json_file, show_result, solved, written
+from laufruhe.cli.screen import DONE, FAILED, exit_statuses, hand_out, progress
+from laufruhe.cli.solve import Answer, Request, checked_tolerance, json_file, show_result, solved, written
 
 if TYPE_CHECKING:
     from laufruhe.problem.model import Problem
@@ -99,7 +99,7 @@ def study(
     """
     kept = "interrupted; finished points are kept, the same command goes on"
     with exit_statuses(problem, kept), ExitStack() as places:
-        from laufruhe.cli_study import studied
+        from laufruhe.cli.study import studied
         from laufruhe.report import files
 
         copy = json_file(Request("study", problem, json, None, False), places)
@@ -143,7 +143,7 @@ FidelityTolerance = Annotated[
 def explain(problem: ProblemArgument, json: JsonOption = None, tolerance: FidelityTolerance = 1e-3) -> None:
     """Say what of the physics this scene needs, what it does not, and why."""
     with exit_statuses(problem):
-        from laufruhe.cli_fidelity import explained
+        from laufruhe.cli.fidelity import explained
 
         checked_tolerance(tolerance)
         text, data = explained(problem, tolerance)
@@ -161,7 +161,7 @@ def trade(
 ) -> None:
     """Measure speed against accuracy of every fidelity, on these problems."""
     with exit_statuses(problems[0]), progress() as say:
-        from laufruhe.cli_fidelity import traded
+        from laufruhe.cli.fidelity import traded
 
         text, data = traded(problems, out or Path("results") / "trade", say)
         hand_out(text, data, json)

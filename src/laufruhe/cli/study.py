@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 from laufruhe.errors import Complaint, InputError
+from laufruhe.numerics.cores import processors
 from laufruhe.problem.study_models import StudyFile
 from laufruhe.problem.study_reader import load_study
 from laufruhe.report import files
@@ -29,7 +29,7 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
         _check_names(study, path)
     folder = out if out is not None else Path("results") / path.stem
     kept = folder / NAME
-    datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or _cores())
+    datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or processors())
     # late: pictures and tables are not needed where the study is refused
     from laufruhe.report.study_report import as_json, file_names, write_study
 
@@ -74,8 +74,3 @@ class _Teller:
             return ""
         seconds = (now - began) / (done - before) * (whole - done)
         return f", about {seconds / 60.0:.0f} min left" if seconds >= 100.0 else f", about {seconds:.0f} s left"
-
-
-def _cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

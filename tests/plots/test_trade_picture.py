@@ -1,0 +1,61 @@
+"""Every fidelity of a trade is named in its picture, however many fall on one spot."""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations, pairwise
+from typing import Any, cast
+
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Annotation, Text
+
+from cli import scenes
+from laufruhe.plots import trade
+from laufruhe.studies.trade import Row, Trade
+
+ROWS = 16
+
+
+def _trade(errors: list[float]) -> Trade:
+    rows = tuple(
+        Row(
+            f"fidelity {k}, 720 steps",
+            error,
+            error,
+            1e-5 * (k + 1.0),
+            2e-5,
+            0.01,
+            1e-3,
+            1e5,
+            1e-3 if k % 3 else math.nan,
+        )
+        for k, error in enumerate(errors)
+    )
+    unused = cast(Any, None)
+    return Trade(scenes.problem_of(scenes.PARTS), rows, 1.0, 0.5, unused, unused, unused)
+
+
+@pytest.mark.parametrize(
+    "errors", [[0.0] * (ROWS - 1) + [1.0], [1e-3] * ROWS, [10.0 ** (-0.4 * k) for k in range(ROWS)], [0.02]]
+)
+def test_names_cover_neither_each_other_nor_the_panel(errors: list[float]) -> None:
+    figure = trade.figure(_trade(errors))
+    axes = figure.axes[0]
+    names = [text for text in axes.texts if isinstance(text, Annotation)]
+    assert [name.get_text() for name in names] == [f"fidelity {k}, 720 steps" for k in range(len(errors))]
+    canvas = cast(FigureCanvasAgg, figure.canvas)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    # the box of the words, without the line that leads to the dot
+    places = [Text.get_window_extent(name, renderer) for name in names]
+    assert not any(one.overlaps(other) for one, other in combinations(places, 2))
+    panel = axes.get_window_extent()
+    assert all(box.x0 > panel.x1 and box.x1 < figure.bbox.x1 for box in places)
+
+
+def test_names_stand_in_the_order_of_their_errors() -> None:
+    errors = [1e-2, 1e-5, 1e-2, 1e-4, 0.5]
+    figure = trade.figure(_trade(errors))
+    heights = {error: text.xyann[1] for error, text in zip(errors, figure.axes[0].texts, strict=True)}
+    assert all(heights[low] < heights[high] for low, high in pairwise(sorted(heights)))
