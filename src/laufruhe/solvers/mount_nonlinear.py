@@ -17,7 +17,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.phasing import Candidate
 from laufruhe.solvers.accuracy import sampling_error
-from laufruhe.solvers.certificate import Certificate, Proof, gap_scale
+from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.domain import domains_of
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mount_program import JointProgram
@@ -265,13 +265,13 @@ def _result(
     timing: dict[str, float],
 ) -> Result:
     objective = objective_of(problem, initial, design.evaluation)
-    scale = gap_scale(design.value, objective.initial) if objective else 1.0
+    scale = gap_unit(design.value, objective.initial) if objective else 1.0
     # throws that move are not in the bound
     met = design.excess <= 10.0 * FEASIBLE
     divided = Divided(_bound(problem) if joint.moves is None else 0.0, 0)
     if joint.moves is None and met and divides(problem):
         divided = divided_bound(problem, design.value, problem.tolerance * scale, divided.bound)
-    gap = max(design.value - divided.bound, 0.0) / (scale or 1.0)
+    gap = max(design.value - divided.bound, 0.0) / scale
     certificate = Certificate(
         _proof(gap, problem.tolerance, divided), divided.bound, gap, best.kkt_residual,
         _method(optima, scale, proven, divided),
