@@ -91,12 +91,10 @@ def divided_bound(problem: Problem, value: float, room: float, floor: float = 0.
         halves: list[tuple[Array, Array, float]] = []
         while heap and heap[0][0] < enough and len(halves) < search.at_once:
             known, _, low, high, side = heapq.heappop(heap)
-            middle = 0.5 * (low[side] + high[side])
-            for one, other in ((None, middle), (middle, None)):
-                below, above = low.copy(), high.copy()
-                below[side] = low[side] if one is None else one
-                above[side] = high[side] if other is None else other
-                halves.append((below, above, known))
+            here = np.arange(len(low)) == side
+            middle = 0.5 * (low + high)
+            halves.append((low, np.where(here, middle, high), known))
+            halves.append((np.where(here, middle, low), high, known))
         lows, highs = (np.array([half[k] for half in halves]) for k in (0, 1))
         bounds, sides = search.bounds(lows, highs)
         for (low, high, known), bound, side in zip(halves, bounds, sides, strict=True):
