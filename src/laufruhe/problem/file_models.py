@@ -368,6 +368,9 @@ class SearchTable(Table):
 
     starts: int = Field(default=16, ge=1, le=10_000)
     seed: int = Field(default=0, ge=0)
+    boxes: int | None = Field(
+        default=None, ge=0, le=1_000_000, description="That bounds of stiffness may be divided into for a proof."
+    )
 
 
 class ProblemFile(Table):

@@ -47,6 +47,8 @@ def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many
         from laufruhe.solvers.mount_stars import solve_star_mounts
 
         return solve_star_mounts(problem, say)
+    if problem.phasing is None and not problem.decisions and not problem.mount_design.decisions:
+        return state(problem)
     if problem.mount_design.asked:
         from laufruhe.solvers.mounts import solve_mounts
 

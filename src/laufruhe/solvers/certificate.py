@@ -27,7 +27,8 @@ FLOOR = 1e-3
 
 def gap_unit(value: float, given: float) -> float:
     """What a gap of an objective is counted in, beside that of the design as given; never zero."""
-    return max(value, FLOOR * given) or 1.0
+    # a design as given that stands on a resonance has no size
+    return max(value, FLOOR * given if math.isfinite(given) else 0.0) or 1.0
 
 
 class Proof(StrEnum):
@@ -64,11 +65,6 @@ class Certificate:
     gap: float
     kkt_residual: float
     method: str
-
-
-def gap_scale(value: float, given: float) -> float:
-    """What a gap is relative to: the objective, or a thousandth of that of the design as given if it has one."""
-    return max(abs(value), 1e-3 * abs(given) if math.isfinite(given) else 0.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,7 +38,7 @@ from laufruhe.problem.mount_design import (
 )
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.mount_values import excess, whole_objective
-from laufruhe.solvers.certificate import Certificate, Proof, gap_scale
+from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.mount_result import FEASIBLE, infeasible_mounts, mount_result
 from laufruhe.solvers.result import Result
 
@@ -307,7 +307,7 @@ def solve_convex_mounts(problem: Problem) -> Result:
     final = evaluate(problem, problem.design(problem.start, [float(v) for v in x]))
     value, given = whole_objective(problem, final), whole_objective(problem, initial)
     bound = float(max(bound, 0.0))
-    gap = float(max(value - bound, 0.0) / max(gap_scale(value, given), 1e-300))
+    gap = float(max(value - bound, 0.0) / gap_unit(value, given))
     worst = max((excess(limit, final) for limit in problem.mount_design.limits), default=0.0)
     proven = gap <= problem.tolerance and worst <= FEASIBLE
     certificate = Certificate(

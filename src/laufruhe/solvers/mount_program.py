@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from laufruhe.errors import ModelError
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.modes import weight_wrench
@@ -51,6 +52,8 @@ Array = NDArray[np.float64]
 SOFTNESS = (1e-2, 1e-4, 1e-7)
 # bounds of a stiffness that are further apart leave a start no place between them
 WIDE = 100.0
+# orders that a complaint names
+MOST_NAMED = 6
 # a typical deviation of a throw [rad]
 TURN = 0.1
 
@@ -243,6 +246,10 @@ class JointProgram:
             numbers = self.problem.mount_design.numbers_at([self._d[k] for k in range(self._count)])
             return sum((k for row in numbers for k in row[:3]), ca.MX(0.0))
         pairs = self._transmitted(quantity)
+        if not pairs:
+            felt = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
+            there = ", ".join(f"{order:g}" for order in felt[:MOST_NAMED]) or "none"
+            raise ModelError(f"nothing is to be felt of {quantity.name}; name an order that is there: {there}")
         ratios = [ca.sqrt(force / firm) for force, firm in pairs]
         top = self._top(ca.mmax(ca.vertcat(*ratios)))
         for force, firm in pairs:
