@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from _pytest.mark.structures import ParameterSet
 
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
-from laufruhe.machine import Cycle, Seiliger
+from laufruhe.machine import Cycle, PressureTrace, Seiliger
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.reader import load
 
@@ -261,8 +262,10 @@ BAD = [
         'objective.mounts = "mount 5": is no mount'),
     bad("unknown operating point", '"mean mount force"', "\"mean mount force\"\noperating_points = [\"idle\"]",
         'objective.operating_points = "idle": is no operating point here'),
+    bad("mass without a unit", 'max = "4 kg"', "max = 4",
+        'constraints[1].max = "4": has no unit, a mass needs one; write for example "1.25 kg"'),
     bad("weights of a moment", '"mean mount force"', "\"mean roll moment\"\ndirection_weights = [1, 1, 0]",
-        "objective.mounts: goes with mount forces and travels only; leave it out"),
+        "objective.direction_weights: goes with mount forces and travels only; leave it out"),
     bad("gas without bore", "bore = \"100 mm\"\n", "",
         "engine.bore: is missing, and gas acts on it; add it"),
     bad("unknown gas model", '"seiliger"', '"seliger"',
@@ -382,6 +385,13 @@ class TestOnEvaluation:
 class TestOperatingPoints:
     """What the gas does at one of them."""
 
+    def test_what_cannot_be_reached_says_where(self, tmp_path: Path) -> None:
+        text = changed(
+            WHOLE, "[gas]", '[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\nimep = "0.1 bar"\n[gas]'
+        )
+        with pytest.raises(ModelError, match=r"^at idle: imep 0\.1 bar cannot be reached"):
+            evaluate(load(written(tmp_path, text)))
+
     def test_motored_compresses_and_burns_nothing(self, tmp_path: Path) -> None:
         gas = load(written(tmp_path, changed(WHOLE, "[gas]", "motored = true\n[gas]"))).points[0].gas
         assert isinstance(gas, Seiliger)
@@ -410,6 +420,29 @@ class TestTrace:
         evaluation = evaluate(problem)
         assert evaluation.loads[0].wrench.coefficients[0, 3].real != 0.0
 
+    @pytest.mark.parametrize("change", [
+        lambda text: text.replace(",", ";"),
+        lambda text: text.replace(",", ";").replace(".", ","),
+        lambda text: text.replace(",", "\t"),
+        lambda text: "\ufeff" + text,
+        lambda text: "\ufeff# test bench 3; 2500 rpm\n" + text.replace(",", ";"),
+        lambda text: text.replace("\n", "\r\n"),
+    ])  # fmt: skip
+    def test_as_spreadsheets_write_it(self, change: Callable[[str], str], tmp_path: Path) -> None:
+        """Semicolons, decimal commas, tabs, a byte order mark and notes say the same."""
+        headless = rows(360).split("\n", 1)[1]
+        plain = load(trace(tmp_path, headless)).points[0].gas
+        assert isinstance(plain, PressureTrace)
+        assert len(plain.angles) == 72
+        assert load(trace(tmp_path, change(headless))).points[0].gas == plain
+
+    @pytest.mark.parametrize("key", ["angle_unit", "pressure_unit"])
+    def test_wrong_unit(self, key: str, tmp_path: Path) -> None:
+        path = trace(tmp_path, rows(360))
+        text = path.read_text(encoding="utf-8")
+        path.write_text(changed(text, '"trace"', f'"trace"\n{key} = "parsec/s"'), encoding="utf-8")
+        assert complaint_about(path).startswith(f'gas.{key} = "parsec/s": ')
+
     def test_part_of_the_cycle(self, tmp_path: Path) -> None:
         """One turn of a four-stroke's two is not enough."""
         problem = load(trace(tmp_path, rows(360), "four-stroke"))
@@ -421,8 +454,8 @@ class TestTrace:
     @pytest.mark.parametrize(
         ("content", "said"),
         [
-            ("angle,pressure\n0,1\n5,one\n", 'gas.file = "pressure.csv": row 3 is no pair of numbers; write'),
-            ("0,1\n5\n", 'gas.file = "pressure.csv": row 2 is no pair of numbers; write'),
+            ("angle,pressure\n0,1\n5,one\n", 'gas.file = "pressure.csv": line 3 is no pair of numbers; write'),
+            ("0,1\n5\n", 'gas.file = "pressure.csv": line 2 is no pair of numbers; write'),
             ("", "gas: the trace has 0 points, too few for a cycle; give one every few degrees"),
             (
                 "0,1\n90,2\n80,1\n270,1\n",

@@ -10,6 +10,7 @@ mount beyond its gap (E27).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 STEPS_PER_PERIOD = 24
 MOST_SHOTS = 60
 CLOSED = 1e-9
+# what integration over a period makes of its tolerance
+ROUNDING = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,29 +167,35 @@ def periodic_state(
         load = (np.exp(1j * orders * speed * t) @ loads).real[:, None]
         return np.concatenate([rate, model.accelerations(y, rate, load)]).reshape(-1)
 
-    def run(start: Array, times: Array | None = None) -> Array:
+    # what an even star cancels leaves a shorter period, which closes faster and farther from any resonance
+    shortest = period / (math.gcd(*np.flatnonzero(loaded).tolist()) or 1)
+
+    def run(start: Array, until: float, times: Array | None = None) -> Array:
         columns = start.shape[1]
         scale = float(np.abs(start).max(initial=0.0)) or 1e-6
         found = solve_ivp(
-            rates, (0.0, period), start.reshape(-1), "DOP853", t_eval=times, args=(columns,), rtol=tolerance,
-            atol=tolerance * min(scale, 1e-3), max_step=period / 64,
+            rates, (0.0, until), start.reshape(-1), "DOP853", t_eval=times, args=(columns,), rtol=tolerance,
+            atol=tolerance * min(scale, 1e-3), max_step=until / 64,
         )  # fmt: skip
         return np.asarray(found.y if times is not None else found.y[:, -1].reshape(12, columns))
 
     size = _static_size(model, loads)
     start, step = np.zeros(12), size * 1e-4
     for _ in range(MOST_SHOTS):
-        ends = run(start[:, None] + np.column_stack([np.zeros(12), step * np.eye(12)]))
+        ends = run(start[:, None] + np.column_stack([np.zeros(12), step * np.eye(12)]), shortest)
         slope = (ends[:, 1:] - ends[:, :1]) / step
         gap = ends[:, 0] - start
         change = np.linalg.solve(np.eye(12) - slope, gap)
         start = start + change
-        if np.abs(change).max() <= CLOSED * max(np.abs(start).max(), size):
+        whole = max(np.abs(start).max(), size)
+        # a gap of the integration's own rounding cannot be closed, only moved
+        if np.abs(change).max() <= CLOSED * whole or np.abs(gap).max() <= ROUNDING * tolerance * whole:
             break
     else:
-        raise SolverError("the bump stops let no motion repeat itself in one period; integrate a run-up instead")
+        why = "the bump stops let no motion" if model.has_stops else "no motion was found to"
+        raise SolverError(f"{why} repeat itself in one period; integrate a run-up instead")
     times = np.arange(samples + 1) * (period / samples)
-    states = run(start[:, None], np.minimum(times, period))
+    states = run(start[:, None], period, np.minimum(times, period))
     y, rate = states[:6, :-1], states[6:, :-1]
     mismatch = float(np.abs(states[:, -1] - start).max() / max(np.abs(states).max(), 1e-300))
     travels = (model.travels @ y).T.reshape(samples, -1, 3)

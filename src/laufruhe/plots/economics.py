@@ -41,9 +41,8 @@ def economics(data: xr.Dataset) -> Figure:
 
 
 def _source(data: xr.Dataset) -> str:
-    return (
-        f"{data.attrs['source']}. Computed with Laufruhe; filled dots: no other point has less force, mass and shafts."
-    )
+    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
+    return f"{source}Computed with Laufruhe; filled dots: no other point has less force, mass and shafts."
 
 
 def _colours(data: xr.Dataset) -> dict[str, str]:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, BeforeValidator, GetCoreSchemaHandler, GetJsonSchemaHandler, WithJsonSchema
 from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
@@ -178,6 +178,11 @@ def _turning(ratio: float) -> float:
     return ratio
 
 
+def _side(given: Any) -> Any:
+    """A bare number as text: which unit is missing, if any, is known with the quantity."""
+    return repr(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
+
+
 _DEG = math.radians(1.0)
 
 Length: TypeAlias = Annotated[float, Quantity("m")]
@@ -209,4 +214,7 @@ OpenLossFactor: TypeAlias = Annotated[float | Open, Quantity("", least=0.0, most
 OpenLength: TypeAlias = Annotated[float | Open, Quantity("m", openable=True)]
 OpenStiffness: TypeAlias = Annotated[float | Open, Quantity("N/m", least=0.0, openable=True)]
 OpenDamping: TypeAlias = Annotated[float | Open, Quantity("N s/m", least=0.0, openable=True)]
+Side: TypeAlias = Annotated[
+    str, BeforeValidator(_side), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
+]
 Throws: TypeAlias = Annotated[list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]")]

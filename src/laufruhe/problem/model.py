@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -94,7 +95,7 @@ class Limit:
     maximum: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Problem:
     """Everything that a solver and a report need to know.
 
@@ -138,6 +139,28 @@ class Problem:
     mount_design: MountDesign = NOTHING_ASKED
     phasing: Phasing | None = None
 
+    def __repr__(self) -> str:
+        return f"<Problem {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        return f"<strong>{html.escape(self.title)}</strong><br>{html.escape(self.summary)}"
+
+    @property
+    def summary(self) -> str:
+        """What the problem is about and what of it is open, in one line."""
+        engine = self.engine
+        parts = [
+            self.name,
+            f"{len(engine.slider_cranks)} cylinder(s), {engine.cycle}",
+            f"{len(engine.mounts)} mount(s)",
+            f"{len(self.points)} operating point(s)",
+            f"{len(self.limits) + len(self.mount_design.limits)} constraint(s)",
+        ]
+        names = list(self.phasing.open_names) if self.phasing is not None else []
+        names += [decision.name + ("" if decision.fixed_angle else " and angle") for decision in self.decisions]
+        names += [decision.name for decision in self.mount_design.decisions]
+        return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
+
     @property
     def start(self) -> tuple[complex, ...]:
         """Decisions of the design as given."""
@@ -162,10 +185,12 @@ class Problem:
 
     @property
     def objective_unit(self) -> str | None:
-        """SI unit of what is minimised, of its first term; None where nothing is."""
-        units = [term.quantity.unit for term in self.objective]
-        units += [quantity.unit for quantity, _ in self.mount_design.terms]
-        return units[0] if units else None
+        """SI unit of what is minimised, empty where its terms have several; None where nothing is."""
+        units = {term.quantity.unit for term in self.objective}
+        units |= {quantity.unit for quantity, _ in self.mount_design.terms}
+        if not units:
+            return None
+        return units.pop() if len(units) == 1 else ""
 
     def at(self, fidelity: Fidelity) -> Problem:
         """The same problem at another fidelity, every design of an open star included."""

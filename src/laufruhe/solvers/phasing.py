@@ -118,7 +118,7 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
         best.result,
         problem=replace(best.result.problem, phasing=phasing),
         status=Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=ObjectiveValue(problem.objective_name, best.value, problem.objective[0].quantity.unit, initial),
+        objective=ObjectiveValue.of(problem, best.value, initial),
         certificate=certificate,
         decisions=(*phase_decisions(problem, phasing, candidate, names), *best.result.decisions),
         initial=replace(given, samples=best.result.final.samples),

@@ -257,7 +257,7 @@ def _triangle(slope: Array) -> Array:
 def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Evaluation) -> Result:
     value, given = objective_value(problem, final), objective_value(problem, initial)
     bound = optimum.bound
-    residual = kkt_residual(optimum.problem, optimum.x, bound)
+    residual = kkt_residual(optimum.problem, optimum.x, bound, gap_unit(value, given))
     certificate = Certificate(
         kind=Proof.GLOBAL if optimum.gap <= problem.tolerance else Proof.WITHIN_GAP,
         lower_bound=bound.value,
@@ -278,7 +278,7 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         else Status.FEASIBLE
         if feasible
         else Status.FAILED,
-        objective=ObjectiveValue(problem.objective_name, value, problem.objective[0].quantity.unit, given),
+        objective=ObjectiveValue.of(problem, value, given),
         certificate=certificate,
         decisions=tuple(
             entry for domain in optimum.problem.domains for entry in decision_values(domain, optimum.x, bound.gradient)

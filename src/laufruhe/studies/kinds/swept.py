@@ -47,7 +47,8 @@ def checked(part: SweptPartTable, scenes: Scenes) -> list[Problem]:
     units = {problem.objective_unit: case for problem, case in zip(found, part.cases, strict=True)}
     if len(units) > 1:
         (one, first_case), (two, second_case) = list(units.items())[:2]
-        rule = f"minimises in {one} in '{first_case.name}' and in {two} in '{second_case.name}'"
+        said = [unit or "several units together" for unit in (one, two)]
+        rule = f"minimises in {said[0]} in '{first_case.name}' and in {said[1]} in '{second_case.name}'"
         raise refused(scenes, part.cases[0], "objective", rule, "give the part one metric")
     return found
 
