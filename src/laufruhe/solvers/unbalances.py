@@ -85,7 +85,7 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     if optimum is None:
         conflict = _conflict(_tightened(model.at(samples), 0.0), [limit.name for limit in problem.limits])
         return _infeasible(problem, conflict, initial, timing)
-    hopeless = _hopeless(problem, optimum) if optimum.excess > KEPT else ()
+    hopeless = _hopeless(problem, optimum)
     if hopeless:
         return _infeasible(problem, hopeless, initial, timing)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
@@ -110,6 +110,8 @@ def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSol
             # fewer angles ask for less: what they cannot meet, all cannot
             return best if best is not None and best.excess <= KEPT else None, samples
         best = found
+        if _hopeless(problem, best):
+            break
         rows = len(best.problem.terms[0][1].weights)
         if (best.gap <= problem.tolerance and best.excess <= FEASIBLE) or rows > MOST_ROWS:
             break
