@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, Engine, Role
+from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Role, Shaft
 from laufruhe.machine.layouts import (
     Layout,
     Mechanism,
@@ -19,6 +20,7 @@ from laufruhe.machine.layouts import (
     boxer,
     build,
     even_throws,
+    facing_pistons,
     firing_angles,
     inline,
     stations,
@@ -86,6 +88,52 @@ class TestPlaces:
         for build_layout, name in ((lambda n: vee(n, 0.1, 1.0), "vee"), (lambda n: boxer(n, 0.1, 0.05), "boxer")):
             with pytest.raises(ModelError, match=f"a {name} needs an even number of cylinders, got {count}"):
                 build_layout(count)
+
+
+class TestOpposedPistons:
+    """Two pistons in one cylinder, the upper crank geared to the lower one."""
+
+    @staticmethod
+    def of(ratio: float, lead: float = 0.0, count: int = 3) -> Engine:
+        throws = even_throws(TWO, inline(count, 0.1), list(range(1, count + 1)))
+        lower, _ = build(TWO, inline(count, 0.1), MECHANISM, throws)
+        upper = facing_pistons(lower, Shaft("upper", ratio, 0.0, 0.6), lead, 0.8)
+        return Engine("opposed", TWO, (*lower, *upper))
+
+    @pytest.mark.parametrize("ratio", [1.0, -1.0])
+    def test_pistons_mirror_each_other(self, ratio: float) -> None:
+        """Whatever the cranks' sense, their inertia is no force and no couple across the engine."""
+        for part in (loads := reciprocating_loads(self.of(ratio), 300.0).coefficients)[:, [0, 1, 2, 4, 5]]:
+            assert np.abs(part).max() <= 1e-12 * 1.25 * 0.06 * 300.0**2
+        assert np.isfinite(loads).all()
+
+    @pytest.mark.parametrize("ratio", [1.0, -1.0])
+    def test_the_upper_crank_leads(self, ratio: float) -> None:
+        """Its pistons come to their inner dead centre by the lead sooner."""
+        engine = self.of(ratio, math.radians(12.0))
+        for low, high in zip(engine.slider_cranks[:3], engine.slider_cranks[3:], strict=True):
+            assert math.degrees(low.firing_angle - high.firing_angle) == pytest.approx(12.0)
+
+    def test_two_pistons_are_one_cylinder(self) -> None:
+        engine = self.of(-1.0)
+        assert engine.cylinders == engine.slider_cranks[:3]
+        assert np.degrees(engine.firing_intervals) == pytest.approx([120.0] * 3)
+
+    def test_what_stands_back_to_back_is_no_cylinder(self) -> None:
+        """Pistons that move away from each other's crank share none: a boxer, and cranks the other way up."""
+        boxed, _ = build(FOUR, boxer(2, 0.1, 0.0), MECHANISM, (math.pi / 2, -math.pi / 2))
+        assert not boxed[0].faces(boxed[1])
+        low, high = (self.of(-1.0).slider_cranks[k] for k in (0, 3))
+        assert low.faces(high)
+        assert high.faces(low)
+        assert not replace(low, shaft=high.shaft).faces(replace(high, shaft=CRANKSHAFT))
+        assert not low.faces(replace(high, shaft=replace(high.shaft, y=0.05)))
+
+    @pytest.mark.parametrize(("ratio", "height"), [(2.0, 0.6), (-1.0, -0.6)])
+    def test_cranks_that_do_not_fit(self, ratio: float, height: float) -> None:
+        lower = self.of(1.0).slider_cranks[:3]
+        with pytest.raises(ModelError, match="opposed-piston"):
+            facing_pistons(lower, Shaft("upper", ratio, 0.0, height))
 
 
 class TestFiring:

@@ -146,9 +146,18 @@ class Engine:
         )
 
     @property
+    def cylinders(self) -> tuple[SliderCrank, ...]:
+        """One slider-crank for each cylinder: of two pistons that face each other the first."""
+        found: list[SliderCrank] = []
+        for part in self.slider_cranks:
+            if not any(part.faces(other) for other in found):
+                found.append(part)
+        return tuple(found)
+
+    @property
     def firing_intervals(self) -> tuple[float, ...]:
         """Crank angles from each firing to the next over a cycle [rad]."""
         whole = self.cycle.turns
-        turns = sorted(within(as_turn(part.firing_angle), whole) for part in self.slider_cranks)
+        turns = sorted(within(as_turn(part.firing_angle), whole) for part in self.cylinders)
         following = [*turns[1:], turns[0] + whole] if turns else []
         return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))

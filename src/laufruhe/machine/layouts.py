@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from laufruhe.errors import ModelError
@@ -311,6 +311,45 @@ def build(
         for k in cylinders
     )
     return slider_cranks, _throws_of(layout, mechanism, angles)
+
+
+def facing_pistons(
+    lower: Sequence[SliderCrank], crank: Shaft, lead: float = 0.0, pin_mass: float = 0.0
+) -> tuple[SliderCrank, ...]:
+    """The second pistons of opposed-piston cylinders, upside down on a crank of their own.
+
+    Parameters
+    ----------
+    lower
+        Upright slider-cranks on the crankshaft, one for each cylinder.
+    crank
+        Above them, geared at a ratio of 1 or -1.
+    lead
+        Crank angle by which its pistons come to their dead centre first [rad].
+    pin_mass
+        What turns at its crank pins beside the rods' shares [kg].
+
+    Raises
+    ------
+    ModelError
+        If the crank does not keep step or does not lie above.
+    """
+    if abs(crank.ratio) != 1.0:
+        raise ModelError(f"an opposed-piston engine needs a crank ratio of 1 or -1, got {crank.ratio:g}")
+    if not crank.z > 0.0:
+        raise ModelError(f"the second crank of an opposed-piston engine lies above the first, not at {crank.z:g} m")
+    return tuple(
+        replace(
+            part,
+            name=f"{part.name} upper",
+            bank=math.pi,
+            throw=math.pi + crank.ratio * (part.throw + lead),
+            rotating_mass=part.rotating_mass + pin_mass,
+            firing_angle=part.firing_angle - lead,
+            shaft=crank,
+        )
+        for part in lower
+    )
 
 
 def _throws_of(layout: Layout, mechanism: Mechanism, angles: Sequence[float]) -> tuple[Throw, ...]:

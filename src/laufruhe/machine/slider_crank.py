@@ -8,7 +8,9 @@ from functools import cached_property
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
-from laufruhe.numerics.turns import Turn, as_turn
+from laufruhe.numerics.turns import Turn, as_turn, cis
+
+_ON_ONE_AXIS = 1e-9
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,13 @@ class SliderCrank:
     def star_turn(self) -> Turn:
         """theta - beta as a part of a turn: the local crank angle at phi = 0 (C5)."""
         return as_turn(self.throw) - as_turn(self.bank)
+
+    def faces(self, other: SliderCrank) -> bool:
+        """Whether two pistons work against each other in one cylinder: on one axis, each towards the other (C5)."""
+        axis, opposite = cis(as_turn(self.bank)), cis(as_turn(other.bank))
+        apart = complex(other.shaft.z - self.shaft.z, other.shaft.y - self.shaft.y) * axis.conjugate()
+        reach = _ON_ONE_AXIS * abs(apart)
+        return self.x == other.x and abs(axis + opposite) < _ON_ONE_AXIS and abs(apart.imag) <= reach < apart.real
 
     @property
     def piston_area(self) -> float:

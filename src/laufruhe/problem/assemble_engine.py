@@ -10,7 +10,7 @@ from typing import Any
 from laufruhe import units
 from laufruhe.machine import CRANKSHAFT, Cycle, OperatingPoint, PressureTrace, Rod, Shaft, SliderCrank
 from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
-from laufruhe.machine.layouts import Layout, Mechanism, Throw, boxer, build, even_throws, inline, vee
+from laufruhe.machine.layouts import Layout, Mechanism, Throw, boxer, build, even_throws, facing_pistons, inline, vee
 from laufruhe.machine.slider_crank import radius_for_stroke
 from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.problem.complaints import Refused, blamed_on, nearest
@@ -26,13 +26,17 @@ from laufruhe.problem.file_models import (
 from laufruhe.problem.read_trace import trace_of
 
 _CYCLES = {str(cycle): cycle for cycle in Cycle}
+_WITH_THROWS = ("inline", "vee", "boxer", "opposed-piston")
 _ONLY_FOR = {
     "bank_angle": ("vee",),
     "split_pin_angle": ("vee",),
     "bank_stagger": ("vee", "boxer"),
-    "cylinder_spacing": ("inline", "vee", "boxer"),
-    "throws": ("inline", "vee", "boxer"),
-    "firing_order": ("inline", "vee", "boxer"),
+    "crank_distance": ("opposed-piston",),
+    "crank_ratio": ("opposed-piston",),
+    "crank_lead": ("opposed-piston",),
+    "cylinder_spacing": _WITH_THROWS,
+    "throws": _WITH_THROWS,
+    "firing_order": _WITH_THROWS,
     "slider_cranks": ("parts",),
     "shafts": ("parts",),
 }
@@ -57,7 +61,22 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     layout = layout_of(table)
     throws = _throws(table, layout)
     with blamed_on("engine.firing_order" if table.given_order else "engine"):
-        return build(cycle_of(table), layout, _mechanism(table), throws, table.given_order)
+        parts, cranks = build(cycle_of(table), layout, _mechanism(table), throws, table.given_order)
+    return (*parts, *_facing(table, parts, gas)) if table.layout == "opposed-piston" else parts, cranks
+
+
+def _facing(table: EngineTable, lower: tuple[SliderCrank, ...], gas: bool) -> tuple[SliderCrank, ...]:
+    """The second pistons of opposed-piston cylinders."""
+    if table.crank_distance is None:
+        raise Refused("engine.crank_distance", None, "is missing", "add the distance between the two cranks")
+    if gas and table.crank_lead:
+        rule = "puts pistons out of step, and gas is known of pistons that mirror each other"
+        raise Refused("engine.crank_lead", units.shown(table.crank_lead, "rad"), rule, "leave it out, or [gas]")
+    if table.offset:
+        rule = "means nothing for pistons on one axis"
+        raise Refused("engine.offset", units.shown(table.offset, "m"), rule, "leave it out")
+    crank = Shaft("second crankshaft", float(table.crank_ratio or -1), 0.0, table.crank_distance)
+    return facing_pistons(lower, crank, table.crank_lead, table.rotating_mass)
 
 
 def layout_of(table: EngineTable) -> Layout:
@@ -69,7 +88,7 @@ def layout_of(table: EngineTable) -> Layout:
             raise Refused("engine.cylinder_spacing", None, "is missing", 'add it, for example "125 mm"')
         spacing = 1.0
     with blamed_on("engine.cylinders"):
-        if table.layout == "inline":
+        if table.layout in ("inline", "opposed-piston"):
             return inline(count, spacing)
         if table.layout == "boxer":
             if table.bank_stagger is None:

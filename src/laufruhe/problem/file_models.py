@@ -64,7 +64,7 @@ class SliderCrankTable(Table):
 class EngineTable(Table):
     """What the engine is."""
 
-    layout: Literal["inline", "vee", "boxer", "parts"]
+    layout: Literal["inline", "vee", "boxer", "opposed-piston", "parts"]
     cycle: Literal["two-stroke", "four-stroke"]
     cylinders: Count | None = Field(default=None, description="Told by throws or firing order where left out.")
     bore: f.PositiveLength | None = Field(default=None, description="Needed with gas.")
@@ -84,6 +84,11 @@ class EngineTable(Table):
     bank_angle: f.OpenAngle | None = Field(default=None, description="Between the banks of a vee.")
     split_pin_angle: f.OpenAngle | None = Field(default=None, description="By which the right bank's pin leads.")
     bank_stagger: f.Length | None = None
+    crank_distance: f.PositiveLength | None = Field(default=None, description="Of the two cranks of opposed pistons.")
+    crank_ratio: Literal[1, -1] | None = Field(
+        default=None, description="Of the second crank of opposed pistons; -1, against the first, where left out."
+    )
+    crank_lead: f.Angle = Field(default=0.0, description="By which the second crank of opposed pistons leads.")
     throws: f.Throws | None = Field(default=None, description="At phi = 0; even firing where left out.")
     firing_order: FiringOrder | None = None
     shafts: list[ShaftTable] = Field(default_factory=list)

@@ -151,7 +151,7 @@ class Problem:
         engine = self.engine
         parts = [
             self.name,
-            f"{len(engine.slider_cranks)} cylinder(s), {engine.cycle}",
+            f"{len(engine.cylinders)} cylinder(s), {engine.cycle}",
             f"{len(engine.mounts)} mount(s)",
             f"{len(self.points)} operating point(s)",
             f"{len(self.limits) + len(self.mount_design.limits)} constraint(s)",

@@ -70,7 +70,7 @@ def opened(file: ProblemFile, assemble: Assemble) -> Problem:
         firing_order=None if engine.given_order is None else tuple(engine.given_order),
         bank=_bounds(engine.bank_angle),
         split=_bounds(engine.split_pin_angle) if engine.layout == "vee" else None,
-        intervals=_intervals(table, cycle, count),
+        intervals=_intervals(table, cycle, count, _throw_bounds(engine) is not None),
         realise=lambda candidate: _without(assemble(_with(file, count, candidate)), candidate.left_out),
         steps=table.phases,
         shafts=_shaft_choice(file.balancer_shafts, table),
@@ -138,11 +138,12 @@ def _bounds(value: float | Open | None) -> tuple[float, float] | None:
     return (value.lower, value.upper) if isinstance(value, Open) else (value, value)
 
 
-def _intervals(table: PhasingTable, cycle: Cycle, count: int) -> Intervals:
+def _intervals(table: PhasingTable, cycle: Cycle, count: int, bounded: bool) -> Intervals:
     even = cycle.angle / count
     given = table.intervals
     if given is None:
-        return Intervals(even, even)
+        # throws with bounds of their own need no others
+        return Intervals(0.0, cycle.angle) if bounded else Intervals(even, even)
     low = given.min if given.min is not None else 0.0
     high = given.max if given.max is not None else cycle.angle
     if given.min is None and given.max is None and given.largest_deviation is None:

@@ -179,7 +179,7 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> Front:
         ),
         optimum=optimum,
         shafts=len(shafts_of(problem)),
-        cylinders=len(problem.engine.slider_cranks),
+        cylinders=len(problem.engine.cylinders),
         objective=problem.objective_name,
         unit=problem.objective_unit or "",
     )

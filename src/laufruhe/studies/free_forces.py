@@ -84,7 +84,7 @@ def layout(engine: Engine, spacing: float) -> Layout:
     """Free loads of the orders 1 and 2, couples in units of a spacing [m]."""
     loads = tuple(free_load(engine, order, spacing) for order in ORDERS)
     intervals = engine.firing_intervals
-    return Layout(loads, (min(intervals), max(intervals)), len(engine.slider_cranks))
+    return Layout(loads, (min(intervals), max(intervals)), len(engine.cylinders))
 
 
 def compared(layouts: Mapping[str, Layout], literature: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
