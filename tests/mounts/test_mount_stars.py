@@ -170,6 +170,30 @@ def test_the_program_of_moved_throws_says_what_the_exact_model_says(quantity, tm
         assert sorted(rows) == pytest.approx(sorted(exact.engine.firing_intervals), abs=1e-9)
 
 
+@pytest.mark.parametrize("quantity", ["mean mount force", "rms mount force", "rms roll moment"])
+def test_the_program_of_moved_throws_has_the_gas_of_the_exact_model(quantity, tmp_path):
+    gas = '[gas]\nmodel = "seiliger"\npeak_pressure = "60 bar"\nimep = "8 bar"\n'
+    objective = changed(FORCE, ("mean mount force", quantity))
+    engine, *rest = parts(objective=objective)
+    engine = changed(engine, ("[[operating_points]]", 'bore = "85 mm"\n[[operating_points]]'))
+    phasing = problem_of(tmp_path, engine, *rest, gas, UNEVEN).phasing
+    star = Candidate((0.0, math.pi, math.pi, 0.0), (1, 3, 4, 2))
+    own = replace(phasing.realise(star), phasing=None)
+    moves = ThrowMoves(phasing, phasing.layout(None, None), star, phasing.intervals)
+    joint = JointProgram(own, moves=moves)
+    value = ca.Function("f", [joint.program.x, joint.program.parameters], [joint.program.objective])
+    generator = np.random.default_rng(6)
+    for _ in range(2):
+        turns = generator.uniform(-0.07, 0.07, moves.size)
+        mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_design.decisions]
+        x = joint.start(mounts, np.array([0.5]), turns)
+        moved = joint.designed(x)
+        given, unbalances = joint.split(x)
+        exact = evaluate(moved, moved.design(unbalances, given))
+        assert max(abs(loads.wrench.at(0.5)[3]) for loads in exact.loads) > 0.5
+        assert float(value(x, 1e-9)) == pytest.approx(whole_objective(moved, exact), rel=2e-3)
+
+
 def test_throws_between_bounds_of_their_own_are_decided_with_the_mounts(tmp_path):
     throws = "[0, { between = [160, 200] }, { between = [160, 200] }, { between = [-15, 15] }]"
     phasing = '[phasing]\nintervals = { largest_deviation = "25 deg" }\n'

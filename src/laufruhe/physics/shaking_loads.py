@@ -170,19 +170,27 @@ def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
 
 def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
     """Roll moment of the gas, the reaction to its crank torque (L5; eq. 1). No net force."""
-    turns, samples = engine.cycle.turns, fidelity.gas_steps
+    turns = engine.cycle.turns
     # equal mechanisms differ only in when they fire
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
     for part in engine.slider_cranks:
         alike[part.crank_radius, part.rod_length, part.offset, part.bore, part.shaft.ratio].append(part)
     total = Spectrum(engine.cycle.base_order, np.zeros((1, 6), dtype=complex))
     for parts in alike.values():
-        torque = spectrum_of(gas_torque(gas, parts[0], engine.cycle, samples), engine.cycle.base_order)
+        torque = gas_coefficients(gas, parts[0], engine.cycle, fidelity)
         delays: list[Turn] = [-as_turn(part.firing_angle) / turns for part in parts]
         multiples = np.arange(len(torque.coefficients))
         star = star_sum(np.tile(_ROLL, (len(parts), 1)), delays, multiples)
         total = total + Spectrum(engine.cycle.base_order, torque.coefficients[:, None] * star)
     return total
+
+
+def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Roll moment of one cylinder's gas [N m] by order, from its firing dead centre on (L5), shape (n,).
+
+    A cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
+    """
+    return spectrum_of(gas_torque(gas, part, cycle, fidelity.gas_steps), cycle.base_order)
 
 
 def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.artist import Artist
@@ -21,8 +21,13 @@ from matplotlib.figure import Figure
 from laufruhe.report.measures import changed, load_designs
 from laufruhe.solvers.result import Result
 
-# Okabe and Ito's blue beside a grey of clearly other lightness: told apart by every eye and in print.
-BEFORE, AFTER = "#8a8a8a", "#0072B2"
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Okabe and Ito: told apart by every eye, and by their lightness in print
+GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
+PURPLE, PALE = "#CC79A7", "#8fc4e8"
+BEFORE, AFTER = GREY, BLUE
 INK, FAINT = "#222222", "#666666"
 DPI = 150
 LEFT, RIGHT, TOP, BOTTOM = 0.85, 0.3, 1.2, 0.85
@@ -123,6 +128,12 @@ def source_line(result: Result, note: str = "") -> str:
     problem = result.problem
     described = f"Engine: {problem.source}. " if problem.source else ""
     return f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
+
+
+def credit(data: xr.Dataset, note: str = "") -> str:
+    """Source line of a study's dataset."""
+    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
+    return f"{source}{note}Computed with Laufruhe."
 
 
 def fitted(text: str, inches: float, points: float) -> str:

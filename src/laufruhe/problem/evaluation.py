@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.mixed_norms import Norm, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base
@@ -135,9 +136,16 @@ def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None
         If the engine drives a direction that no mount carries.
     """
     engine = problem.engine if engine is None else engine
-    wrenches = [(point, shaking_loads(engine, point, problem.fidelity)) for point in problem.points]
+    wrenches = [(point, _wrench(engine, point, problem.fidelity)) for point in problem.points]
     loads = _on_mounts(engine, problem.fidelity, wrenches)
     return Evaluation(engine, problem.fidelity, loads, samples or problem.fidelity.samples)
+
+
+def _wrench(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    try:
+        return shaking_loads(engine, point, fidelity)
+    except ModelError as error:
+        raise ModelError(f"at {point.name}: {error}") from None
 
 
 def remounted(evaluation: Evaluation, engine: Engine) -> Evaluation:

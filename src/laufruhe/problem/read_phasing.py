@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from laufruhe import units
 from laufruhe.machine import Cycle
-from laufruhe.machine.firing import NoEvenStarError, even_orders, even_patterns, firing_lattice, star_throws
+from laufruhe.machine.firing import (
+    MOST_ORDERS,
+    NoEvenStarError,
+    even_orders,
+    even_patterns,
+    firing_lattice,
+    firing_turns,
+    intervals_of,
+    lap_orders,
+    star_throws,
+)
 from laufruhe.machine.layouts import Layout
 from laufruhe.problem.assemble_engine import cycle_of, layout_of
 from laufruhe.problem.complaints import Refused
@@ -16,9 +27,11 @@ from laufruhe.problem.fields import Open
 from laufruhe.problem.file_models import BalancerShaftTable, EngineTable, PhasingTable, ProblemFile
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Intervals, Method, OrderCriterion, Phasing, ShaftChoice
-from laufruhe.problem.quantity import Subject
 
 Assemble = Callable[[ProblemFile], Problem]
+
+# what fires sooner after another fires with it [rad]
+SOONEST = 1e-8
 
 
 def is_open(file: ProblemFile) -> bool:
@@ -68,18 +81,17 @@ def opened(file: ProblemFile, assemble: Assemble) -> Problem:
     )
     _check(phasing, engine)
     problem = replace(phasing.realise(_first(phasing)), phasing=phasing)
-    _check_gas(problem, phasing)
+    _check_speed(problem, phasing)
     return problem
 
 
-def _check_gas(problem: Problem, phasing: Phasing) -> None:
-    """Uneven firing changes what gas does, and the smooth program knows inertia only."""
-    quantities = [term.quantity for term in problem.objective] + [limit.quantity for limit in problem.limits]
-    felt = any(quantity.subject in (Subject.MOUNT_FORCE, Subject.ROLL_MOMENT) for quantity in quantities)
-    if phasing.continuous and felt and any(point.gas is not None for point in problem.points):
+def _check_speed(problem: Problem, phasing: Phasing) -> None:
+    """The smooth program of uneven throws knows a crank that turns evenly (S19)."""
+    if phasing.continuous and problem.fidelity.is_uneven:
         raise Refused(
-            "gas", None, "acts on what is minimised or limited, and uneven throws are decided by inertia alone",
-            "leave [gas] out, or ask for shaking force and rocking couple",
+            "fidelity.crank_inertia", f"{problem.fidelity.crank_inertia:g} kg m^2",
+            "makes the crank's speed uneven, and throws that leave the even steps are decided at an even one",
+            "leave it out, or fix the throws",
         )  # fmt: skip
 
 
@@ -213,7 +225,7 @@ def _first(phasing: Phasing) -> Candidate:
             return Candidate(given, phasing.firing_order, bank, split)
         if phasing.throw_bounds is not None:
             middle = tuple(0.5 * (low + high) for low, high in phasing.throw_bounds)
-            return Candidate(middle, None, bank, split)
+            return Candidate(middle, _most_even(phasing, layout, middle), bank, split)
         try:
             pattern = even_patterns(phasing.cycle, layout)[0]
         except NoEvenStarError:
@@ -227,6 +239,18 @@ def _first(phasing: Phasing) -> Candidate:
     bank, split = _low(phasing.bank), _low(phasing.split)
     count = len(phasing.layout(bank, split).throw_positions)
     return Candidate(tuple(math.tau * k / count for k in range(count)), None, bank, split)
+
+
+def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> tuple[int, ...] | None:
+    """The firing order given, or that of the most even intervals; None if these throws cannot fire so."""
+    given = phasing.firing_order
+    orders = lap_orders(phasing.cycle, layout, throws) if given is None else [given]
+    found = []
+    for order in itertools.islice(orders, MOST_ORDERS):
+        intervals = intervals_of(phasing.cycle, firing_turns(layout, throws, order))
+        if min(intervals) > SOONEST:
+            found.append((round(max(intervals) - min(intervals), 9), order))
+    return min(found)[1] if found else None
 
 
 def _of_order(phasing: Phasing, layout: Layout) -> tuple[float, ...]:

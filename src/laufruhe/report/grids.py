@@ -74,7 +74,7 @@ def priced(price: float, unit: str, of: str) -> str:
     if not price:
         return DASH
     (name, factor), (of_name, of_factor) = readable(unit), readable(of)
-    units = f"{name or '1'} per {of_name}" if of_name else name
+    units = f"{name} per {of_name}".strip() if of_name else name
     return f"{number(price * factor / of_factor)} {units}".rstrip()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from laufruhe.report.wording import percent
 from laufruhe.units import readable
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
     best = settled(best, given)
     proof, status = str(row["proof"].item()), str(row["status"].item())
     decided = proof != "as given"
-    change = f"{100.0 * (best / given - 1.0):+.1f} %" if decided and given and best == best else NOTHING
+    change = percent(best / given - 1.0) if decided and given and best == best else NOTHING
     cells = [_cell(row[name].item()) for name in columns]
     cells += [number(given), number(best) if decided else NOTHING, number(bound), change]
     if row.sizes["mount"]:

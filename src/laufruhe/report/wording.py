@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from laufruhe.problem.model import Problem
 from laufruhe.report.measures import breaks_a_limit, changed
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.result import DecisionValue, Result, Status
@@ -64,22 +63,6 @@ def figure(value: float, unit: str, digits: int = 4, scale: float = 0.0) -> str:
 def percent(share: float) -> str:
     """A change as a reader expects it: with its sign."""
     return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH
-
-
-def one_line(problem: Problem) -> str:
-    """What a problem is about, for the screen."""
-    engine = problem.engine
-    parts = [
-        problem.name,
-        f"{len(engine.slider_cranks)} cylinder(s), {engine.cycle}",
-        f"{len(engine.mounts)} mount(s)",
-        f"{len(problem.points)} operating point(s)",
-        f"{len(problem.limits) + len(problem.mount_design.limits)} constraint(s)",
-    ]
-    names = list(problem.phasing.open_names) if problem.phasing is not None else []
-    names += [decision.name + ("" if decision.fixed_angle else " and angle") for decision in problem.decisions]
-    names += [decision.name for decision in problem.mount_design.decisions]
-    return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
 
 
 def headline(result: Result) -> str:

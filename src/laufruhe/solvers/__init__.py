@@ -41,6 +41,8 @@ def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many
     """
     if problem.mount_design.decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
+    if problem.phasing is None and not (problem.decisions or problem.mount_design.decisions):
+        return state(problem)
     if problem.phasing is not None and problem.mount_design.asked:
         from laufruhe.solvers.mount_stars import solve_star_mounts
 

@@ -98,7 +98,7 @@ class FixedThrows:
 
 
 class MovedThrows:
-    """Smooth in throws, bank and split pin as well; of inertia alone."""
+    """Smooth in throws, bank and split pin as well (S19, S23)."""
 
     def __init__(
         self, problem: Problem, fixed: FixedThrows, moves: ThrowMoves, model: UnevenModel, turns: Any, unbalances: Any
@@ -112,7 +112,7 @@ class MovedThrows:
         return [self._wrenches_at(point, moved) for point in self._problem.points]
 
     def _wrenches_at(self, point: OperatingPoint, moved: Array) -> SymbolicLoads:
-        found = sorted(self._model.wrench(point.speed, self._at).items())
+        found = sorted(self._model.wrench(point, self._at).items())
         parts = [ca.DM(moved) @ ca.horzcat(*(wrench[:, side] for _, wrench in found)) for side in (0, 1)]
         sizes = self._sizes(parts)
         kept = [int(k) for k in _felt(sizes, np.array([h for h, _ in found]))]

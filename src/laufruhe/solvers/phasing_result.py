@@ -57,9 +57,7 @@ def final_result(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         result,
         problem=replace(chosen, phasing=phasing),
         status=status,
-        objective=ObjectiveValue(
-            problem.objective_name, value, problem.objective[0].quantity.unit, objective_value(problem, initial)
-        ),
+        objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
         certificate=certificate,
         decisions=(*phase_decisions(problem, phasing, candidate, shafts), *result.decisions),
         initial=initial,

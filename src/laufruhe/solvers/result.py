@@ -72,6 +72,11 @@ class ObjectiveValue:
     unit: str
     initial: float
 
+    @classmethod
+    def of(cls, problem: Problem, value: float, initial: float) -> ObjectiveValue:
+        """What a problem minimises, of a design and of the one given [SI]."""
+        return cls(problem.objective_name, value, problem.objective_unit or "", initial)
+
     @property
     def reduction(self) -> float:
         """Share by which the initial value fell; not a number where that is infinite."""

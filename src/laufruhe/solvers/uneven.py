@@ -19,6 +19,7 @@ from laufruhe.machine.firing import firing_turns, intervals_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Intervals, OrderCriterion, Phasing
+from laufruhe.problem.quantity import ON_MOUNTS, Subject
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.nonlinear import solve_nonlinear
 from laufruhe.solvers.phasing_result import no_result, phase_decisions, solve_fixed
@@ -26,13 +27,14 @@ from laufruhe.solvers.ranking import PhasingResult, RankedStar, TradePoint, rank
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_objective import amplitude_objective
-from laufruhe.solvers.uneven_bound import uneven_bound
+from laufruhe.solvers.uneven_bound import steady_bound, uneven_bound
 from laufruhe.solvers.uneven_model import UnevenModel
 from laufruhe.solvers.uneven_program import UnevenProgram, rides_of
 
 Array = NDArray[np.float64]
 
 STARTS = 6
+ORDERS_WITH_GAS = 2
 FLOOR = 1e-3
 FEASIBLE = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
@@ -88,7 +90,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     SolverError
         If no start leads anywhere.
     """
-    starts = starts_of(phasing, even)
+    starts = starts_of(phasing, even, ORDERS_WITH_GAS if _feels_gas(problem) else 1)
     if not starts:
         return no_result(problem, "no star and firing order to start from keeps the firing intervals allowed")
     found = [answer for start in starts[:STARTS] if (answer := local_optimum(phasing, start, phasing.intervals))]
@@ -145,15 +147,26 @@ def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...
     return intervals_of(phasing.cycle, turns)
 
 
-def starts_of(phasing: Phasing, even: Result | None) -> list[Start]:
-    """Designs to start from: the ranked even stars, or the middle of the throws' own bounds."""
+def _feels_gas(problem: Problem) -> bool:
+    """Whether gas loads what is minimised or limited: firing orders of one star then differ."""
+    asked = [term.quantity for term in problem.objective] + [limit.quantity for limit in problem.limits]
+    felt = any(quantity.subject in (*ON_MOUNTS, Subject.ROLL_MOMENT) for quantity in asked)
+    return felt and problem.fidelity.gas and any(point.gas is not None for point in problem.points)
+
+
+def starts_of(phasing: Phasing, even: Result | None, orders_each: int = 1) -> list[Start]:
+    """Designs to start from: the ranked even stars, or the middle of the throws' own bounds.
+
+    Parameters
+    ----------
+    orders_each
+        How many firing orders of a star are started from.
+    """
     if even is not None and even.phasing is not None:
         return [
-            Start(
-                Candidate(s.throws, s.firing_orders[0].order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts))
-            )
+            Start(Candidate(s.throws, firing.order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts)))
             for s in even.phasing.ranking
-            if s.firing_orders
+            for firing in s.firing_orders[:orders_each]
         ]
     out = []
     free = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
@@ -185,13 +198,14 @@ def _left_out(phasing: Phasing, shafts: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for names in phasing.shafts.optional for name in names if name not in shafts)
 
 
-def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> float:
-    """What no design with these intervals goes under, zero where no more is known (S22)."""
+def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[float, str]:
+    """What no design with these intervals goes under, and where that is from (S22, S24)."""
     objective = amplitude_objective(problem)
     families, _ = families_of(phasing)
     if objective is None or phasing.throw_bounds is not None or len(families) != 1 or families[0].fixed is not None:
-        return 0.0
-    return uneven_bound(phasing, families[0].space, objective, intervals)
+        return steady_bound(problem), "the steady part of the loads"
+    bound = uneven_bound(phasing, families[0].space, objective, intervals)
+    return bound, "windows around the even steps"
 
 
 def _trade(
@@ -214,7 +228,7 @@ def _trade(
         if not answers:
             continue
         best = min(answers, key=lambda answer: answer.value)
-        bound = _bound(problem, phasing, Intervals(low, high))
+        bound, _ = _bound(problem, phasing, Intervals(low, high))
         if out and out[-1].value < best.value:
             out.append(replace(out[-1], allowed=share * allowed, lower_bound=bound))
             continue
@@ -233,12 +247,13 @@ def _result(
     given = even.initial if even is not None else evaluate(problem)
     initial = objective_value(problem, given)
     measure = max(best.value, FLOOR * initial) or 1.0
-    bound = min(_bound(problem, phasing, phasing.intervals), best.value)
+    bound, source = _bound(problem, phasing, phasing.intervals)
+    bound = min(bound, best.value)
     # no norm lies under zero: who reaches it is done
     gap = (best.value - bound) / measure
     proven = gap <= problem.tolerance
     shafts = [n for names in phasing.shafts.optional for n in names if n not in best.candidate.left_out]
-    method = f"IPOPT from {len(found)} star(s), firing orders kept; bound from windows around the even steps"
+    method = f"IPOPT from {len(found)} start(s), firing orders kept; bound from {source}"
     certificate = Certificate(Proof.GLOBAL if proven else Proof.LOCAL, bound, gap, best.kkt_residual, method)
     details = PhasingResult(
         ranking=tuple(_entry(phasing, answer) for answer in found),
@@ -255,7 +270,7 @@ def _result(
         result,
         problem=replace(result.problem, phasing=phasing),
         status=Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=ObjectiveValue(problem.objective_name, best.value, problem.objective[0].quantity.unit, initial),
+        objective=ObjectiveValue.of(problem, best.value, initial),
         certificate=certificate,
         decisions=(*phase_decisions(problem, phasing, best.candidate, shafts), *result.decisions),
         initial=replace(given, samples=result.final.samples),

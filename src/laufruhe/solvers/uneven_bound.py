@@ -4,11 +4,15 @@ As in S4 a direction v bounds the couples by sum_k x_k a_k, but a throw on step 
 stand anywhere in a window around it: as far as the intervals before and after it let
 its firing move. The least of x_k a_p over the window is a number for each throw and step,
 so every star is bounded by a sum, and all stars by the least of their bounds.
+
+Gas has a mean torque that no throw changes, and a norm is never less than that of the
+mean over the cycle (S24).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +20,10 @@ from numpy.typing import NDArray
 from laufruhe.machine.firing import firing_lattice
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Intervals, Phasing
+from laufruhe.problem.quantity import MASSES
 from laufruhe.solvers.star_search import AmplitudeObjective, directions
 
 Array = NDArray[np.float64]
@@ -51,6 +58,17 @@ def uneven_bound(
     whole = StarSpace(space.phases, space.patterns, space.places, mirror=True, reflect=True)
     least = min(float(star_bounds(costs, block).min()) for block in whole.blocks())
     return max(least, 0.0)
+
+
+def steady_bound(problem: Problem) -> float:
+    """What the mean of the loads over the cycle leaves of the objective, on mounts as given (S24) [SI]."""
+    given, total = evaluate(problem), 0.0
+    for term in problem.objective:
+        quantity = term.quantity
+        if quantity.subject in MASSES or (quantity.orders is not None and 0.0 not in quantity.orders):
+            continue
+        total += term.weight * given.value(replace(quantity, orders=(0.0,)))
+    return total
 
 
 def star_bounds(costs: Array, stars: Stars) -> Array:

@@ -1,14 +1,16 @@
 """Loads of throws at any angles as smooth expressions, with coefficients from the exact model (S19).
 
 A slider-crank's wrench of order h is its own coefficient times e^{i h (theta + o - beta)}
-along its axis; a rotor that rides on a throw turns with it. Everything that turns
-the same way whatever the throws do is a number from the exact model.
+along its axis; a rotor that rides on a throw turns with it, and gas with the firing dead
+centre of its cylinder. Everything that turns the same way whatever the throws do is a
+number from the exact model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 import casadi as ca
@@ -18,16 +20,21 @@ from numpy.typing import NDArray
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.physics.mounting import mount_maps, mounting_of
+from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.physics.mount_forces import RigidMounting
+from laufruhe.physics.mounting import mount_maps, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import inertia_coefficients, rotor_wrench
 from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import MASSES, Quantity, Subject, counted_rotors, radius_of
+from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Subject, counted_rotors, radius_of
 from laufruhe.solvers.domain import Domain, domains_of
+from laufruhe.solvers.mount_rows import SAMPLES_PER_ORDER
+from laufruhe.solvers.mount_symbols import waves
 from laufruhe.solvers.nonlinear import softened_lengths
+from laufruhe.solvers.uneven_gas import LEFT_OUT, GasMoments
 
 Array = NDArray[np.float64]
 
-SAMPLES = 72
+LEAST_SAMPLES = 72
 NEGLIGIBLE = 1e-9
 _PARTS = {Subject.SHAKING_FORCE: slice(0, 3), Subject.ROLL_MOMENT: slice(3, 4), Subject.ROCKING_COUPLE: slice(4, 6)}
 
@@ -58,18 +65,21 @@ class UnevenModel:
     Parameters
     ----------
     problem
-        Of the star that the program starts from, without gas.
+        Of the star that the program starts from, with its firing order.
     layout
         Of that star.
     rides
         Throw that every rotor turns with; rotors left out stand still beside the throws.
+    left_out
+        Share of the gas torque's root mean square that orders left out may hold together.
     """
 
-    def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
+    def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int], left_out: float = LEFT_OUT) -> None:
         self.problem, self.layout, self.rides = problem, layout, rides
         self.domains: tuple[Domain, ...] = domains_of(problem.decisions)
         self._mounting = mounting_of(problem.engine, problem.fidelity)
         self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
+        self._gas = GasMoments(problem, left_out)
 
     def squares(self, quantity: Quantity, at: Symbols) -> Any:
         """Squares that must all stay under that of a limit: smooth even where the quantity is zero."""
@@ -77,8 +87,7 @@ class UnevenModel:
             return None
         if quantity.norm is Norm.RMS:
             return self._mean_square(quantity, at)
-        signals = [self._signal(quantity, point.speed, at) for point in self._points(quantity)]
-        rows = [_rows([(h, mounts[m]) for h, mounts in s]) for s in signals for m in range(len(s[0][1]))]
+        rows = [row for point in self._points(quantity) for row in self._vectors(quantity, point, at)]
         return ca.vertcat(*(ca.sum2(row * row) for row in rows))
 
     def _points(self, quantity: Quantity) -> list[OperatingPoint]:
@@ -90,7 +99,7 @@ class UnevenModel:
         whole = sum(point.weight for point in chosen)
         total = 0.0
         for point in chosen:
-            for h, mounts in self._signal(quantity, point.speed, at):
+            for h, mounts in self._signal(quantity, point, at):
                 half = 1.0 if h == 0.0 else 0.5
                 total = total + point.weight / whole * half * sum(ca.sumsqr(c) for c in mounts) / len(mounts)
         return total
@@ -104,69 +113,116 @@ class UnevenModel:
             return ca.sqrt(self._mean_square(quantity, at) + softness**2) - softness
         chosen = self._points(quantity)
         whole = sum(point.weight for point in chosen)
-        parts = [(point.weight / whole, self._signal(quantity, point.speed, at)) for point in chosen]
-        lengths = [
-            (share, softened_lengths(_rows([(h, mounts[m]) for h, mounts in signal]), softness))
-            for share, signal in parts
-            for m in range(len(signal[0][1]))
-        ]
+        parts = [(point.weight / whole, self._vectors(quantity, point, at)) for point in chosen]
+        lengths = [(share, softened_lengths(rows, softness)) for share, vectors in parts for rows in vectors]
         if quantity.norm is Norm.SUM:
-            return sum(share * ca.sum1(v) / v.numel() for share, v in lengths) / len(parts[0][1][0][1])
+            return sum(share * ca.sum1(v) / v.numel() for share, v in lengths) / len(parts[0][1])
         # the largest of many, smooth from above by less than the softness times their logarithm
         stacked = ca.vertcat(*(v for _, v in lengths))
         top = ca.mmax(stacked)
         return top + softness * ca.log(ca.sum1(ca.exp((stacked - top) / softness)))
 
     def rows(self, quantity: Quantity, at: Symbols) -> tuple[Any, Array]:
-        """Vectors at angles over two turns whose norm a load on the block is, and their weights (P1)."""
+        """Vectors at angles over a period whose norm a load on the block is, and their weights (P1)."""
         chosen = self._points(quantity)
         whole = sum(point.weight for point in chosen)
-        blocks = [_rows([(h, parts[0]) for h, parts in self._signal(quantity, p.speed, at)]) for p in chosen]
+        blocks = [self._vectors(quantity, p, at)[0] for p in chosen]
         weights = [np.full(b.shape[0], p.weight / whole / b.shape[0]) for p, b in zip(chosen, blocks, strict=True)]
         return ca.vertcat(*blocks), np.concatenate(weights)
 
-    def _signal(self, quantity: Quantity, speed: float, at: Symbols) -> list[tuple[float, list[Any]]]:
-        """Per order, the vectors (re, im), shape (d, 2), of each mount or of the block."""
-        out = []
-        for h, wrench in sorted(self.wrench(speed, at).items()):
-            if quantity.orders is not None and h not in quantity.orders:
-                continue
-            if quantity.subject is not Subject.MOUNT_FORCE:
-                out.append((h, [wrench[_PARTS[quantity.subject], :]]))
-                continue
-            if self._mounting is None:
-                raise ValueError("an engine without mounts has no mount forces")
-            weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
-            names = [mount.name for mount in self.problem.engine.mounts]
-            every = mount_maps(self._mounting, h, speed)
-            maps = [
-                weights @ every[k] for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts
-            ]
-            turned = ca.horzcat(-wrench[:, 1], wrench[:, 0])
-            out.append((h, [ca.DM(m.real) @ wrench + ca.DM(m.imag) @ turned for m in maps]))
-        return out or [(1.0, [ca.DM.zeros(1, 2)])]
+    def _vectors(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[Any]:
+        """Values at equal steps of a period, shape (samples, d), of each mount or of the block."""
+        if quantity.subject is Subject.MOUNT_FORCE and isinstance(self._mounting, RigidMounting):
+            # one map for all orders: the wrench alone is sampled
+            values = _sampled(self._counted(quantity, point, at))
+            return [values @ ca.DM(m.real).T for m in self._maps(quantity, 0.0, point)]
+        signal = self._signal(quantity, point, at)
+        return [_sampled([(h, parts[m]) for h, parts in signal]) for m in range(len(signal[0][1]))]
 
-    def wrench(self, speed: float, at: Symbols) -> dict[float, Any]:
-        """Wrench coefficients (re, im) by order, shape (6, 2)."""
+    def _signal(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[tuple[float, list[Any]]]:
+        """Per order, the vectors (re, im), shape (d, 2), of each mount or of the block."""
+        counted = self._counted(quantity, point, at)
+        if quantity.subject not in ON_MOUNTS:
+            return [(h, [wrench[_PARTS[quantity.subject], :]]) for h, wrench in counted]
+        out = []
+        for h, wrench in counted:
+            turned = ca.horzcat(-wrench[:, 1], wrench[:, 0])
+            maps = self._maps(quantity, h, point)
+            out.append((h, [ca.DM(m.real) @ wrench + ca.DM(m.imag) @ turned for m in maps]))
+        return out
+
+    def _counted(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[tuple[float, Any]]:
+        """Wrench coefficients of the orders that count."""
+        # a block on soft mounts feels the first orders of its gas alone
+        gain = self._gain(quantity, point) if quantity.subject in ON_MOUNTS else None
+        found = sorted(self.wrench(point, at, gain).items())
+        counted = [(h, wrench) for h, wrench in found if quantity.orders is None or h in quantity.orders]
+        return counted or [(1.0, ca.DM.zeros(6, 2))]
+
+    def _maps(self, quantity: Quantity, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
+        """Force per wrench of every mount that counts, its directions weighted."""
+        weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
+        names = [mount.name for mount in self.problem.engine.mounts]
+        every = self._map(quantity, order, point.speed)
+        return [
+            weights @ every[k] for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts
+        ]
+
+    def _map(self, quantity: Quantity, order: float, speed: float) -> NDArray[np.complex128]:
+        """Forces or travels of all mounts per wrench, shape (mounts, 3, 6)."""
+        if self._mounting is None:
+            raise ValueError("an engine without mounts has no mount forces")
+        if quantity.subject is Subject.MOUNT_FORCE:
+            return mount_maps(self._mounting, order, speed)
+        base = Fraction(order).limit_denominator(1000)
+        units = np.stack([np.zeros((6, 6)), np.eye(6)]).astype(complex)
+        spectra = [Spectrum(base or Fraction(1), units[:, k] if base else units[1:, k]) for k in range(6)]
+        travels = [travel_of(self.problem.engine, self._mounting, unit, speed) for unit in spectra]
+        return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
+
+    def _gain(self, quantity: Quantity, point: OperatingPoint) -> Callable[[float], float] | None:
+        """How much of a roll moment of an order mounts feel; None where that is the same for all."""
+        if isinstance(self._mounting, RigidMounting):
+            return None
+        return lambda h: float(np.abs(self._map(quantity, h, point.speed)[:, :, 3]).max())
+
+    def wrench(
+        self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float] | None = None
+    ) -> dict[float, Any]:
+        """Wrench coefficients (re, im) by order, shape (6, 2); gas of the orders that a gain leaves to matter."""
         total: dict[float, Any] = {}
-        for k, part in enumerate(self.problem.engine.slider_cranks):
-            for h, wrench in self._cylinder(k, part, speed, at):
+        parts = self.problem.engine.slider_cranks
+        for k, part in enumerate(parts):
+            for h, wrench in self._cylinder(k, part, point.speed, at):
                 total[h] = total.get(h, 0.0) + wrench
+        stars = [self._star(k, part, at) for k, part in enumerate(parts)]
+        for h, moment in self._gas.at(point, stars, gain):
+            wrench = ca.vertcat(ca.DM.zeros(3, 2), moment, ca.DM.zeros(2, 2))
+            total[h] = total.get(h, 0.0) + wrench
         for rotor in self.problem.engine.rotors:
             order = abs(rotor.shaft.ratio)
-            real, imaginary = (rotor_wrench(replace(rotor, unbalance=u), speed) for u in (1.0, 1.0j))
+            real, imaginary = (rotor_wrench(replace(rotor, unbalance=u), point.speed) for u in (1.0, 1.0j))
             u = self._unbalance(rotor, at)
             rows = _columns(real) @ u[0] + _columns(imaginary) @ u[1]
             total[order] = total.get(order, 0.0) + rows
         return total
 
-    def _cylinder(self, k: int, part: SliderCrank, speed: float, at: Symbols) -> list[tuple[float, Any]]:
-        pin = self.layout.pins[k]
+    def _place(self, k: int, part: SliderCrank, at: Symbols) -> tuple[Any, Any]:
+        """Angle of a cylinder's own pin, and of its bank."""
         side = 0.5 if 2 * k < len(self.layout.pins) else -0.5
         bank = side * at.bank if at.bank is not None else part.bank
         offset = -side * at.split if at.split is not None else self.layout.pin_offsets[k]
+        return at.throws[self.layout.pins[k]] + offset, bank
+
+    def _star(self, k: int, part: SliderCrank, at: Symbols) -> Any:
+        """A cylinder's own crank angle when phi = 0 (C5)."""
+        angle, bank = self._place(k, part, at)
+        return angle - bank
+
+    def _cylinder(self, k: int, part: SliderCrank, speed: float, at: Symbols) -> list[tuple[float, Any]]:
+        angle, bank = self._place(k, part, at)
         axial, roll = inertia_coefficients(part, speed, self.problem.fidelity)
-        star = at.throws[pin] + offset - bank
+        star = angle - bank
         size = np.abs(axial).max() + np.abs(roll).max() / part.crank_radius
         zero = ca.DM.zeros(1, 2)
         out = []
@@ -180,7 +236,6 @@ class UnevenModel:
             mass = part.rotating_mass * part.crank_radius
             pair = (rotor_wrench(Rotor("pin", part.x, u * mass, part.shaft), speed) for u in (1.0, 1.0j))
             real, imaginary = (_columns(wrench) for wrench in pair)
-            angle = at.throws[pin] + offset
             out.append((abs(part.shaft.ratio), real * ca.cos(angle) + imaginary * ca.sin(angle)))
         return out
 
@@ -225,11 +280,11 @@ def _columns(wrench: NDArray[np.complex128]) -> Any:
     return ca.DM(np.stack([wrench.real, wrench.imag], axis=1))
 
 
-def _rows(signal: Sequence[tuple[float, Any]]) -> Any:
-    """Values at equal steps of two turns, shape (samples, d)."""
-    angles = 4.0 * np.pi * np.arange(2 * SAMPLES) / (2 * SAMPLES)
-    total = 0.0
-    for h, c in signal:
-        waves = np.stack([np.cos(h * angles), -np.sin(h * angles)], axis=1)
-        total = total + ca.DM(waves) @ c.T
-    return total
+def _sampled(signal: Sequence[tuple[float, Any]]) -> Any:
+    """Values of (order, coefficients of shape (d, 2)) at equal steps of their period, shape (samples, d)."""
+    orders = [h for h, _ in signal]
+    base = float(common_base([Fraction(h).limit_denominator(1000) for h in orders if h > 0.0] or [Fraction(1)]))
+    samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * max(orders) / base))
+    cosine, sine = waves(orders, base, samples)
+    real, imaginary = (ca.horzcat(*(c[:, side] for _, c in signal)) for side in (0, 1))
+    return (real @ cosine - imaginary @ sine).T

@@ -181,7 +181,7 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> Front:
         shafts=len(shafts_of(problem)),
         cylinders=len(problem.engine.slider_cranks),
         objective=problem.objective_name,
-        unit=problem.objective[0].quantity.unit,
+        unit=problem.objective_unit or "",
     )
 
 

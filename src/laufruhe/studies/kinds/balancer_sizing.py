@@ -12,7 +12,13 @@ from laufruhe.problem.quantity import MASSES, Quantity, counted_rotors
 from laufruhe.problem.study_models import BalancerSizingTable
 from laufruhe.studies.economics import shafts_of, with_shafts
 from laufruhe.studies.kinds.kind import Kind
-from laufruhe.studies.kinds.swept import check_moved_by_loads, checked, combinations, refused
+from laufruhe.studies.kinds.swept import (
+    check_moved_by_loads,
+    checked,
+    combinations,
+    refuse_open_phasing,
+    refused,
+)
 from laufruhe.studies.outcome import axes_of, coordinates, dataset, solved
 from laufruhe.studies.scenes import Point, Scenes
 
@@ -44,9 +50,7 @@ def _points(part: BalancerSizingTable, scenes: Scenes) -> list[Point]:
         groups = shaft_groups(problem)
         if not groups:
             raise refused(scenes, case, "balancer_shafts", "is missing, so there is nothing to size", "add a shaft")
-        if problem.phasing is not None:
-            rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
-            raise refused(scenes, case, "phasing", rule, remedy)
+        refuse_open_phasing(problem, case, scenes)
         if len(groups) > MOST_GROUPS:
             rule = f"makes {len(groups)} independent shafts, {2 ** len(groups)} sets of them"
             raise refused(scenes, case, "balancer_shafts", rule, f"study {MOST_GROUPS} or fewer")

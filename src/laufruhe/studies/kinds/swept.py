@@ -47,7 +47,8 @@ def checked(part: SweptPartTable, scenes: Scenes) -> list[Problem]:
     units = {problem.objective_unit: case for problem, case in zip(found, part.cases, strict=True)}
     if len(units) > 1:
         (one, first_case), (two, second_case) = list(units.items())[:2]
-        rule = f"minimises in {one} in '{first_case.name}' and in {two} in '{second_case.name}'"
+        said = [unit or "several units together" for unit in (one, two)]
+        rule = f"minimises in {said[0]} in '{first_case.name}' and in {said[1]} in '{second_case.name}'"
         raise refused(scenes, part.cases[0], "objective", rule, "give the part one metric")
     return found
 
@@ -55,6 +56,19 @@ def checked(part: SweptPartTable, scenes: Scenes) -> list[Problem]:
 def _check_asked(problem: Problem, case: CaseTable, scenes: Scenes) -> None:
     if problem.objective_unit is None:
         raise refused(scenes, case, "objective", "is missing, so a study has nothing to compare", "give a metric")
+
+
+def refuse_open_phasing(problem: Problem, case: CaseTable, scenes: Scenes) -> None:
+    """Of sets of shafts: an open star has a choice of its own.
+
+    Raises
+    ------
+    InputError
+        If something of the phasing is open.
+    """
+    if problem.phasing is not None:
+        rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
+        raise refused(scenes, case, "phasing", rule, remedy)
 
 
 def check_moved_by_loads(problems: Sequence[Problem], part: SweptPartTable, scenes: Scenes, what: str) -> None:

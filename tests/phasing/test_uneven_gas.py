@@ -1,0 +1,216 @@
+"""Uneven throws with gas: the smooth program against the exact model, grids, symmetry and a bound in closed form."""
+
+import math
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from laufruhe.errors import InputError
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.reader import load
+from laufruhe.solvers import solve
+from laufruhe.solvers.throw_moves import ThrowMoves
+from laufruhe.solvers.uneven import Start, local_optimum
+from laufruhe.solvers.uneven_gas import LEFT_OUT
+from laufruhe.solvers.uneven_model import Symbols, UnevenModel
+from laufruhe.solvers.uneven_program import rides_of
+from phasing import engines
+
+GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "8 bar"\n'
+OPEN = 'throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n'
+SPLIT = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"
+ALLOWED = 'intervals = { largest_deviation = "40 deg" }'
+MOUNT_FORCE = engines.MOUNTS + engines.MOUNT_FORCE
+DISPLACED = math.pi / 4.0 * 0.1**2 * 0.12
+SCENES = {
+    "two-stroke four": ("inline", "two-stroke", 4, (1, 3, 4, 2), None),
+    "four-stroke five": ("inline", "four-stroke", 5, (1, 2, 4, 5, 3), None),
+    "four-stroke vee": ("vee", "four-stroke", 6, (1, 6, 3, 5, 2, 4), (math.radians(90.0), math.radians(20.0))),
+}
+
+
+def scene(folder, name, rest=MOUNT_FORCE):
+    """A star with its firing order, what may move of it, and its problem."""
+    layout, cycle, count, order, angles = SCENES[name]
+    open_ = OPEN + (SPLIT if angles else "")
+    phasing = engines.problem(folder, count, cycle, open_, ALLOWED, GAS + rest, layout, 480).phasing
+    geometry = angles or (None, None)
+    places = phasing.layout(*geometry)
+    # the even star of the order, and for the vee the one of its right angle
+    throws = {
+        "two-stroke four": (0.0, 1.0, 3.0, 2.0),
+        "four-stroke five": (0.0, 3.0, 2.0, 1.0, 4.0),
+        "four-stroke vee": (0.0, 2.0, 1.0),
+    }[name]
+    first = places.banks[0] - places.pin_offsets[0]
+    start = Candidate(tuple(first + math.tau * t / len(throws) for t in throws), order, *geometry)
+    return phasing, start, ThrowMoves(phasing, places, start, phasing.intervals)
+
+
+def model_of(phasing, start, left_out=0.0):
+    problem = replace(phasing.realise(start), phasing=None)
+    layout = phasing.layout(start.bank_angle, start.split_pin)
+    return UnevenModel(problem, layout, rides_of(phasing, start), left_out)
+
+
+def moved(moves, x):
+    """Symbols at deviations x, and the exact problem there."""
+    return Symbols(*moves.angles(x), ca.DM(0, 1)), replace(moves.phasing.realise(moves.candidate(x)), phasing=None)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_order_is_that_of_the_exact_model(tmp_path, name):
+    phasing, start, moves = scene(tmp_path, name)
+    model = model_of(phasing, start)
+    rng = np.random.default_rng(3)
+    for _ in range(3):
+        at, exact = moved(moves, rng.uniform(-0.25, 0.25, moves.size))
+        wrench = evaluate(exact).loads[0].wrench
+        smooth = {h: np.array(c, dtype=float) for h, c in model.wrench(exact.points[0], at).items()}
+        assert 0.0 in smooth
+        assert max(abs(smooth[h]).max() for h in smooth if h not in (0.0, 1.0, 2.0)) > 10.0
+        peak = np.abs(wrench.sample(480)).max(axis=0)
+        for h in wrench.orders:
+            found = smooth.get(float(h), np.zeros((6, 2)))
+            assert np.abs(found[:, 0] + 1j * found[:, 1] - wrench.at(h)).max() <= 1e-9 * peak.max()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name):
+    rms = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", "rms")
+    phasing, start, moves = scene(tmp_path, name, rms)
+    model, x = model_of(phasing, start), ca.SX.sym("x", moves.size)
+    quantity = model.problem.objective[0].quantity
+    norm = model.norm(quantity, Symbols(*moves.angles(x), ca.DM(0, 1)), 1e-9)
+    smooth = ca.Function("norm", [x], [norm, ca.gradient(norm, x)])
+    point = np.random.default_rng(4).uniform(-0.2, 0.2, moves.size)
+
+    def exact(x):
+        return evaluate(moved(moves, x)[1]).value(quantity)
+
+    value, slope = (np.array(part, dtype=float).ravel() for part in smooth(point))
+    assert value[0] == pytest.approx(exact(point), rel=1e-9)
+    step = 1e-5
+    for k, unit in enumerate(np.eye(moves.size)):
+        difference = (exact(point + step * unit) - exact(point - step * unit)) / (2.0 * step)
+        assert slope[k] == pytest.approx(difference, rel=1e-5, abs=1e-5 * value[0])
+
+
+@pytest.mark.parametrize("measure", ["mean", "maximum"])
+def test_orders_left_out_hardly_change_sampled_measures(tmp_path, measure):
+    objective = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", measure)
+    phasing, start, moves = scene(tmp_path, "four-stroke five", objective)
+    model = model_of(phasing, start, LEFT_OUT)
+    at, exact = moved(moves, np.random.default_rng(5).uniform(-0.2, 0.2, moves.size))
+    quantity = exact.objective[0].quantity
+    assert float(model.norm(quantity, at, 1e-6)) == pytest.approx(evaluate(exact).value(quantity), rel=1e-2)
+
+
+def test_neither_the_origin_of_the_angle_nor_the_numbering_matters(tmp_path):
+    phasing, start, moves = scene(tmp_path, "four-stroke five")
+    model = model_of(phasing, start, 1e-2)
+    at, exact = moved(moves, np.random.default_rng(6).uniform(-0.2, 0.2, moves.size))
+    rms = replace(exact.objective[0].quantity, norm=Norm.RMS)
+    own = float(model.norm(rms, at, 1e-9))
+    turned = replace(at, throws=[angle + 0.7 for angle in at.throws])
+    assert float(model.norm(rms, turned, 1e-9)) == pytest.approx(own, rel=1e-12)
+    # counted from the other end the roll moment is the same
+    roll = '[objective]\nminimise = "mean roll moment"\n'
+    phasing, start, moves = scene(tmp_path, "four-stroke five", roll)
+    throws = moves.candidate(np.full(moves.size, 0.1)).throws
+    values = [
+        objective_value(problem, evaluate(problem))
+        for problem in (
+            phasing.realise(replace(start, throws=throws)),
+            phasing.realise(replace(start, throws=throws[::-1], firing_order=tuple(6 - k for k in start.firing_order))),
+        )
+    ]
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("cycle", ["two-stroke", "four-stroke"])
+def test_one_open_throw_is_where_a_fine_grid_is_least(tmp_path, cycle):
+    throws, order, low, high = {
+        "two-stroke": ("[0, { between = [70, 170] }, 240]", (1, 3, 2), 70, 170),
+        "four-stroke": ("[0, { between = [110, 250] }]", (1, 2), 110, 250),
+    }[cycle]
+    count = len(order)
+    engine = f"throws = {throws}\nfiring_order = {list(order)}"
+    allowed = 'intervals = { largest_deviation = "300 deg" }'
+    problem = engines.problem(tmp_path, count, cycle, engine, allowed, GAS + MOUNT_FORCE)
+    result = solve(problem)
+    phasing = problem.phasing
+    grid = {}
+    for degrees in range(low, high + 1):
+        middle = (math.radians(degrees),)
+        tail = (math.radians(240.0),) if count == 3 else ()
+        exact = replace(phasing.realise(Candidate((0.0, *middle, *tail), order)), phasing=None)
+        grid[degrees] = objective_value(exact, evaluate(exact))
+    least = min(grid, key=grid.get)
+    assert result.objective.value <= grid[least] * (1.0 + 2e-4)
+    assert abs(math.degrees(result.decisions[1].value) - least) < 2.0
+    assert result.objective.value < result.objective.initial
+    # gas is what decides here
+    motored = solve(engines.problem(tmp_path, count, cycle, engine, allowed, MOUNT_FORCE))
+    assert abs(motored.decisions[1].value - result.decisions[1].value) > math.radians(0.5)
+
+
+@pytest.mark.parametrize(("orders", "stays"), [("orders = [1, 2]", True), ("", False)])
+def test_even_firing_stays_where_it_is_best(tmp_path, orders, stays):
+    """Gas alone: even firing cancels orders 1 and 2 of three cylinders, but adds up order 3."""
+    rest = GAS + f'[objective]\nminimise = "rms roll moment"\n{orders}\n'
+    phasing = engines.problem(tmp_path, 3, phasing=ALLOWED, rest=rest).phasing
+    light = replace(phasing, realise=lambda candidate: _light(phasing.realise(candidate)))
+    start = Candidate(tuple(math.tau * t / 3.0 for t in (0, 1, 2)), (1, 3, 2))
+    given = light.realise(start)
+    even = objective_value(given, evaluate(given))
+    found = local_optimum(light, Start(start), phasing.intervals)
+    if stays:
+        assert not found.moved
+        assert found.candidate.throws == start.throws
+        assert found.value < 1e-6
+        return
+    assert found.moved
+    assert found.value < even * (1.0 - 1e-3)
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        throws = tuple(a + rng.uniform(-0.2, 0.2) * (k > 0) for k, a in enumerate(found.candidate.throws))
+        near = light.realise(replace(found.candidate, throws=throws))
+        if phasing.intervals.holds(near.engine.firing_intervals):
+            assert objective_value(near, evaluate(near)) > found.value * (1.0 - 2e-4)
+
+
+def _light(problem):
+    parts = tuple(replace(part, reciprocating_mass=1e-6) for part in problem.engine.slider_cranks)
+    return replace(problem, engine=replace(problem.engine, slider_cranks=parts))
+
+
+def test_the_bound_is_the_steady_torque(tmp_path):
+    """Work of the cycle over its angle: imep times what all cylinders displace, on any star."""
+    rest = GAS + '[objective]\nminimise = "rms roll moment"\n'
+    allowed = 'intervals = { largest_deviation = "5 deg" }\nbest = 1'
+    result = solve(engines.problem(tmp_path, 3, phasing=allowed, rest=rest))
+    assert result.certificate.lower_bound == pytest.approx(8e5 * DISPLACED * 3.0 / math.tau, rel=1e-3)
+    assert result.certificate.lower_bound <= result.objective.value
+    assert all(point.lower_bound <= point.value for point in result.phasing.trade)
+
+
+def test_an_uneven_crank_speed_is_refused(tmp_path):
+    speed = '[objective]\nminimise = "rms roll moment"\n'
+    path = tmp_path / "test.toml"
+    engines.problem(tmp_path, 3, phasing=ALLOWED, rest=GAS + speed)
+    text = path.read_text(encoding="utf-8").replace("[fidelity]\n", '[fidelity]\ncrank_inertia = "0.5 kg m^2"\n')
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=r"fidelity.crank_inertia.*even steps.*leave it out"):
+        load(path)
+
+
+def test_throws_between_bounds_start_at_their_most_even_firing(tmp_path):
+    """Gas of the design as given needs a firing order, though none is named."""
+    engine = "throws = [0, { between = [170, 190] }, { between = [170, 190] }, { between = [-10, 10] }]"
+    problem = engines.problem(tmp_path, 4, "four-stroke", engine, ALLOWED, GAS + MOUNT_FORCE)
+    assert problem.engine.firing_intervals == pytest.approx([math.pi] * 4, abs=1e-9)
