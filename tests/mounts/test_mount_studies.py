@@ -29,7 +29,7 @@ position = ["90 mm", "-60 mm"]
 x = "0 mm"
 unbalance = { between = ["0 kg m", "0.05 kg m"] }
 [search]
-starts = 2
+starts = 1
 """
 
 

@@ -55,9 +55,8 @@ def test_a_design_off_resonance_is_evaluated_as_ever(tmp_path: Path) -> None:
     assert off_resonance(problem) is problem
 
 
-@pytest.mark.parametrize("starts", [1, 3])
-def test_the_search_ends_where_it_does_from_elsewhere(tmp_path: Path, starts: int) -> None:
-    asked = FORCE.replace("starts = 4", f"starts = {starts}")
+def test_the_search_ends_where_it_does_from_elsewhere(tmp_path: Path) -> None:
+    asked = FORCE.replace("starts = 4", "starts = 1")
     found, usual = solve(resonant(tmp_path, asked)), solve(resonant(tmp_path, asked, UNDAMPED))
     assert found.objective is not None
     assert usual.objective is not None
