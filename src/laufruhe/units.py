@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     import pint
 
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
+# kp/cm2 as it is typed for kp/cm^2; H2O keeps its figure
+_POWER = re.compile(r"(?<=[a-z])([23])\b")
 _DEFINITIONS = (
     "@alias kilogram_force = kp = kilopond",
     "newton_metre = newton * meter = Nm",
@@ -36,6 +38,7 @@ def _registry() -> pint.UnitRegistry[Any]:
 def _factor(unit: str, wanted: str) -> float:
     """SI value of one `unit` of the dimension of `wanted`."""
     registry = _registry()
+    unit = _POWER.sub(r"^\1", unit)
     if wanted == "Hz" and "Hz" not in unit:
         # radians have no dimension, so rpm would be taken for a frequency 2 pi too high
         raise UnitError(f"'{unit}' is no frequency in Hz; {advice(wanted)}")
@@ -125,6 +128,17 @@ def unit_of(text: str) -> str:
     """The unit that a number is written in; empty where there is none."""
     match = _QUANTITY.match(text)
     return (match.group(3) or "").strip() if match else ""
+
+
+def dimension_of(text: str) -> str | None:
+    """SI unit of what a text such as '12 Hz' measures; None where it is no number with a unit known here."""
+    for unit in _EXAMPLES:
+        try:
+            parse(text, unit)
+        except UnitError:
+            continue
+        return unit
+    return None
 
 
 _SHOWN = {

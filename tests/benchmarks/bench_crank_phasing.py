@@ -19,6 +19,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from pages import RESULTS, ROOT, publish, spent
 
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns
@@ -37,8 +38,7 @@ from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_model import StarModel
 from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm, enumerate_stars, search_stars
 
-ROOT = Path(__file__).resolve().parents[2]
-OUT = ROOT / "results" / "crank-phasing"
+OUT = RESULTS / "crank-phasing"
 RANKED = (
     "two-stroke-four-open", "vee-six-open", "vee-eight-open", "inline-five-open", "inline-seven-uneven",
     "two-stroke-eight-uneven", "inline-nine-uneven", "vee-twenty-open",
@@ -103,9 +103,7 @@ def seconds(work: Callable[[], object], repeats: int = 3) -> float:
     """Median wall time."""
     times = []
     for _ in range(repeats):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
+        times.append(spent(work))
         if times[-1] > 2.0:
             break
     return statistics.median(times)
@@ -286,8 +284,7 @@ def on_one_core() -> None:
 def main() -> None:
     """Measure and write."""
     on_one_core()
-    OUT.mkdir(parents=True, exist_ok=True)
-    (OUT / "rankings.md").write_text(rankings(), encoding="utf-8")
+    publish(OUT / "rankings.md", rankings())
     found = rows()
     growth(found)
     body = [
@@ -323,8 +320,7 @@ def main() -> None:
         "## Memory of an enumeration",
         table(("throws", "stars", "largest MiB"), memory()),
     ]
-    (OUT / "benchmark.md").write_text("\n\n".join(text) + "\n", encoding="utf-8")
-    print((OUT / "benchmark.md").read_text(encoding="utf-8"))
+    publish(OUT / "benchmark.md", "\n\n".join(text) + "\n")
 
 
 if __name__ == "__main__":

@@ -15,12 +15,12 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import importlib  # noqa: E402
 import math  # noqa: E402
 import sys  # noqa: E402
-import time  # noqa: E402
 from collections.abc import Callable, Sequence  # noqa: E402
 from dataclasses import replace  # noqa: E402
 from pathlib import Path  # noqa: E402
 
 import numpy as np  # noqa: E402
+from pages import RESULTS, ROOT, publish, spent  # noqa: E402
 
 from laufruhe import load  # noqa: E402
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
@@ -35,20 +35,14 @@ from laufruhe.problem.model import Problem, Term  # noqa: E402
 from laufruhe.problem.quantity import Quantity, Subject  # noqa: E402
 from laufruhe.solvers.batch import Designs, prepare, random_decisions  # noqa: E402
 
-ROOT = Path(__file__).resolve().parents[2]
-OUT = ROOT / "results" / "benchmarks" / "fidelity.md"
+OUT = RESULTS / "benchmarks" / "fidelity.md"
 DESIGNS = 100_000
 
 
 def seconds(work: Callable[[], object], repeats: int = 5) -> float:
     """Least of a few calls, after one that warms caches: others may use the machine too."""
     work()
-    times = []
-    for _ in range(repeats):
-        started = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - started)
-    return min(times)
+    return min(spent(work) for _ in range(repeats))
 
 
 def product_rate() -> float:
@@ -249,9 +243,7 @@ def main() -> None:
     lines = ["# Fidelity, batches and growth", "", "Least of several calls on one core of one machine.", ""]
     table, found = growth()
     text = "\n".join([*lines, *four_cylinder(), *pruned(), *table]) + "\n"
-    print(text)
-    OUT.parent.mkdir(parents=True, exist_ok=True)
-    OUT.write_text(text, encoding="utf-8")
+    publish(OUT, text)
     draw(found, OUT.with_suffix(".png"))
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
+
+from pages import RESULTS, ROOT, publish
 
 from laufruhe.problem.model import Problem
 from laufruhe.problem.reader import load
 from laufruhe.solvers import solve
 from laufruhe.solvers.mount_convex import is_convex
 
-ROOT = Path(__file__).parents[2]
 SEEDS = range(10)
 # of an open star; all of them are looked at by the ready problem itself
 STARS = 12
@@ -55,9 +55,7 @@ def main() -> None:
         "| --- | --- | ---: | ---: | ---: | ---: |",
         *(row_of(problem) for problem in elastic_problems()),
     ]
-    target = ROOT / "results" / "mounts" / "seeds.md"
-    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    print(target.read_text("utf-8"))
+    publish(RESULTS / "mounts" / "seeds.md", "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

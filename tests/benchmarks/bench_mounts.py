@@ -8,28 +8,27 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+from pages import RESULTS, ROOT, publish, spent
 from scipy.optimize import minimize
 
-ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from laufruhe.machine import OperatingPoint  # noqa: E402
-from laufruhe.numerics.cores import processors  # noqa: E402
-from laufruhe.physics.shaking_loads import shaking_loads  # noqa: E402
-from laufruhe.physics.speed_map import speed_map, split_loads  # noqa: E402
-from laufruhe.problem.evaluation import evaluate  # noqa: E402
-from laufruhe.problem.model import Problem  # noqa: E402
-from laufruhe.problem.mount_design import mounting_in  # noqa: E402
-from laufruhe.problem.mount_values import excess, whole_objective  # noqa: E402
-from laufruhe.problem.reader import load  # noqa: E402
-from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint  # noqa: E402
-from laufruhe.solvers.mount_program import JointProgram  # noqa: E402
-from laufruhe.solvers.mount_starts import start_points  # noqa: E402
-from laufruhe.solvers.nonlinear import NonlinearProgram, solve_nonlinear  # noqa: E402
-from mounts.test_moving_block import simulated_forces  # noqa: E402
+from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.cores import processors
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.physics.speed_map import speed_map, split_loads
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_design import mounting_in
+from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.problem.reader import load
+from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint
+from laufruhe.solvers.mount_program import JointProgram
+from laufruhe.solvers.mount_starts import start_points
+from laufruhe.solvers.nonlinear import NonlinearProgram, solve_nonlinear
+from mounts.test_moving_block import simulated_forces
 
 PROBLEM = ROOT / "problems" / "tractor-four-elastic.toml"
 RPM = math.pi / 30.0
@@ -42,10 +41,8 @@ def seconds(work: Callable[[], object], least: float = 0.5) -> float:
     """Best time of one call over at least half a second of calls."""
     best, whole = math.inf, 0.0
     while whole < least:
-        started = time.perf_counter()
-        work()
-        spent = time.perf_counter() - started
-        best, whole = min(best, spent), whole + spent
+        last = spent(work)
+        best, whole = min(best, last), whole + last
     return best
 
 
@@ -204,9 +201,7 @@ def main() -> None:
     for part in (one_speed, many_speeds, joint):
         lines += part(problem)
         print("\n".join(lines[-16:]), flush=True)
-    target = ROOT / "results" / "mounts" / "benchmark.md"
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+    publish(RESULTS / "mounts" / "benchmark.md", "\n".join(lines).rstrip() + "\n")
 
 
 if __name__ == "__main__":

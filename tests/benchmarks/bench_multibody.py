@@ -8,16 +8,15 @@ from __future__ import annotations
 import math
 import statistics
 import sys
-import time
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pages import RESULTS, ROOT, publish, spent
 
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
 from laufruhe.numerics.mixed_norms import Norm
@@ -27,8 +26,7 @@ from laufruhe.problem.model import Drive, Problem, Term, UnbalanceDecision
 from laufruhe.problem.quantity import Quantity, Subject
 from laufruhe.solvers.affine import AffineModel
 
-ROOT = Path(__file__).resolve().parents[2]
-OUT = ROOT / "results" / "benchmarks" / "multibody.md"
+OUT = RESULTS / "benchmarks" / "multibody.md"
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +59,7 @@ class Scene:
     def integration_seconds(self, steps: int) -> float:
         """Wall time of one turn; building the system and reading its forces are not counted."""
         model = self.multibody.build(self.machine, 0.0)
-        return seconds(lambda: self.multibody.integrate(model, steps, steps, self.integrator))
+        return spent(lambda: self.multibody.integrate(model, steps, steps, self.integrator))
 
     def analytic(self) -> FloatArray:
         """Mount forces over the working cycle from the analytic loads."""
@@ -106,13 +104,6 @@ def scene() -> Scene:
     return Scene(multibody, case.machine, replace(case.engine, mounts=MOUNTS), case.point, quickest)
 
 
-def seconds(work: Callable[[], object]) -> float:
-    """Wall time of one run."""
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
-
-
 def error(scene: Scene, steps: int) -> float:
     """Largest difference of a mount force over the largest mount force, after a first tenth of a turn.
 
@@ -145,7 +136,7 @@ def peak_memory(scene: Scene) -> int:
 def same_rods_again(scene: Scene) -> float:
     """Wall time of an evaluation that remembers order coefficients of the rods and no loads."""
     forget()
-    return seconds(scene.analytic)
+    return spent(scene.analytic)
 
 
 def in_turns(scene: Scene, steps: int) -> tuple[float, ...]:
@@ -160,9 +151,9 @@ def in_turns(scene: Scene, steps: int) -> tuple[float, ...]:
             (
                 scene.integration_seconds(steps),
                 plain.integration_seconds(steps),
-                seconds(new.analytic),
+                spent(new.analytic),
                 same_rods_again(new),
-                seconds(lambda x=other: designs(x)),
+                spent(lambda x=other: designs(x)),
             )
         )
     return tuple(statistics.median(times) for times in zip(*rounds, strict=True))
@@ -197,9 +188,7 @@ def main() -> None:
         f"Peak memory of the analytic evaluation above imports: {memory / 2**20:.2f} MiB.",
     ]
     text = "\n".join(lines) + "\n"
-    print(text)
-    OUT.parent.mkdir(parents=True, exist_ok=True)
-    OUT.write_text(text, encoding="utf-8")
+    publish(OUT, text)
 
 
 if __name__ == "__main__":

@@ -15,15 +15,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from pages import RESULTS, ROOT, publish
 
 from laufruhe import load
 from laufruhe.problem.model import Problem
 from laufruhe.solvers.affine import AffineModel, AffineProblem
 from laufruhe.solvers.conic import ConicProgram
 
-ROOT = Path(__file__).resolve().parents[2]
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester.toml"
-OUT = ROOT / "results" / "benchmarks" / "solve.md"
+OUT = RESULTS / "benchmarks" / "solve.md"
 
 Row = tuple[str, float, str, float]
 
@@ -100,9 +100,7 @@ def main() -> None:
         for name, own, beside, other in (*command_rows(), *resolve_rows())
     ]
     text = "\n".join(lines) + "\n"
-    print(text)
-    OUT.parent.mkdir(parents=True, exist_ok=True)
-    OUT.write_text(text, encoding="utf-8")
+    publish(OUT, text)
 
 
 if __name__ == "__main__":

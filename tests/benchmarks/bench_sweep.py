@@ -19,6 +19,7 @@ from dataclasses import replace  # noqa: E402
 from pathlib import Path  # noqa: E402
 
 import numpy as np  # noqa: E402
+from pages import RESULTS, ROOT, publish  # noqa: E402
 from scipy.optimize import NonlinearConstraint, differential_evolution, minimize  # noqa: E402
 
 from laufruhe import load  # noqa: E402
@@ -28,9 +29,8 @@ from laufruhe.solvers.conic import ConicProgram  # noqa: E402
 from laufruhe.studies import run  # noqa: E402
 from laufruhe.studies.speed_sweep import speed_sweep  # noqa: E402
 
-ROOT = Path(__file__).resolve().parents[2]
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester-and-moment.toml"
-OUT = ROOT / "results" / "benchmarks" / "sweep.md"
+OUT = RESULTS / "benchmarks" / "sweep.md"
 SAMPLES, POINTS, EVOLVED = 360, 13, 3
 STUDIED, STUDY_POINTS = ("tractor-single", "tractor-four-lanchester-and-moment", "tractor-four-front-force"), 25
 
@@ -165,9 +165,7 @@ def main() -> None:
         *study_rows(),
     ]
     text = "\n".join(lines) + "\n"
-    print(text)
-    OUT.parent.mkdir(parents=True, exist_ok=True)
-    OUT.write_text(text, encoding="utf-8")
+    publish(OUT, text)
 
 
 if __name__ == "__main__":

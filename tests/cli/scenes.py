@@ -7,51 +7,15 @@ from functools import cache
 from pathlib import Path
 
 from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
 from laufruhe.solvers import Result, solve, state
+from problem_files import FOUR, MOUNTS, SECOND_ORDER_SHAFTS, loaded
 
 READY = Path(__file__).parents[2] / "problems" / "tractor-four-lanchester.toml"
 
-_FOUR = """
-title = "Four in line"
-[engine]
-layout = "inline"
-cycle = "four-stroke"
-stroke = "120 mm"
-rod_ratio = 0.26
-reciprocating_mass = "1.25 kg"
-cylinder_spacing = "125 mm"
-firing_order = [1, 3, 4, 2]
-"""
-_MOUNTS = """
-[mounts]
-positions = [
-    ["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"],
-    ["-1 m", "250 mm", "0 mm"], ["-1 m", "-250 mm", "0 mm"],
-]
-"""
-SECOND_ORDER_SHAFTS = """
-[[balancer_shafts]]
-name = "left"
-ratio = 2
-position = ["60 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-radius = "20 mm"
-unbalance = { between = ["0 kg m", "0.05 kg m"] }
-angle = { between = [0, 360] }
-[[balancer_shafts]]
-name = "right"
-ratio = -2
-position = ["-60 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-radius = "20 mm"
-unbalance = { between = ["0 kg m", "0.05 kg m"] }
-angle = { between = [0, 360] }
-"""
 _SPEED = '[[operating_points]]\nspeed = "2500 rpm"\n'
 
 SHAKING_ONLY = (
-    _FOUR
+    FOUR
     + _SPEED
     + SECOND_ORDER_SHAFTS
     + """
@@ -61,9 +25,9 @@ minimise = "mean shaking force"
 )
 
 TIGHT = (
-    _FOUR
+    FOUR
     + _SPEED
-    + _MOUNTS
+    + MOUNTS
     + SECOND_ORDER_SHAFTS
     + """
 [[constraints]]
@@ -73,9 +37,9 @@ max = "0.5 kg"
 )
 
 IMPOSSIBLE = (
-    _FOUR
+    FOUR
     + _SPEED
-    + _MOUNTS
+    + MOUNTS
     + SECOND_ORDER_SHAFTS
     + """
 [[constraints]]
@@ -94,7 +58,7 @@ max = "1e6 N"
 )
 
 TWO_POINTS = (
-    _FOUR
+    FOUR
     + """
 [[operating_points]]
 name = "idle"
@@ -104,14 +68,14 @@ name = "rated"
 speed = "2500 rpm"
 weight = 3
 """
-    + _MOUNTS
+    + MOUNTS
     + SECOND_ORDER_SHAFTS
 )
 
-GIVEN = _FOUR + _SPEED + _MOUNTS
+GIVEN = FOUR + _SPEED + MOUNTS
 
 UNCARRIED = (
-    _FOUR
+    FOUR
     + _SPEED
     + """
 [mounts]
@@ -214,17 +178,10 @@ samples = 360
 """
 
 
-def written(folder: Path, text: str, name: str = "scene") -> Path:
-    """A problem file with this text."""
-    path = folder / f"{name}.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def problem_of(text: str) -> Problem:
     """The problem that a text describes."""
     with tempfile.TemporaryDirectory() as folder:
-        return load(written(Path(folder), text))
+        return loaded(Path(folder), text)
 
 
 @cache

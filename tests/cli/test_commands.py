@@ -15,6 +15,7 @@ import laufruhe.solvers
 from cli import scenes
 from laufruhe.cli import app
 from laufruhe.errors import SolverError
+from problem_files import written
 
 ALL_FILES = {"result.json", "report.md", "polar.png", "bars.png", "spectrum.png"}
 
@@ -46,7 +47,7 @@ def refused(result: Result, *words: str) -> None:
 
 
 def test_solve_writes_everything_under_results(here: Path) -> None:
-    path = scenes.written(here, scenes.TIGHT, "tight")
+    path = written(here, scenes.TIGHT, "tight")
     result = run("solve", path)
     assert result.exit_code == 0
     assert tree(here / "results") == {f"tight/{name}" for name in ALL_FILES}
@@ -57,17 +58,17 @@ def test_solve_writes_everything_under_results(here: Path) -> None:
 
 
 def test_evaluate_leaves_the_design_as_given(here: Path) -> None:
-    path = scenes.written(here, scenes.TIGHT)
+    path = written(here, scenes.TIGHT)
     assert run("evaluate", path, "--out", "given", "--no-plots").exit_code == 0
-    written = json.loads((here / "given/result.json").read_text(encoding="utf-8"))
-    assert written["objective"]["value"] == written["objective"]["initial"]
-    assert written["decisions"] == {}
-    assert written["certificate"] is None
-    assert written["constraints"][0]["value"] == 0.0
+    record = json.loads((here / "given/result.json").read_text(encoding="utf-8"))
+    assert record["objective"]["value"] == record["objective"]["initial"]
+    assert record["decisions"] == {}
+    assert record["certificate"]["kind"] == "none"
+    assert record["constraints"][0]["value"] == 0.0
 
 
 def test_check_says_what_is_open_and_writes_nothing(here: Path) -> None:
-    path = scenes.written(here, scenes.TIGHT)
+    path = written(here, scenes.TIGHT)
     result = run("check", path)
     assert result.exit_code == 0
     assert result.stdout.startswith("ok: ")
@@ -77,31 +78,31 @@ def test_check_says_what_is_open_and_writes_nothing(here: Path) -> None:
 
 
 def test_json_on_standard_output_is_pure(here: Path) -> None:
-    result = run("solve", scenes.written(here, scenes.TIGHT), "--json", "-", "--no-plots")
+    result = run("solve", written(here, scenes.TIGHT), "--json", "-", "--no-plots")
     assert json.loads(result.stdout)["status"] == "optimal"
     assert "mount 1" in result.stderr
     assert result.stdout == (here / "results/scene/result.json").read_text(encoding="utf-8")
 
 
 def test_json_file_is_the_result(here: Path) -> None:
-    run("solve", scenes.written(here, scenes.TIGHT), "--json", "deep/answer.json", "--no-plots")
+    run("solve", written(here, scenes.TIGHT), "--json", "deep/answer.json", "--no-plots")
     assert (here / "deep/answer.json").read_bytes() == (here / "results/scene/result.json").read_bytes()
     assert tree(here / "deep") == {"answer.json"}
 
 
 @pytest.mark.skipif(not Path("/dev/null").is_char_device(), reason="needs a device file")
 def test_json_to_a_device_leaves_the_device(here: Path) -> None:
-    assert run("solve", scenes.written(here, scenes.TIGHT), "--json", "/dev/null", "--no-plots").exit_code == 0
+    assert run("solve", written(here, scenes.TIGHT), "--json", "/dev/null", "--no-plots").exit_code == 0
     assert Path("/dev/null").is_char_device()
 
 
 def test_infeasible_names_the_conflict_and_is_written(here: Path) -> None:
-    result = run("solve", scenes.written(here, scenes.IMPOSSIBLE), "--no-plots")
+    result = run("solve", written(here, scenes.IMPOSSIBLE), "--no-plots")
     assert result.exit_code == 1
-    written = json.loads((here / "results/scene/result.json").read_text(encoding="utf-8"))
-    assert written["status"] == "infeasible"
-    assert set(written["conflict"]) == {"light shafts", "quiet mounts"}
-    for name in written["conflict"]:
+    record = json.loads((here / "results/scene/result.json").read_text(encoding="utf-8"))
+    assert record["status"] == "infeasible"
+    assert set(record["conflict"]) == {"light shafts", "quiet mounts"}
+    for name in record["conflict"]:
         assert name in result.stderr
     assert "idle limit" not in result.stderr
 
@@ -111,7 +112,7 @@ def test_a_solver_that_gives_up_is_a_failed_result(here: Path, monkeypatch: pyte
         raise SolverError("the cone solver gave up")
 
     monkeypatch.setattr(laufruhe.solvers, "solve", give_up)
-    result = run("solve", scenes.written(here, scenes.TIGHT), "--no-plots")
+    result = run("solve", written(here, scenes.TIGHT), "--no-plots")
     assert result.exit_code == 1
     assert "gave up" in result.stderr
     assert json.loads((here / "results/scene/result.json").read_text(encoding="utf-8"))["status"] == "failed"
@@ -122,7 +123,7 @@ def test_an_interrupt_leaves_nothing(here: Path, monkeypatch: pytest.MonkeyPatch
         raise KeyboardInterrupt
 
     monkeypatch.setattr(laufruhe.solvers, "solve", interrupt)
-    path = scenes.written(here, scenes.TIGHT)
+    path = written(here, scenes.TIGHT)
     result = run("solve", path, "--json", "answer.json")
     assert result.exit_code == 130
     assert result.stderr == "laufruhe: interrupted, nothing was written\n"
@@ -130,7 +131,7 @@ def test_an_interrupt_leaves_nothing(here: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_an_interrupt_keeps_the_earlier_result(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = scenes.written(here, scenes.TIGHT)
+    path = written(here, scenes.TIGHT)
     run("solve", path)
     before = {name: (here / "results/scene" / name).read_bytes() for name in ALL_FILES}
 
@@ -144,7 +145,7 @@ def test_an_interrupt_keeps_the_earlier_result(here: Path, monkeypatch: pytest.M
 
 
 def test_pictures_of_another_result_do_not_stay(here: Path) -> None:
-    path = scenes.written(here, scenes.TIGHT)
+    path = written(here, scenes.TIGHT)
     run("solve", path)
     (here / "results/scene/notes.txt").write_text("mine")
     run("evaluate", path, "--no-plots")
@@ -154,21 +155,21 @@ def test_pictures_of_another_result_do_not_stay(here: Path) -> None:
 @pytest.mark.parametrize("command", ["solve", "evaluate", "check"])
 def test_bad_input_is_refused(here: Path, command: str) -> None:
     refused(run(command, "missing.toml"), "missing.toml", "does not exist")
-    wrong = scenes.written(here, scenes.TIGHT.replace('stroke = "120 mm"', 'stroke = "120 kg"'))
+    wrong = written(here, scenes.TIGHT.replace('stroke = "120 mm"', 'stroke = "120 kg"'))
     refused(run(command, wrong), "scene.toml", "engine.stroke", "not a unit of a length")
     assert tree(here) == {"scene.toml"}
 
 
 @pytest.mark.parametrize("command", ["solve", "evaluate", "check"])
 def test_a_load_that_no_mount_carries_is_bad_input(here: Path, command: str) -> None:
-    path = scenes.written(here, scenes.UNCARRIED)
+    path = written(here, scenes.UNCARRIED)
     refused(run(command, path), "scene.toml", "no mount carries")
     assert list(here.iterdir()) == [path]
 
 
 def test_every_complaint_gets_a_line(here: Path) -> None:
     text = scenes.TIGHT.replace("rod_ratio", "rod_ration").replace('"1.25 kg"', '"-1 kg"')
-    result = run("solve", scenes.written(here, text))
+    result = run("solve", written(here, text))
     assert result.exit_code == 2
     lines = result.stderr.splitlines()
     assert len(lines) == 2
@@ -178,15 +179,15 @@ def test_every_complaint_gets_a_line(here: Path) -> None:
 
 @pytest.mark.parametrize("tolerance", ["0", "-1", "nan", "inf"])
 def test_a_tolerance_is_above_zero(here: Path, tolerance: str) -> None:
-    path = scenes.written(here, scenes.TIGHT)
+    path = written(here, scenes.TIGHT)
     refused(run("solve", path, "--tolerance", tolerance), "--tolerance")
     assert list(here.iterdir()) == [path]
 
 
 def test_the_tolerance_is_used(here: Path) -> None:
-    run("solve", scenes.written(here, scenes.TIGHT), "--tolerance", "1e-2", "--no-plots")
-    written = json.loads((here / "results/scene/result.json").read_text(encoding="utf-8"))
-    assert written["status"] == "optimal"
+    run("solve", written(here, scenes.TIGHT), "--tolerance", "1e-2", "--no-plots")
+    record = json.loads((here / "results/scene/result.json").read_text(encoding="utf-8"))
+    assert record["status"] == "optimal"
     assert "--tolerance 0.01" in (here / "results/scene/report.md").read_text(encoding="utf-8")
 
 
@@ -201,7 +202,7 @@ class TestUnwritable:
         monkeypatch.setattr(laufruhe.solvers, "solve", solve)
 
     def test_a_file_stands_where_the_folder_goes(self, here: Path) -> None:
-        path = scenes.written(here, scenes.TIGHT)
+        path = written(here, scenes.TIGHT)
         (here / "results").write_text("a file")
         refused(run("solve", path), "results", "cannot be written")
         refused(run("solve", path, "--out", path), "--out", "is not a folder")
@@ -209,43 +210,43 @@ class TestUnwritable:
         assert tree(here) == {"scene.toml", "results"}
 
     def test_a_folder_stands_where_a_file_goes(self, here: Path) -> None:
-        path = scenes.written(here, scenes.TIGHT)
+        path = written(here, scenes.TIGHT)
         (here / "out/result.json").mkdir(parents=True)
         refused(run("solve", path, "--out", "out"), "--out", "is a folder")
         assert list((here / "out").iterdir()) == [here / "out/result.json"]
 
     @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder that nobody can write to")
     def test_nobody_can_write_there(self, here: Path) -> None:
-        path = scenes.written(here, scenes.TIGHT)
+        path = written(here, scenes.TIGHT)
         refused(run("solve", path, "--out", "/proc/laufruhe"), "--out", "/proc/laufruhe")
         refused(run("solve", path, "--json", "/proc/laufruhe/answer.json"), "--json")
         assert list(here.iterdir()) == [path]
 
     @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
     def test_permission_is_missing(self, here: Path) -> None:
-        path = scenes.written(here, scenes.TIGHT)
+        path = written(here, scenes.TIGHT)
         (here / "locked").mkdir(mode=0o500)
         refused(run("solve", path, "--out", "locked"), "--out", "Permission denied")
 
     def test_json_is_a_folder(self, here: Path) -> None:
-        path = scenes.written(here, scenes.TIGHT)
+        path = written(here, scenes.TIGHT)
         refused(run("solve", path, "--json", here), "--json", "is a folder")
         assert list(here.iterdir()) == [path]
 
     def test_json_is_the_problem(self, here: Path) -> None:
-        path = scenes.written(here, scenes.TIGHT)
+        path = written(here, scenes.TIGHT)
         refused(run("solve", path, "--json", path), "--json", "is the problem file")
         assert path.read_text(encoding="utf-8") == scenes.TIGHT
 
 
 def test_a_name_of_dots_stays_under_results(here: Path) -> None:
-    assert run("evaluate", scenes.written(here, scenes.GIVEN, "..."), "--no-plots").exit_code == 0
+    assert run("evaluate", written(here, scenes.GIVEN, "..."), "--no-plots").exit_code == 0
     assert tree(here / "results") == {"problem/result.json", "problem/report.md"}
 
 
 def test_markup_in_a_title_is_text(here: Path) -> None:
     title = "[red]x[/red] :smile: $a $b | <b> *c*"
-    path = scenes.written(here, scenes.GIVEN.replace("Four in line", title))
+    path = written(here, scenes.GIVEN.replace("Four in line", title))
     result = run("evaluate", path)
     assert result.exit_code == 0
     assert title in result.stdout
@@ -269,7 +270,7 @@ def test_help_imports_no_heavy_library() -> None:
 
 
 def test_evaluate_and_check_need_no_solver(tmp_path: Path) -> None:
-    path = scenes.written(tmp_path, scenes.GIVEN)
+    path = written(tmp_path, scenes.GIVEN)
     code = (
         "import sys\n"
         "from laufruhe.cli import app\n"
@@ -287,7 +288,7 @@ def test_the_process_ends_with_the_status(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
     assert in_a_process("--version").stdout.startswith("laufruhe ")
     assert in_a_process("solve").returncode == 2
-    path = scenes.written(tmp_path, scenes.GIVEN)
+    path = written(tmp_path, scenes.GIVEN)
     done = in_a_process("evaluate", str(path), "--out", str(tmp_path / "out"), "--no-plots")
     assert done.returncode == 0
     # a pipe gets neither a spinner nor colours

@@ -11,12 +11,13 @@ from typer.testing import CliRunner
 
 from cli import scenes
 from laufruhe.cli import app
+from problem_files import written
 
 RUN = CliRunner()
 
 
 def test_explain_says_what_is_left_out(tmp_path: Path) -> None:
-    path = scenes.written(tmp_path, scenes.SHAKING_ONLY)
+    path = written(tmp_path, scenes.SHAKING_ONLY)
     answer = RUN.invoke(app, ["explain", str(path), "--tolerance", "1e-2"])
     assert answer.exit_code == 0, answer.output
     for text in ("kept:", "left out:", "saved:", "gas: the problem describes none", "Fx, Fy"):
@@ -25,7 +26,7 @@ def test_explain_says_what_is_left_out(tmp_path: Path) -> None:
 
 
 def test_explain_as_json(tmp_path: Path) -> None:
-    path, out = scenes.written(tmp_path, scenes.GIVEN), tmp_path / "explain.json"
+    path, out = written(tmp_path, scenes.GIVEN), tmp_path / "explain.json"
     assert RUN.invoke(app, ["explain", str(path), "--json", str(out)]).exit_code == 0
     data = json.loads(out.read_text(encoding="utf-8"))
     assert data["error_estimate"] <= data["tolerance"] == 1e-3
@@ -35,13 +36,13 @@ def test_explain_as_json(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("tolerance", ["0", "-1", "nan"])
 def test_tolerance_must_be_positive(tolerance: str, tmp_path: Path) -> None:
-    path = scenes.written(tmp_path, scenes.GIVEN)
+    path = written(tmp_path, scenes.GIVEN)
     answer = RUN.invoke(app, ["explain", str(path), "--tolerance", tolerance])
     assert answer.exit_code == 2
 
 
 def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
-    path, out = scenes.written(tmp_path, scenes.TIGHT), tmp_path / "trade"
+    path, out = written(tmp_path, scenes.TIGHT), tmp_path / "trade"
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(out), "--json", str(tmp_path / "trade.json")])
     assert answer.exit_code == 0, answer.output
     assert {p.name for p in out.iterdir()} == {"scene.md", "scene.png"}
@@ -58,7 +59,7 @@ def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
 
 
 def test_trade_of_a_damaged_file(tmp_path: Path) -> None:
-    path = scenes.written(tmp_path, "title = 3")
+    path = written(tmp_path, "title = 3")
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(tmp_path / "trade")])
     assert answer.exit_code == 2
     assert not (tmp_path / "trade").exists()
@@ -80,7 +81,7 @@ def test_trade_of_a_question_about_modes(tmp_path: Path) -> None:
 
 def test_trade_of_elastic_mounts(tmp_path: Path) -> None:
     """Mounts held, unbalances open: rows of the block's own choices, and a regret where they can decide."""
-    path, out = scenes.written(tmp_path, _elastic_with_a_shaft()), tmp_path / "trade.json"
+    path, out = written(tmp_path, _elastic_with_a_shaft()), tmp_path / "trade.json"
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(tmp_path / "trade"), "--json", str(out)])
     assert answer.exit_code == 0, answer.output
     (data,) = json.loads(out.read_text(encoding="utf-8"))

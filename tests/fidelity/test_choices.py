@@ -27,6 +27,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.problem.reader import load
 from laufruhe.solvers import solve
+from problem_files import written
 
 ROOT = Path(__file__).parents[2]
 PROBLEMS = ROOT / "problems"
@@ -164,7 +165,7 @@ def _with(text: str, table: str) -> str:
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
 def test_solve_within_a_tolerance(tolerance: float, tmp_path: Path) -> None:
     text = _with(scenes.TIGHT, f'kinematics = "auto"\ntolerance = {tolerance}')
-    problem = load(scenes.written(tmp_path, text))
+    problem = load(written(tmp_path, text))
     result = solve(problem)
     truth = objective_value(problem, reference(problem, result.final.engine))
     assert result.objective is not None
@@ -185,11 +186,11 @@ def test_solve_within_a_tolerance(tolerance: float, tmp_path: Path) -> None:
 )
 def test_contradictions_are_refused(table: str, key: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=key):
-        load(scenes.written(tmp_path, _with(scenes.GIVEN, table)))
+        load(written(tmp_path, _with(scenes.GIVEN, table)))
 
 
 def test_uneven_speed_from_a_file(tmp_path: Path) -> None:
-    problem = load(scenes.written(tmp_path, _with(scenes.TIGHT, 'samples = 360\ncrank_inertia = "0.5 kg m^2"')))
+    problem = load(written(tmp_path, _with(scenes.TIGHT, 'samples = 360\ncrank_inertia = "0.5 kg m^2"')))
     assert problem.fidelity.is_uneven
     result = solve(problem)
     assert result.certificate is not None

@@ -27,6 +27,7 @@ from laufruhe.problem.mount_design import NOTHING_ASKED, mounting_in
 from laufruhe.problem.mount_needs import needs
 from laufruhe.problem.reader import load
 from laufruhe.solvers import solve
+from problem_files import written
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 READY = sorted(path for path in PROBLEMS.glob("*.toml") if 'kind = "elastic"' in path.read_text(encoding="utf-8"))
@@ -228,14 +229,14 @@ def test_rigid_mounts_have_no_choice() -> None:
 )
 def test_choices_of_elastic_mounts_need_them(table: str, key: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=key):
-        load(scenes.written(tmp_path, scenes.GIVEN + "\n[fidelity]\n" + table))
+        load(written(tmp_path, scenes.GIVEN + "\n[fidelity]\n" + table))
 
 
 @pytest.mark.parametrize("modes", ["[0]", "[7]", "[1, 1]"])
 def test_modes_are_numbers_of_the_table(modes: str, tmp_path: Path) -> None:
     text = _elastic_text() + f"\n[fidelity]\nmodes = {modes}\n"
     with pytest.raises(InputError, match=r"fidelity\.modes"):
-        load(scenes.written(tmp_path, text))
+        load(written(tmp_path, text))
     with pytest.raises(ModelError, match="modes"):
         Fidelity(modes=tuple(int(k) for k in modes.strip("[]").split(",")))
 
@@ -250,10 +251,10 @@ def _elastic_text() -> str:
 
 
 def test_modes_from_a_file(tmp_path: Path) -> None:
-    problem = load(scenes.written(tmp_path, _elastic_text() + "\n[fidelity]\nmodes = [3, 6]\n"))
+    problem = load(written(tmp_path, _elastic_text() + "\n[fidelity]\nmodes = [3, 6]\n"))
     assert problem.fidelity.modes == (3, 6)
     with pytest.raises(InputError, match="leave one of the two out"):
-        load(scenes.written(tmp_path, _elastic_text() + '\n[fidelity]\nmodes = [3]\nmounts = "rigid"\n'))
+        load(written(tmp_path, _elastic_text() + '\n[fidelity]\nmodes = [3]\nmounts = "rigid"\n'))
 
 
 def test_a_question_about_modes_needs_no_loads() -> None:

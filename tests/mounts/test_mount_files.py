@@ -78,7 +78,7 @@ REFUSED = {
                   'stiffness = ["1 N/mm", "1 N/mm", "1 N/mm"]\n', BLOCK, "",
                   "mounts: leave the block free in roll and pitch and yaw"),
     "reversed bounds": (MOUNTS.replace(OPEN, '{ between = ["9 N/mm", "3 N/mm"] }', 1), BLOCK, SAG, "bounds reversed"),
-    "limits that contradict": (MOUNTS, BLOCK, SAG + 'min = "15 Hz"\n', "contradict each other: at least 15 Hz and"),
+    "limits that contradict": (MOUNTS, BLOCK, SAG + 'min = "15 Hz"\n', "contradicts itself: at least 15 Hz and"),
     "speed for frequency": (MOUNTS, BLOCK, SAG.replace("40/3 Hz", "400 rpm"), "'rpm' is no frequency in Hz"),
     "unknown key": (MOUNTS.replace("loss_factor", "loss_facto"), BLOCK, SAG, "did you mean 'loss_factor'"),
     "unknown leader": (MOUNTS.replace('mirror_of = "rear left"', 'mirror_of = "rear lef"'), BLOCK, SAG,

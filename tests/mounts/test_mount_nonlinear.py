@@ -211,7 +211,8 @@ def test_a_natural_frequency_is_kept_out_of_a_band(tmp_path):
     )
     result = solve_mounts(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked, SEARCH))
     frequencies = mounting_in(result.final.engine).modes.frequencies
-    assert result.status is Status.FEASIBLE
+    # two open stiffnesses: the bounds are divided until nothing better is left
+    assert result.status is Status.OPTIMAL
     assert not np.any((frequencies > 8.0 * (1 + 1e-6)) & (frequencies < 12.0 * (1 - 1e-6)))
     given = mounting_in(result.initial.engine).modes.frequencies
     assert np.any((given > 8.0) & (given < 12.0))

@@ -13,6 +13,7 @@ from laufruhe.machine import Block, Mount
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.run_up import periodic_state, run_through, time_model
+from laufruhe.physics.time_mounting import INTEGRATION
 from mounts.powertrain import powertrain, random_mounting, wrench
 
 RPM = np.pi / 30.0
@@ -37,6 +38,27 @@ def test_light_damping_near_resonance_too():
     expected = mounting.forces(load, speed).values(steady.angles)
     assert np.abs(expected).max() > 10 * np.abs(mounting.forces(load, 0.2 * speed).sample(64)).max()
     assert np.abs(steady.forces - expected).max() <= 1e-6 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("tolerance", [1e-11, INTEGRATION, 1e-7])
+def test_a_mean_torque_on_soft_mounts_settles(tolerance):
+    """An idling four-cylinder: what the integration rounds moves the start, and the period is closed all the same."""
+    turned = ((3**0.5 / 2, 0.0, 0.5), (0.0, 1.0, 0.0), (-0.5, 0.0, 3**0.5 / 2))
+    mounts = [
+        Mount("right", (0.15, -0.3, 0.12), (40e3, 40e3, 60e3), loss_factor=0.12),
+        Mount("left", (0.15, 0.3, 0.12), (40e3, 40e3, 60e3), loss_factor=0.12),
+        Mount("rear", (-0.45, 0.0, -0.05), (80e3, 60e3, 40e3), turned, loss_factor=0.12),
+    ]
+    block = Block(180.0, ((9.0, 0.0, 0.0), (0.0, 14.0, 0.0), (0.0, 0.0, 12.0)), (-0.04, 0.0, 0.08))
+    coefficients = np.zeros((37, 6), dtype=complex)
+    coefficients[0, 3], coefficients[4, 2] = 39.75, 251.5
+    coefficients[4::4, 3] = -149j / np.arange(1, 10) ** 2
+    mounting, speed = elastic_mounting(block, mounts), 750.0 * RPM
+    load = Spectrum(Fraction(1, 2), coefficients)
+    steady = periodic_state(mounting, load, speed, tolerance=tolerance)
+    means = mounting.forces(load, speed).coefficients[0].real
+    assert steady.mismatch < 1e3 * tolerance
+    assert steady.forces.mean(axis=0) == pytest.approx(means, rel=max(1e-6, 10.0 * tolerance), abs=1e-5)
 
 
 def test_equal_loss_keeps_every_modes_loss_factor():

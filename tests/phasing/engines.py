@@ -1,9 +1,21 @@
 """Problem files that phasing tests write for themselves."""
 
+from functools import cache
 from pathlib import Path
 
 from laufruhe.problem.model import Problem
 from laufruhe.problem.reader import load
+from laufruhe.solvers import Result, solve
+from problem_files import loaded
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+
+
+@cache
+def solved(name: str) -> Result:
+    """The result of a ready problem, solved once for all tests."""
+    return solve(load(PROBLEMS / f"{name}.toml"))
+
 
 MOUNTS = """
 [mounts]
@@ -82,6 +94,4 @@ samples = {samples}
 speed = "2000 rpm"
 
 {rest}"""
-    path = folder / "test.toml"
-    path.write_text(text, encoding="utf-8")
-    return load(path)
+    return loaded(folder, text)

@@ -110,7 +110,7 @@ def test_refused(tmp_path, cylinders, engine, phasing, rest, said):
 def test_cylinders_are_asked_for(tmp_path):
     engines.problem(tmp_path, 4, engine='throws = "open"')
     path = tmp_path / "none.toml"
-    path.write_text((tmp_path / "test.toml").read_text().replace("cylinders = 4\n", ""), encoding="utf-8")
+    path.write_text((tmp_path / "scene.toml").read_text().replace("cylinders = 4\n", ""), encoding="utf-8")
     with pytest.raises(InputError, match=r"engine\.cylinders: is missing, and open throws do not tell it"):
         load(path)
 

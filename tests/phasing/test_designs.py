@@ -1,9 +1,11 @@
 """Stars, shafts and unbalances together: cuts, listing and the mixed-integer program agree."""
 
+import itertools
+
 import numpy as np
 import pytest
 
-from laufruhe.errors import SolverError
+from laufruhe.errors import InputError, SolverError
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve
 from laufruhe.solvers.certificate import Multipliers, Proof, lower_bound
@@ -173,3 +175,41 @@ def test_shafts_keep_the_limits_on_number_and_mass(tmp_path):
     assert built["none"] == set()
     assert "against built" not in built["light"]
     assert "against built" in built["all"]
+
+
+GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "7 bar"\n'
+
+
+@pytest.mark.parametrize("measure", ["rms roll moment", "mean mount force"])
+def test_given_throws_get_the_firing_order_that_gas_likes_best(tmp_path, measure):
+    """Throws that fire unevenly: the objective differs from order to order, and none of them is under the bound."""
+    rest = engines.MOUNTS + GAS + f'[objective]\nminimise = "{measure}"\n'
+    wide = 'intervals = { min = "20 deg", max = "700 deg" }'
+
+    def solved(order):
+        engine = f"throws = [0, 90, 200, 300]\nfiring_order = {order}"
+        return solve(engines.problem(tmp_path, 4, "four-stroke", engine, wide, rest))
+
+    found = solved('"open"')
+    every = []
+    for rest_of_order in itertools.permutations((2, 3, 4)):
+        try:
+            every.append(solved([1, *rest_of_order]).objective.value)
+        except InputError:
+            # these throws cannot fire in this order within two turns
+            continue
+    assert max(every) > 1.02 * min(every)
+    assert len(every) == found.phasing.ranking[0].order_count
+    assert found.objective.value == pytest.approx(min(every), rel=1e-9)
+    assert found.certificate.kind is Proof.GLOBAL
+    assert found.certificate.lower_bound <= min(every) * (1.0 + 1e-12)
+
+
+def test_given_throws_that_break_a_limit_are_no_design(tmp_path):
+    """With nothing but the firing order open, limits are looked at too."""
+    limit = '[[constraints]]\nlimit = "maximum mount force"\nmax = "1 N"\n'
+    rest = engines.MOUNTS + engines.MOUNT_FORCE + limit
+    engine = 'throws = [0, 240, 120]\nfiring_order = "open"'
+    found = solve(engines.problem(tmp_path, 3, "four-stroke", engine, rest=rest))
+    assert found.status is Status.INFEASIBLE
+    assert "limits" in found.message

@@ -29,13 +29,13 @@ SPLIT = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0,
 @pytest.mark.parametrize("name", ["inline-seven-uneven", "inline-nine-uneven", "two-stroke-eight-uneven"])
 def test_slightly_uneven_angles_cut_the_couple(name):
     """The marine trick: a few degrees take most of the couple."""
-    problem = load(PROBLEMS / f"{name}.toml")
-    result = solve(problem)
+    problem, result = load(PROBLEMS / f"{name}.toml"), engines.solved(name)
     allowed = problem.phasing.intervals
     intervals = result.final.engine.firing_intervals
     assert allowed.holds(intervals, 1e-7)
     assert max(intervals) - min(intervals) > math.radians(0.5)
     assert result.objective.value < 0.5 * result.phasing.even_value
+    assert problem.limits
     for limit in problem.limits:
         assert result.final.value(limit.quantity) <= limit.maximum * (1.0 + 1e-6)
     trade = result.phasing.trade
@@ -51,7 +51,7 @@ def test_slightly_uneven_angles_cut_the_couple(name):
 
 def test_zero_is_reached_cleanly():
     """Four-stroke nine: both couples vanish within the intervals, and below zero there is nothing."""
-    result = solve(load(PROBLEMS / "inline-nine-uneven.toml"))
+    result = engines.solved("inline-nine-uneven")
     assert result.objective.value <= 1e-6 * result.phasing.even_value
     assert result.certificate.kind is Proof.GLOBAL
     assert result.certificate.kkt_residual < 1e-6
@@ -191,7 +191,7 @@ def test_no_uneven_star_goes_under_the_bound(tmp_path, cycle, cylinders):
 
 @pytest.mark.parametrize("name", ["inline-seven-uneven", "two-stroke-eight-uneven"])
 def test_the_trade_lies_between_its_bounds(name):
-    result = solve(load(PROBLEMS / f"{name}.toml"))
+    result = engines.solved(name)
     for point in result.phasing.trade:
         assert point.lower_bound <= point.value
     assert result.phasing.trade[0].lower_bound >= 0.95 * result.phasing.even_value

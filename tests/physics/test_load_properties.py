@@ -78,7 +78,7 @@ def bodies(draw: st.DrawFn, cycle: Cycle, shafts: Sequence[Shaft], number: int, 
     radius, rod_ratio, offset_share, piston, mass, gravity, inertia = alike or draw(mechanisms())
     shaft, throw, bank = draw(st.sampled_from(shafts)), draw(ANGLES), draw(ANGLES)
     rod = Rod(radius / rod_ratio, mass, gravity * radius / rod_ratio, inertia) if rod_ratio else None
-    dead_centre = (bank - throw) / shaft.ratio
+    dead_centre, between = (bank - throw) / shaft.ratio, 1.0 / abs(shaft.ratio)
     turns = draw(st.integers(0, STROKES[cycle] - 1))
     part = SliderCrank(
         f"cylinder {number}",
@@ -92,7 +92,7 @@ def bodies(draw: st.DrawFn, cycle: Cycle, shafts: Sequence[Shaft], number: int, 
         rotating_mass=rod.rotating_mass if rod else 0.0,
         rod_inertia_deficit=rod.inertia_deficit if rod else 0.0,
         bore=0.1,
-        firing_angle=math.tau * ((dead_centre / math.tau) % 1.0 + turns),
+        firing_angle=math.tau * ((dead_centre / math.tau) % between + turns * between),
         shaft=shaft,
     )
     return Bodies(part, piston, rod)
@@ -113,10 +113,15 @@ def mechanisms(draw: st.DrawFn) -> tuple[float, ...]:
 
 
 @st.composite
-def scenes(draw: st.DrawFn) -> Scene:
-    """Up to five cylinders, alike or each its own, on one crank or two, and up to three rotors."""
-    cycle = draw(st.sampled_from(Cycle))
-    shafts = [CRANKSHAFT, Shaft("geared crank", -1.0, draw(PLACES), draw(PLACES))][: draw(st.integers(1, 2))]
+def scenes(draw: st.DrawFn, ratios: Sequence[float] = (-1.0,)) -> Scene:
+    """Up to five cylinders, alike or each its own, on one crank or two, and up to three rotors.
+
+    The second crank has one of the `ratios`, and with half ratios the cycle four strokes.
+    """
+    halves = any(ratio % 1.0 for ratio in ratios)
+    cycle = Cycle.FOUR_STROKE if halves else draw(st.sampled_from(Cycle))
+    geared = Shaft("geared crank", draw(st.sampled_from(ratios)), draw(PLACES), draw(PLACES))
+    shafts = [CRANKSHAFT, geared][: draw(st.integers(1, 2))]
     alike = draw(st.one_of(st.just(()), mechanisms()))
     cylinders = tuple(draw(bodies(cycle, shafts, k + 1, alike)) for k in range(draw(st.integers(1, 5))))
     rotors = tuple(
@@ -124,7 +129,7 @@ def scenes(draw: st.DrawFn) -> Scene:
             f"rotor {k}",
             draw(PLACES),
             cmath.rect(draw(st.floats(1e-3, 0.1)), draw(ANGLES)),
-            Shaft(f"shaft {k}", draw(st.sampled_from([1.0, -1.0, 2.0, -2.0])), draw(PLACES), draw(PLACES)),
+            Shaft(f"shaft {k}", draw(st.sampled_from([1.0, -1.0, 2.0, -2.0, *ratios])), draw(PLACES), draw(PLACES)),
         )
         for k in range(draw(st.integers(0, 3)))
     )
@@ -260,6 +265,12 @@ class TestMomentum:
         expected = np.array([_momentum_change(scene, angle) for angle in angles])
         size = float(np.abs(expected).max()) + 1e-9
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-11 * size)
+
+    @given(scenes(ratios=(-1.5, 0.5, 2.5)), st.floats(0.0, 12.6))
+    def test_cranks_and_shafts_of_any_ratio(self, scene: Scene, angle: float) -> None:
+        """The same for second cranks beside the first one, at ratios whose loads have half orders."""
+        found, expected = loads_of(scene.engine).values(np.array([angle]))[0], _momentum_change(scene, angle)
+        assert found == pytest.approx(expected, rel=0.0, abs=1e-11 * (float(np.abs(expected).max()) + 1e-9))
 
     @given(scenes())
     def test_inertia_does_no_work_at_constant_speed(self, scene: Scene) -> None:

@@ -19,6 +19,7 @@ from laufruhe.plots.style import DPI, fitted
 from laufruhe.problem.evaluation import measured, mount_samples
 from laufruhe.report.measures import mount_orders
 from laufruhe.solvers import Result
+from problem_files import written
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -198,7 +199,7 @@ def test_long_lines_are_cut() -> None:
 
 
 def test_pictures_need_no_pyplot_and_change_no_settings(tmp_path: Path) -> None:
-    path = scenes.written(tmp_path, scenes.GIVEN)
+    path = written(tmp_path, scenes.GIVEN)
     code = (
         "import sys; from pathlib import Path; import matplotlib as mpl; before = dict(mpl.rcParams)\n"
         "from laufruhe.problem.reader import load; from laufruhe.solvers import state\n"

@@ -15,7 +15,7 @@ from laufruhe.machine import Role
 from laufruhe.physics.shaking_loads import rotating_loads, rotor_loads
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
+from problem_files import loaded, open_unbalance, shaft
 
 ENGINE = """
 title = "Vee"
@@ -38,28 +38,6 @@ speed = "2500 rpm"
 [objective]
 minimise = "mean shaking force"
 """
-SHAFTS = """
-[[balancer_shafts]]
-name = "leader"
-ratio = 2
-position = ["100 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-radius = "20 mm"
-unbalance = { between = ["0 kg m", "1 kg m"], start = "0.3 kg m" }
-angle = { between = [0, 360], start = 40 }
-[[balancer_shafts]]
-name = "follower"
-ratio = -2
-position = ["-100 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-name = "front"
-x = "50 mm"
-coupled = { to = "leader", as = "HOW" }
-[[balancer_shafts.unbalances]]
-name = "rear"
-x = "-50 mm"
-coupled = { to = "follower.front", as = "THEN" }
-"""
 SENSES = {
     "equal": lambda u: u,
     "opposite": lambda u: -u,
@@ -75,9 +53,22 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def problem_of(folder: Path, text: str) -> Problem:
-    path = folder / "scene.toml"
-    path.write_text(ENGINE + text, encoding="utf-8")
-    return load(path)
+    return loaded(folder, ENGINE + text)
+
+
+def coupled(how: str, then: str) -> str:
+    """The shafts of a leader, of its follower, and of the follower of that."""
+    leader = shaft("leader", 2, "100 mm", open_unbalance("1 kg m", '"0.3 kg m"', "40"))
+    followers = f"""
+name = "front"
+x = "50 mm"
+coupled = {{ to = "leader", as = "{how}" }}
+[[balancer_shafts.unbalances]]
+name = "rear"
+x = "-50 mm"
+coupled = {{ to = "follower.front", as = "{then}" }}
+"""
+    return leader + shaft("follower", -2, "-100 mm", followers)
 
 
 def unbalances(problem: Problem, *values: complex) -> dict[str, complex]:
@@ -86,14 +77,14 @@ def unbalances(problem: Problem, *values: complex) -> dict[str, complex]:
 
 class TestDesign:
     def test_the_start_is_the_design_as_given(self, folder: Path) -> None:
-        problem = problem_of(folder, SHAFTS.replace("HOW", "mirrored").replace("THEN", "opposite"))
+        problem = problem_of(folder, coupled("mirrored", "opposite"))
         assert problem.design(problem.start) == problem.engine
         assert problem.start == (pytest.approx(cmath.rect(0.3, math.radians(40))),)
 
     @given(VALUES)
     def test_only_rotors_change(self, folder: Path, value: complex) -> None:
         """Cylinders, mounts and throws stay."""
-        problem = problem_of(folder, SHAFTS.replace("HOW", "mirrored").replace("THEN", "opposite"))
+        problem = problem_of(folder, coupled("mirrored", "opposite"))
         design = problem.design([value])
         assert design.slider_cranks == problem.engine.slider_cranks
         throws = [r for r in design.rotors if r.role is Role.THROW]
@@ -101,7 +92,7 @@ class TestDesign:
         assert len(throws) == 2
 
     def test_as_many_values_as_decisions(self, folder: Path) -> None:
-        problem = problem_of(folder, SHAFTS.replace("HOW", "equal").replace("THEN", "equal"))
+        problem = problem_of(folder, coupled("equal", "equal"))
         with pytest.raises(ValueError, match="shorter"):
             problem.design([])
 
@@ -111,7 +102,7 @@ class TestCouplings:
     @pytest.mark.parametrize("how", SENSES)
     def test_followers_follow(self, folder: Path, how: str, then: str) -> None:
         """One decision moves the leader, its follower, and the follower of that; as given and as decided."""
-        problem = problem_of(folder, SHAFTS.replace("HOW", how).replace("THEN", then))
+        problem = problem_of(folder, coupled(how, then))
         (decision,) = problem.decisions
         assert decision.name == "leader.unbalance"
         assert [drive.rotor for drive in decision.drives] == ["leader", "follower.front", "follower.rear"]
@@ -125,14 +116,14 @@ class TestCouplings:
 
     def test_a_mirrored_pair_makes_an_upright_force(self, folder: Path) -> None:
         """What the coupling is for: the lateral forces of two contra-rotating shafts cancel at any angle."""
-        problem = problem_of(folder, SHAFTS.replace("HOW", "mirrored").replace("THEN", "equal"))
+        problem = problem_of(folder, coupled("mirrored", "equal"))
         rotors = [r for r in problem.design([0.2 + 0.1j]).rotors if r.name in ("leader", "follower.front")]
         force = rotor_loads(rotors, 100.0, problem.engine.cycle).at(2)
         assert force[1] == 0.0
         assert abs(force[2]) == pytest.approx(2 * abs(0.2 + 0.1j) * 200.0**2)
 
     def test_a_fixed_leader_is_followed_too(self, folder: Path) -> None:
-        text = SHAFTS.replace("HOW", "mirrored").replace("THEN", "opposite")
+        text = coupled("mirrored", "opposite")
         text = text.replace('{ between = ["0 kg m", "1 kg m"], start = "0.3 kg m" }', '"0.3 kg m"')
         problem = problem_of(folder, text.replace("{ between = [0, 360], start = 40 }", "40"))
         assert problem.decisions == ()
@@ -243,7 +234,7 @@ class TestCounterweights:
 @given(VALUES)
 def test_loads_change_by_those_of_the_rotors_decided(folder: Path, value: complex) -> None:
     """The exact model is linear in the decision: what it adds is what its rotors make alone."""
-    problem = problem_of(folder, SHAFTS.replace("HOW", "mirrored").replace("THEN", "opposite"))
+    problem = problem_of(folder, coupled("mirrored", "opposite"))
     design, bare = problem.design([value]), problem.design([0.0])
     (with_it,), (without,) = evaluate(problem, design).loads, evaluate(problem, bare).loads
     driven = {drive.rotor for drive in problem.decisions[0].drives}

@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from _pytest.mark.structures import ParameterSet
 
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
-from laufruhe.machine import Cycle, Seiliger
+from laufruhe.machine import Cycle, PressureTrace, Seiliger
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.reader import load
+from problem_files import FOUR, MOUNTS, changed, open_unbalance, shaft, written
 
-WHOLE = """
-title = "Four in line"
-
-[engine]
-layout = "inline"
-cycle = "four-stroke"
-bore = "100 mm"
-stroke = "120 mm"
-rod_ratio = 0.26
-reciprocating_mass = "1.25 kg"
-cylinder_spacing = "125 mm"
-throws = [0, 180, 180, 0]
-firing_order = [1, 3, 4, 2]
-
+WHOLE = "".join([
+    FOUR, 'bore = "100 mm"\nthrows = [0, 180, 180, 0]\n', """
 [[operating_points]]
 name = "rated"
 speed = "2500 rpm"
@@ -35,43 +25,22 @@ speed = "2500 rpm"
 model = "seiliger"
 peak_pressure = "80 kp/cm^2"
 imep = "5.5 kp/cm^2"
-
-[mounts]
-positions = [
-    ["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"],
-    ["-1 m", "250 mm", "0 mm"], ["-1 m", "-250 mm", "0 mm"],
-]
-
+""", MOUNTS, """
 [[counterweights]]
 name = "web"
 opposite_throw = 1
 radius = "80 mm"
 mass = { between = ["0 kg", "3 kg"] }
 angle = { between = [0, 360] }
-
-[[balancer_shafts]]
-name = "left"
-ratio = 2
-position = ["100 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-radius = "20 mm"
-unbalance = { between = ["0 kg m", "0.05 kg m"] }
-angle = { between = [0, 360] }
-
-[[balancer_shafts]]
-name = "right"
-ratio = -2
-position = ["-100 mm", "-100 mm"]
-[[balancer_shafts.unbalances]]
-coupled = { to = "left", as = "mirrored" }
-
+""", shaft("left", 2, "100 mm", open_unbalance()),
+    shaft("right", -2, "-100 mm", 'coupled = { to = "left", as = "mirrored" }'), """
 [objective]
 minimise = "mean mount force"
 
 [[constraints]]
 limit = "balancer mass"
 max = "4 kg"
-"""
+"""])  # fmt: skip
 PARTS = """
 title = "Two geared cranks"
 [engine]
@@ -85,17 +54,6 @@ slider_cranks = [{ x = "0 mm" }, { x = "0 mm", shaft = "second", throw = 180, ba
 [[operating_points]]
 speed = "3000 rpm"
 """
-
-
-def written(folder: Path, text: str) -> Path:
-    path = folder / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def changed(text: str, old: str, new: str) -> str:
-    assert text.count(old) >= 1, old
-    return text.replace(old, new, 1)
 
 
 def complaint_about(path: Path) -> str:
@@ -261,8 +219,10 @@ BAD = [
         'objective.mounts = "mount 5": is no mount'),
     bad("unknown operating point", '"mean mount force"', "\"mean mount force\"\noperating_points = [\"idle\"]",
         'objective.operating_points = "idle": is no operating point here'),
+    bad("mass without a unit", 'max = "4 kg"', "max = 4",
+        'constraints[1].max = "4": has no unit, a mass needs one; write for example "1.25 kg"'),
     bad("weights of a moment", '"mean mount force"', "\"mean roll moment\"\ndirection_weights = [1, 1, 0]",
-        "objective.mounts: goes with mount forces and travels only; leave it out"),
+        "objective.direction_weights: goes with mount forces and travels only; leave it out"),
     bad("gas without bore", "bore = \"100 mm\"\n", "",
         "engine.bore: is missing, and gas acts on it; add it"),
     bad("unknown gas model", '"seiliger"', '"seliger"',
@@ -382,6 +342,13 @@ class TestOnEvaluation:
 class TestOperatingPoints:
     """What the gas does at one of them."""
 
+    def test_what_cannot_be_reached_says_where(self, tmp_path: Path) -> None:
+        text = changed(
+            WHOLE, "[gas]", '[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\nimep = "0.1 bar"\n[gas]'
+        )
+        with pytest.raises(ModelError, match=r"^at idle: imep 0\.1 bar cannot be reached"):
+            evaluate(load(written(tmp_path, text)))
+
     def test_motored_compresses_and_burns_nothing(self, tmp_path: Path) -> None:
         gas = load(written(tmp_path, changed(WHOLE, "[gas]", "motored = true\n[gas]"))).points[0].gas
         assert isinstance(gas, Seiliger)
@@ -410,6 +377,29 @@ class TestTrace:
         evaluation = evaluate(problem)
         assert evaluation.loads[0].wrench.coefficients[0, 3].real != 0.0
 
+    @pytest.mark.parametrize("change", [
+        lambda text: text.replace(",", ";"),
+        lambda text: text.replace(",", ";").replace(".", ","),
+        lambda text: text.replace(",", "\t"),
+        lambda text: "\ufeff" + text,
+        lambda text: "\ufeff# test bench 3; 2500 rpm\n" + text.replace(",", ";"),
+        lambda text: text.replace("\n", "\r\n"),
+    ])  # fmt: skip
+    def test_as_spreadsheets_write_it(self, change: Callable[[str], str], tmp_path: Path) -> None:
+        """Semicolons, decimal commas, tabs, a byte order mark and notes say the same."""
+        headless = rows(360).split("\n", 1)[1]
+        plain = load(trace(tmp_path, headless)).points[0].gas
+        assert isinstance(plain, PressureTrace)
+        assert len(plain.angles) == 72
+        assert load(trace(tmp_path, change(headless))).points[0].gas == plain
+
+    @pytest.mark.parametrize("key", ["angle_unit", "pressure_unit"])
+    def test_wrong_unit(self, key: str, tmp_path: Path) -> None:
+        path = trace(tmp_path, rows(360))
+        text = path.read_text(encoding="utf-8")
+        path.write_text(changed(text, '"trace"', f'"trace"\n{key} = "parsec/s"'), encoding="utf-8")
+        assert complaint_about(path).startswith(f'gas.{key} = "parsec/s": ')
+
     def test_part_of_the_cycle(self, tmp_path: Path) -> None:
         """One turn of a four-stroke's two is not enough."""
         problem = load(trace(tmp_path, rows(360), "four-stroke"))
@@ -421,8 +411,8 @@ class TestTrace:
     @pytest.mark.parametrize(
         ("content", "said"),
         [
-            ("angle,pressure\n0,1\n5,one\n", 'gas.file = "pressure.csv": row 3 is no pair of numbers; write'),
-            ("0,1\n5\n", 'gas.file = "pressure.csv": row 2 is no pair of numbers; write'),
+            ("angle,pressure\n0,1\n5,one\n", 'gas.file = "pressure.csv": line 3 is no pair of numbers; write'),
+            ("0,1\n5\n", 'gas.file = "pressure.csv": line 2 is no pair of numbers; write'),
             ("", "gas: the trace has 0 points, too few for a cycle; give one every few degrees"),
             (
                 "0,1\n90,2\n80,1\n270,1\n",

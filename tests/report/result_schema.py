@@ -30,19 +30,14 @@ SCHEMA = {
     **table(
         problem=TEXT,
         status={"enum": ["optimal", "feasible", "infeasible", "failed"]},
-        objective={"anyOf": [{"type": "null"}, table(name=TEXT, value=NUMBER, unit=TEXT, initial=NUMBER)]},
-        certificate={
-            "anyOf": [
-                {"type": "null"},
-                table(
-                    kind={"enum": ["global", "global within gap", "local", "none"]},
-                    lower_bound=NUMBER,
-                    gap=NUMBER,
-                    kkt_residual=NUMBER,
-                    method=TEXT,
-                ),
-            ]
-        },
+        objective={"anyOf": [{"type": "null"}, table(name=TEXT, value=MAYBE, unit=TEXT, initial=MAYBE)]},
+        certificate=table(
+            kind={"enum": ["global", "global within gap", "local", "none"]},
+            lower_bound=MAYBE,
+            gap=MAYBE,
+            kkt_residual=MAYBE,
+            method=TEXT,
+        ),
         decisions={"type": "object", "additionalProperties": DECISION},
         constraints=array(CONSTRAINT),
         mounts=array(MOUNT),

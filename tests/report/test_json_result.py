@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,9 @@ def test_numbers_are_those_of_the_result() -> None:
 
 def test_mounts_agree_with_the_model() -> None:
     result = scenes.solved(scenes.TIGHT)
-    for mount in parsed(result)["mounts"]:
+    mounts = parsed(result)["mounts"]
+    assert [mount["name"] for mount in mounts] == result.final.mount_names
+    for mount in mounts:
         for measure, key in (("mean", "mean"), ("maximum", "max"), ("rms", "rms")):
             quantity = Quantity(Subject.MOUNT_FORCE, MEASURES[measure], mounts=(mount["name"],))
             assert mount[key] == pytest.approx(result.final.value(quantity), rel=1e-12)
@@ -84,6 +87,14 @@ def test_mounts_over_two_points_are_weighted() -> None:
         assert mount["max"] == rated["max"]
 
 
+def test_every_key_is_explained() -> None:
+    text = (Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8")
+    written = parsed(scenes.solved(scenes.TIGHT))
+    keys = {*written, *written["objective"], *written["certificate"], *written["constraints"][0], *written["mounts"][0]}
+    keys |= {*written["shaking"], *written["points"][0], *next(iter(written["decisions"].values()))}
+    assert not {key for key in keys if f"`{key}`" not in text}
+
+
 def test_shaking_orders_are_amplitudes_of_the_wrench() -> None:
     result = scenes.solved(scenes.SHAKING_ONLY)
     shaking = parsed(result)["shaking"]
@@ -95,11 +106,14 @@ def test_shaking_orders_are_amplitudes_of_the_wrench() -> None:
     assert whole[k] == pytest.approx(wrench.at(4.0))
 
 
-def test_infeasible_has_no_objective() -> None:
+def test_infeasible_says_what_was_minimised_and_proves_nothing() -> None:
     written = parsed(scenes.solved(scenes.IMPOSSIBLE))
     assert written["status"] == "infeasible"
-    assert written["objective"] is None
-    assert written["certificate"] is None
+    assert written["objective"]["name"] == "mean mount force"
+    assert written["objective"]["value"] is None
+    assert written["objective"]["initial"] > 0.0
+    assert written["certificate"]["kind"] == "none"
+    assert written["certificate"]["lower_bound"] is None
     assert written["decisions"] == {}
     assert set(written["conflict"]) == {"light shafts", "quiet mounts"}
     assert [entry["met"] for entry in written["constraints"]] == [True, False, True]

@@ -18,6 +18,7 @@ from laufruhe.solvers import Status, solve
 from laufruhe.solvers.affine import AffineModel
 from laufruhe.solvers.certificate import Proof, best_bound, kkt_residual
 from laufruhe.solvers.conic import ConicProgram
+from laufruhe.solvers.direct_cones import TIGHT
 from tractor import GAS, engine, free_unbalance, problem, shaft_rotor, web
 
 EXACT = Fidelity("exact", 720)
@@ -95,6 +96,26 @@ def test_gap_is_computed_from_the_exact_model() -> None:
     assert result.certificate.lower_bound <= result.objective.value
     assert 0.0 <= result.certificate.gap <= 1e-5
     assert result.certificate.kkt_residual < 1e-4
+
+
+@pytest.mark.parametrize("samples", [48, 96, 360])
+@pytest.mark.parametrize("subject", [Subject.MOUNT_FORCE, Subject.ROLL_MOMENT, Subject.SHAKING_FORCE])
+def test_bound_of_a_mean_holds_over_the_whole_cycle(subject: Subject, samples: int) -> None:
+    """However few the angles: the mean over the cycle of the design found, and of any near it, is not below (P7)."""
+    p = replace(four(Quantity(subject, Norm.SUM), tolerance=0.3), fidelity=Fidelity("exact", samples))
+    result = solve(p)
+    assert result.certificate is not None
+    model = AffineModel(p)
+    fine = model.at(20_160)
+    best = np.concatenate([domain.columns_of(r.unbalance) for domain, r in zip(
+        model.domains, result.final.engine.rotors, strict=True)])  # fmt: skip
+    rng = np.random.default_rng(11)
+    near = [best + step * rng.standard_normal(4) for step in (0.0, 1e-5, 1e-4) for _ in range(6)]
+    designs = [np.concatenate([domain.project(x) for domain in model.domains]) for x in near]
+    least = min(fine.objective(x) for x in designs)
+    assert result.certificate.lower_bound <= least * (1.0 + 1e-9)
+    # with many angles it is no idle bound
+    assert samples < 360 or result.certificate.lower_bound >= 0.99 * least
 
 
 def test_a_wrong_answer_gets_a_wide_gap() -> None:
@@ -176,6 +197,37 @@ def test_infeasible_names_the_limits_in_conflict_and_no_others() -> None:
     assert set(result.conflict) == {"peak force", "balancer mass"}
     assert "peak force" in result.message
     assert "generous" not in result.message
+
+
+@pytest.mark.parametrize("samples", [48, 180])
+def test_a_limit_that_only_finer_angles_contradict_is_told(samples: int) -> None:
+    """A largest roll moment that nothing open changes, a hair under its peak: met at many angles, not between.
+
+    The limit in conflict is named alone, and one at the peak itself is met.
+    """
+    roll = Quantity(Subject.ROLL_MOMENT, Norm.MAXIMUM)
+    rotors = [shaft_rotor("left", 2, 0.25, 0.0, 0.0)]
+    machine = engine(FOUR, rotors, firing_order=[1, 3, 4, 2])
+    p = problem(machine, ["left"], GAS, fidelity=Fidelity("exact", samples), upper=0.02)
+    peak = evaluate(p, samples=5760).value(roll)
+    mass = Limit("mass", BALANCER_MASS, 5.0)
+    told = solve(replace(p, limits=(mass, Limit("roll", roll, peak * (1.0 - 2e-5)))))
+    assert told.status is Status.INFEASIBLE
+    assert told.conflict == ("roll",)
+    assert solve(replace(p, limits=(mass, Limit("roll", roll, peak)))).status is Status.OPTIMAL
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_tolerances_out_of_reach_are_not_the_end(many: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the solver stalls before its tight tolerances, its own are tried; the design is judged as ever."""
+    result = solve(four(), many=many)
+    for module in ("conic", "direct_cones"):
+        monkeypatch.setattr(f"laufruhe.solvers.{module}.TIGHT", dict.fromkeys(TIGHT, 1e-300))
+    again = solve(four(), many=many)
+    assert result.objective is not None
+    assert again.objective is not None
+    assert again.objective.value == pytest.approx(result.objective.value, rel=1e-4)
+    assert again.status is Status.OPTIMAL
 
 
 def test_of_equal_designs_the_lightest() -> None:

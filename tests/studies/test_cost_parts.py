@@ -16,9 +16,9 @@ from laufruhe.problem.study_reader import load_study
 from laufruhe.report.study_kinds import SHOWN
 from laufruhe.studies import run
 from laufruhe.studies.free_forces import printed_agree
-from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.tolerance_study import verdicts
 from laufruhe.studies.worth import worths
+from problem_files import written
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 
@@ -75,24 +75,14 @@ literature = {{ couple_1 = 0.449, couple_2 = 4.9798, force_2 = 0.001 }}
 """
 
 
-def written(folder: Path, text: str) -> Path:
-    path = folder / "study.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def part_of(folder: Path, text: str) -> xr.Dataset:
-    datasets, _ = run(load_study(written(folder, text)), folder, folder / "kept")
+    datasets, _ = run(load_study(written(folder, text, "study")), folder, folder / "kept")
     return next(iter(datasets.values()))
-
-
-def test_every_kind_is_computed_and_shown() -> None:
-    assert KINDS.keys() == SHOWN.keys()
 
 
 def test_economics_by_its_command(tmp_path: Path) -> None:
     """Files, proofs, the worth of the shaft, and the engine with more cylinders rebuilt at equal power."""
-    path, out = written(tmp_path, ECONOMICS), tmp_path / "out"
+    path, out = written(tmp_path, ECONOMICS, "study"), tmp_path / "out"
     answer = CliRunner().invoke(app, ["study", str(path), "--out", str(out), "--json", str(tmp_path / "s.json")])
     assert answer.exit_code == 0, answer.output
     assert {file.name for file in out.iterdir()} == {"report.md", "three.nc", "three.csv", "three.png"}
@@ -211,7 +201,7 @@ def test_limits_that_no_design_keeps_are_one_line(tmp_path: Path) -> None:
 
 def refused(folder: Path, text: str, said: str) -> None:
     """One line, exit status 2, no results."""
-    path = written(folder, text)
+    path = written(folder, text, "study")
     with pytest.raises(InputError) as caught:
         run(load_study(path), folder, folder / "kept")
     line = str(caught.value)

@@ -274,10 +274,19 @@ def test_what_a_worker_refuses_is_one_line(tmp_path: Path, small: Path, pool_at_
     assert "\n" not in str(caught.value)
 
 
+LONG = part("counterweight fraction", ["single"], SPEEDS.format(60))
+
+
+@pytest.fixture(scope="module")
+def whole(small: Path, tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    """A long study that nothing stopped."""
+    return computed(study(tmp_path_factory.mktemp("whole"), LONG), small)
+
+
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
-def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals) -> None:
+def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals, whole: xr.Dataset) -> None:
     shutil.copy(small / "single.toml", tmp_path)
-    path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(60)))
+    path = study(tmp_path, LONG)
     source = str(Path(laufruhe.studies.scenes.__file__).parents[2])
     environment = {**os.environ, "PYTHONPATH": source}
     out = tmp_path / "out"
@@ -300,7 +309,7 @@ def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals
     lines = kept.read_bytes().split(b"\n")[:finished]
     data = computed(path, tmp_path, kept=kept)
     assert kept.read_bytes().split(b"\n")[:finished] == lines
-    assert data.identical(computed(path, tmp_path, kept=tmp_path / "whole" / NAME))
+    assert data.identical(whole)
 
 
 @pytest.mark.parametrize(("star", "root", "second"), [("root-two", 2.0, True), ("root-ten", 10.0, False)])

@@ -35,15 +35,17 @@ app = typer.Typer(
 ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help="Problem file (TOML).", show_default=False)]
 JsonOption = Annotated[
     Optional[str],  # noqa: UP045  (typer reads it at run time)
-    typer.Option("--json", metavar="FILE", help="Write result.json to FILE too; - prints it, and the table to stderr."),
+    typer.Option(
+        "--json", metavar="FILE", help="Write the result as JSON to FILE; - prints it, and the text goes to stderr."
+    ),
 ]
 StudyJsonOption = Annotated[
     Optional[str],  # noqa: UP045
-    typer.Option("--json", metavar="FILE", help="Write all parts as JSON to FILE too; - prints them."),
+    typer.Option("--json", metavar="FILE", help="Write all parts as JSON to FILE; - prints them."),
 ]
 OutOption = Annotated[
     Optional[Path],  # noqa: UP045
-    typer.Option("--out", metavar="DIR", help="Folder of the results.  [default: results/<problem name>]"),
+    typer.Option("--out", metavar="DIR", help="Folder of the results.  [default: results/<name of the file>]"),
 ]
 NoPlotsOption = Annotated[
     bool, typer.Option("--no-plots", help="Draw no pictures; those of an earlier result are removed.")
@@ -120,18 +122,17 @@ def check(problem: ProblemArgument, json: JsonOption = None) -> None:
         from laufruhe.problem.reader import load
         from laufruhe.report import files
         from laufruhe.report.json_result import as_json
-        from laufruhe.report.wording import one_line
         from laufruhe.solvers import state
 
         copy = json_file(Request("check", problem, json, None, False), places)
         given = load(problem)
         # a load that no mount carries, or a gas cycle that cannot be met, shows only here
-        stated = state(given)
+        stated = state(given, to_start_from=True)
         if copy is not None:
             files.write(copy, as_json(stated))
         if json == "-":
             sys.stdout.write(as_json(stated))
-        typer.echo(f"ok: {one_line(given)}", err=json == "-")
+        typer.echo(f"ok: {given.summary}", err=json == "-")
 
 
 FidelityTolerance = Annotated[

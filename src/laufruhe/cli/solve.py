@@ -112,7 +112,7 @@ def solved(problem: Problem, say: Callable[[str], None]) -> Result:
     try:
         return solve(problem, say)
     except SolverError as error:
-        return replace(state(problem), status=Status.FAILED, message=str(error))
+        return replace(state(problem, to_start_from=True), status=Status.FAILED, message=str(error))
 
 
 def show_result(result: Result, as_text: bool, folder: Path) -> None:

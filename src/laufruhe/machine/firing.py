@@ -18,11 +18,10 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts import Layout
-from laufruhe.numerics.turns import Turn, angle_of, as_turn
+from laufruhe.numerics.turns import SAME_TURN, angle_of
 
 MOST_ORDERS = 4096
 ORDERS_LOOKED_AT = 200_000
-_SAME = 1e-9
 
 
 class NoEvenStarError(ModelError):
@@ -68,27 +67,22 @@ def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], 
     NoEvenStarError
         If two cylinders of one throw are apart by no whole number of steps.
     """
-    first = _own_turn(layout, 0)
+    first = layout.own_turn(0)
     out = []
     for pin in range(len(layout.throw_positions)):
         steps = []
         for k in (k for k, own in enumerate(layout.pins) if own == pin):
-            apart = (_own_turn(layout, k) - first) * lattice.steps
+            apart = (layout.own_turn(k) - first) * lattice.steps
             nearest = round(float(apart))
-            if abs(float(apart) - nearest) > _SAME * lattice.steps:
+            if abs(float(apart) - nearest) > SAME_TURN * lattice.steps:
                 raise NoEvenStarError(
                     f"even firing needs bank angle plus split pins to be a multiple of {360.0 / lattice.steps:g} deg, "
-                    f"and they make {math.degrees(angle_of(_own_turn(layout, 0) - _own_turn(layout, k))):.6g} deg; "
+                    f"and they make {math.degrees(angle_of(layout.own_turn(0) - layout.own_turn(k))):.6g} deg; "
                     "leave split_pin_angle open, or allow uneven intervals"
                 )
             steps.append(nearest % lattice.steps)
         out.append(tuple(steps))
     return tuple(out)
-
-
-def _own_turn(layout: Layout, k: int) -> Turn:
-    """Dead centre of a cylinder whose throw is at zero."""
-    return as_turn(layout.banks[k]) - as_turn(layout.pin_offsets[k])
 
 
 def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
@@ -137,7 +131,7 @@ def _patterns(lattice: FiringLattice, own: tuple[int, ...], throws: int) -> Iter
 
 def star_throws(layout: Layout, steps: Sequence[int], lattice_steps: int) -> tuple[float, ...]:
     """Throw angles of a star [rad], cylinder 1 at its dead centre when phi = 0 (C5)."""
-    first = _own_turn(layout, 0)
+    first = layout.own_turn(0)
     return tuple(angle_of((first + Fraction(int(step), lattice_steps)) % 1) for step in steps)
 
 
@@ -167,12 +161,12 @@ def even_orders(cycle: Cycle, layout: Layout, steps: Sequence[int]) -> Iterator[
 def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) -> tuple[float, ...]:
     """Turn of the crank at which each cylinder of the order fires, ascending from 0."""
     start, out = None, []
-    previous = -_SAME
+    previous = -SAME_TURN
     for number in order:
         k = number - 1
-        turn = float((_own_turn(layout, k) - as_turn(throws[layout.pins[k]])) % 1)
-        turn = turn - 1.0 if turn > 1.0 - _SAME else turn
-        while turn < previous - _SAME:
+        turn = float(layout.dead_centre(throws, k) % 1)
+        turn = turn - 1.0 if turn > 1.0 - SAME_TURN else turn
+        while turn < previous - SAME_TURN:
             turn += 1.0
         start = turn if start is None else start
         out.append(turn - start)
@@ -181,15 +175,21 @@ def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) 
 
 
 def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterator[tuple[int, ...]]:
-    """Firing orders of throws at any angles: each cylinder on one of the turns of the cycle, cylinder 1 first."""
+    """Firing orders of throws at any angles, each once: every cylinder on one of the turns, cylinder 1 first.
+
+    An order says no more than that a cylinder fires at its first dead centre after the one
+    before it: firings that wait for a later one, or come two at once, have no order.
+    """
     cylinders = range(len(layout.positions))
-    turns = [float((_own_turn(layout, k) - as_turn(throws[layout.pins[k]])) % 1) for k in cylinders]
+    turns = [float(layout.dead_centre(throws, k) % 1) for k in cylinders]
     relative = [(t - turns[0]) % 1.0 for t in turns]
-    relative = [0.0 if t > 1.0 - _SAME else t for t in relative]
+    relative = [0.0 if t > 1.0 - SAME_TURN else t for t in relative]
     laps = itertools.product(range(cycle.turns), repeat=len(relative) - 1)
     for chosen in itertools.islice(laps, ORDERS_LOOKED_AT):
         whole = [relative[0], *(t + lap for t, lap in zip(relative[1:], chosen, strict=True))]
-        yield tuple(k + 1 for k in sorted(cylinders, key=lambda k: (whole[k], k)))
+        order = sorted(cylinders, key=lambda k: whole[k])
+        if all(SAME_TURN < whole[b] - whole[a] <= 1.0 + SAME_TURN for a, b in itertools.pairwise(order)):
+            yield tuple(k + 1 for k in order)
 
 
 def intervals_of(cycle: Cycle, turns: Sequence[float]) -> tuple[float, ...]:

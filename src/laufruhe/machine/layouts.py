@@ -13,7 +13,7 @@ from fractions import Fraction
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.engine import Cycle
-from laufruhe.machine.rotor import Role, Rotor
+from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.numerics.turns import SAME_TURN, Turn, angle_of, as_turn, cis, within
 
@@ -45,6 +45,43 @@ class Mechanism:
     offset: float = 0.0
     bore: float | None = None
 
+    def cylinder(
+        self,
+        number: int,
+        x: float,
+        throw: float,
+        bank: float,
+        firing_angle: float,
+        pin_mass: float = 0.0,
+        shaft: Shaft = CRANKSHAFT,
+    ) -> SliderCrank:
+        """One cylinder of an engine.
+
+        Parameters
+        ----------
+        number
+            Of the cylinder (C3).
+        x, throw, bank, firing_angle, shaft
+            Place [m] and angles [rad]; see `SliderCrank`.
+        pin_mass
+            What turns at the crank pin beside the rod's share [kg].
+        """
+        return SliderCrank(
+            name=f"cylinder {number}",
+            x=x,
+            crank_radius=self.crank_radius,
+            rod_length=self.rod_length,
+            reciprocating_mass=self.reciprocating_mass,
+            throw=throw,
+            bank=bank,
+            offset=self.offset,
+            rotating_mass=pin_mass + self.rod_rotating_mass,
+            rod_inertia_deficit=self.rod_inertia_deficit,
+            bore=self.bore,
+            firing_angle=firing_angle,
+            shaft=shaft,
+        )
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -68,6 +105,14 @@ class Layout:
     pins: tuple[int, ...]
     pin_offsets: tuple[float, ...]
     throw_positions: tuple[float, ...]
+
+    def own_turn(self, k: int) -> Turn:
+        """Dead centre of cylinder k, were its throw at zero, as a part of a turn (C5)."""
+        return as_turn(self.banks[k]) - as_turn(self.pin_offsets[k])
+
+    def dead_centre(self, throws: Sequence[float], k: int) -> Turn:
+        """Crank angle of cylinder k's dead centre as a part of a turn: alpha = 0 (C5)."""
+        return self.own_turn(k) - as_turn(throws[self.pins[k]])
 
 
 def stations(count: int, spacing: float) -> tuple[float, ...]:
@@ -123,15 +168,11 @@ def boxer(cylinders: int, spacing: float, bank_stagger: float) -> Layout:
         Distance by which a left cylinder stands forward of its opposite [m].
     """
     _even(cylinders, "a boxer")
-    half = 0.5 * bank_stagger
-    centres = stations(cylinders // 2, spacing)
-    left, right = tuple(x + half for x in centres), tuple(x - half for x in centres)
-    quarter = 0.5 * math.pi
-    count = cylinders // 2
-    places = left + right
-    return Layout(
-        "boxer", places, (quarter,) * count + (-quarter,) * count, tuple(range(cylinders)), (0.0,) * cylinders, places
-    )
+    count, half, quarter = cylinders // 2, 0.5 * bank_stagger, 0.5 * math.pi
+    centres = stations(count, spacing)
+    places = tuple(x + half for x in centres) + tuple(x - half for x in centres)
+    banks = (quarter,) * count + (-quarter,) * count
+    return Layout("boxer", places, banks, tuple(range(cylinders)), (0.0,) * cylinders, places)
 
 
 def _even(cylinders: int, what: str) -> None:
@@ -154,7 +195,7 @@ def firing_angles(
     start: Turn | None = None
     for number in firing_order:
         k = number - 1
-        centre = within(_dead_centre(layout, throws, k), 1)
+        centre = within(layout.dead_centre(throws, k), 1)
         while centre <= previous + SAME_TURN:
             centre += 1
         start = centre if start is None else start
@@ -181,20 +222,15 @@ def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tu
     asked: dict[int, Turn] = {}
     for place, number in enumerate(firing_order):
         k = number - 1
-        turn = (as_turn(layout.banks[k]) - as_turn(layout.pin_offsets[k]) - place * step) % 1
+        turn = (layout.own_turn(k) - place * step) % 1
         first = asked.setdefault(layout.pins[k], turn)
-        if abs(math.remainder(float(first - turn), 1.0)) > 1e-9:
+        if abs(math.remainder(float(first - turn), 1.0)) > SAME_TURN:
             raise ModelError(
                 f"firing order {list(firing_order)} cannot be even with these pins and banks: cylinder {number} "
                 f"wants its throw at {math.degrees(angle_of(turn)):.6g} deg, another on it at "
                 f"{math.degrees(angle_of(first)):.6g} deg; give the throws"
             )
     return tuple(angle_of(asked[pin]) for pin in range(len(layout.throw_positions)))
-
-
-def _dead_centre(layout: Layout, throws: Sequence[float], k: int) -> Turn:
-    """Crank angle of cylinder k's dead centre as a part of a turn: alpha = 0 (C5)."""
-    return as_turn(layout.banks[k]) - as_turn(layout.pin_offsets[k]) - as_turn(throws[layout.pins[k]])
 
 
 @dataclass(frozen=True)
@@ -262,32 +298,28 @@ def build(
     fires = (
         firing_angles(cycle, layout, angles, firing_order)
         if firing_order
-        else tuple(angle_of(within(_dead_centre(layout, angles, k), 1)) for k in cylinders)
+        else tuple(angle_of(within(layout.dead_centre(angles, k), 1)) for k in cylinders)
     )
     slider_cranks = tuple(
-        SliderCrank(
-            name=f"cylinder {k + 1}",
-            x=layout.positions[k],
-            crank_radius=mechanism.crank_radius,
-            rod_length=mechanism.rod_length,
-            reciprocating_mass=mechanism.reciprocating_mass,
-            throw=angles[layout.pins[k]] + layout.pin_offsets[k],
-            bank=layout.banks[k],
-            offset=mechanism.offset,
-            rotating_mass=mechanism.rod_rotating_mass,
-            rod_inertia_deficit=mechanism.rod_inertia_deficit,
-            bore=mechanism.bore,
-            firing_angle=fires[k],
+        mechanism.cylinder(
+            k + 1,
+            layout.positions[k],
+            angles[layout.pins[k]] + layout.pin_offsets[k],
+            layout.banks[k],
+            fires[k],
         )
         for k in cylinders
     )
-    throws = tuple(
+    return slider_cranks, _throws_of(layout, mechanism, angles)
+
+
+def _throws_of(layout: Layout, mechanism: Mechanism, angles: Sequence[float]) -> tuple[Throw, ...]:
+    return tuple(
         Throw(
             x,
             angles[pin],
-            tuple(k for k in cylinders if layout.pins[k] == pin),
+            tuple(k for k, own in enumerate(layout.pins) if own == pin),
             mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angles[pin])),
         )
         for pin, x in enumerate(layout.throw_positions)
     )
-    return slider_cranks, throws

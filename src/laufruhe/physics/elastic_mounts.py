@@ -229,6 +229,16 @@ class ElasticMounting:
             out += (1j * omegas)[:, None] * (amplitudes @ viscous)
         return np.asarray(out.reshape(len(omegas), -1, 3))
 
+    def resonant(self, wrench: Spectrum, speed: float) -> tuple[NDArray[np.bool_], str]:
+        """Orders of a wrench whose answer has no size, shape (n,), and the first of them in words."""
+        struck, why = np.zeros(len(wrench.coefficients), dtype=bool), ""
+        for k in np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1)):
+            try:
+                self.responses(wrench.orders[[k]] * speed, wrench.coefficients[[k]])
+            except ResonanceError as error:
+                struck[k], why = True, why or str(error).partition(";")[0]
+        return struck, why
+
     def _modal_motion(self, wrench: Spectrum, speed: float) -> ComplexArray:
         loaded = np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1))
         out = np.zeros((len(wrench.coefficients), 6), dtype=complex)

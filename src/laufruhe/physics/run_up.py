@@ -10,6 +10,8 @@ mount beyond its gap (E27).
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -27,8 +29,12 @@ from laufruhe.physics.rigid_body import moved_wrench
 Array = NDArray[np.float64]
 
 STEPS_PER_PERIOD = 24
+LEAST_STEPS, MOST_STEPS = 16, 4000
+"""At which a stretch of a run-up is read."""
 MOST_SHOTS = 60
 CLOSED = 1e-9
+# what integration over a period makes of its tolerance
+ROUNDING = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,16 +170,29 @@ def periodic_state(
         load = (np.exp(1j * orders * speed * t) @ loads).real[:, None]
         return np.concatenate([rate, model.accelerations(y, rate, load)]).reshape(-1)
 
-    def run(start: Array, times: Array | None = None) -> Array:
+    # what an even star cancels leaves a shorter period, which closes faster and farther from any resonance
+    shortest = period / (math.gcd(*np.flatnonzero(loaded).tolist()) or 1)
+
+    def run(start: Array, until: float, times: Array | None = None) -> Array:
         columns = start.shape[1]
         scale = float(np.abs(start).max(initial=0.0)) or 1e-6
         found = solve_ivp(
-            rates, (0.0, period), start.reshape(-1), "DOP853", t_eval=times, args=(columns,), rtol=tolerance,
-            atol=tolerance * min(scale, 1e-3), max_step=period / 64,
+            rates, (0.0, until), start.reshape(-1), "DOP853", t_eval=times, args=(columns,), rtol=tolerance,
+            atol=tolerance * min(scale, 1e-3), max_step=until / 64,
         )  # fmt: skip
         return np.asarray(found.y if times is not None else found.y[:, -1].reshape(12, columns))
 
-    size = _static_size(model, loads)
+    start = _shot(lambda first: run(first, shortest), _static_size(model, loads), tolerance, model.has_stops)
+    times = np.arange(samples + 1) * (period / samples)
+    states = run(start[:, None], period, np.minimum(times, period))
+    y, rate = states[:6, :-1], states[6:, :-1]
+    mismatch = float(np.abs(states[:, -1] - start).max() / max(np.abs(states).max(), 1e-300))
+    travels = (model.travels @ y).T.reshape(samples, -1, 3)
+    return SteadyState(np.asarray(times[:-1] * speed, dtype=float), model.mount_forces(y, rate), travels, mismatch)
+
+
+def _shot(run: Callable[[Array], Array], size: float, tolerance: float, has_stops: bool) -> Array:
+    """The start (y, y'), shape (12,), that one period of `run` ends at again, by Newton's method from rest (E28)."""
     start, step = np.zeros(12), size * 1e-4
     for _ in range(MOST_SHOTS):
         ends = run(start[:, None] + np.column_stack([np.zeros(12), step * np.eye(12)]))
@@ -181,16 +200,12 @@ def periodic_state(
         gap = ends[:, 0] - start
         change = np.linalg.solve(np.eye(12) - slope, gap)
         start = start + change
-        if np.abs(change).max() <= CLOSED * max(np.abs(start).max(), size):
-            break
-    else:
-        raise SolverError("the bump stops let no motion repeat itself in one period; integrate a run-up instead")
-    times = np.arange(samples + 1) * (period / samples)
-    states = run(start[:, None], np.minimum(times, period))
-    y, rate = states[:6, :-1], states[6:, :-1]
-    mismatch = float(np.abs(states[:, -1] - start).max() / max(np.abs(states).max(), 1e-300))
-    travels = (model.travels @ y).T.reshape(samples, -1, 3)
-    return SteadyState(np.asarray(times[:-1] * speed, dtype=float), model.mount_forces(y, rate), travels, mismatch)
+        whole = max(np.abs(start).max(), size)
+        # a gap of the integration's own rounding cannot be closed, only moved
+        if np.abs(change).max() <= CLOSED * whole or np.abs(gap).max() <= ROUNDING * tolerance * whole:
+            return start
+    why = "the bump stops let no motion" if has_stops else "no motion was found to"
+    raise SolverError(f"{why} repeat itself in one period; integrate a run-up instead")
 
 
 def _static_size(model: TimeModel, loads: NDArray[np.complex128]) -> float:
@@ -271,25 +286,14 @@ def run_through(
     if gas is not None:
         bases.append((gas.orders, gas.coefficients @ model.load.T))
 
-    def load(t: float) -> Array:
-        speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
-        orders, coefficients = bases[0]
-        total = speed * speed * (np.exp(1j * orders * angle) @ coefficients).real
-        for orders, coefficients in bases[1:]:
-            total = total + (np.exp(1j * orders * angle) @ coefficients).real
-        return np.asarray(total)[:, None]
-
-    def rates(t: float, state: Array) -> Array:
-        y, rate = state[:6, None], state[6:, None]
-        return np.concatenate([rate[:, 0], model.accelerations(y, rate, load(t))[:, 0]])
-
+    rates = _run_rates(model, bases, first, gain)
     fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in bases))
     state, edges = np.zeros(12), np.linspace(0.0, duration, stretches + 1)
     force, travel = np.zeros(stretches), np.zeros(stretches)
     scale = _static_size(model, bases[0][1] * max(first, last) ** 2)
+    count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
     for k, (start, end) in enumerate(pairwise(edges)):
-        count = max(int(STEPS_PER_PERIOD * fastest * (end - start) / (2.0 * np.pi)) + 1, 16)
-        times = np.linspace(start, end, min(count, 4000))
+        times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
         found = solve_ivp(
             rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=1e-3 * tolerance * scale
         )
@@ -298,3 +302,20 @@ def run_through(
         travel[k] = np.linalg.norm((model.travels @ y).T.reshape(len(times), -1, 3), axis=-1).max()
         state = found.y[:, -1]
     return RunUp(first + gain * edges[1:], force, travel)
+
+
+def _run_rates(
+    model: TimeModel, bases: Sequence[tuple[Array, NDArray[np.complex128]]], first: float, gain: float
+) -> Callable[[float, Array], Array]:
+    """Right side of E25 in (y, y') at a crank speed that grows by `gain`; of the loads the first is inertia (E28)."""
+
+    def load(t: float) -> Array:
+        speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
+        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in bases]
+        return np.asarray(sum(parts[1:], speed * speed * parts[0]))[:, None]
+
+    def rates(t: float, state: Array) -> Array:
+        y, rate = state[:6, None], state[6:, None]
+        return np.concatenate([rate[:, 0], model.accelerations(y, rate, load(t))[:, 0]])
+
+    return rates

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from laufruhe.plots.style import FAINT, colours_of, fitted, heading, names_of, page, source_line, thin
 from laufruhe.problem.evaluation import Evaluation, measured
-from laufruhe.report.measures import changed, hardest_point
+from laufruhe.report.measures import hardest_point, load_designs
 from laufruhe.report.wording import number
 from laufruhe.solvers.result import Result
 
@@ -28,10 +28,10 @@ def figure(result: Result) -> Figure:
     names = [*result.initial.mount_names, "all mounts"]
     wide = min(max(6.4, 1.15 * len(names)), 24.0)
     drawn = page(len(shown), 1, (wide, 3.4 if len(shown) == 1 else 2.3))
-    designs = [result.initial, result.final] if changed(result) else [result.final]
+    designs = load_designs(result)
     for axes, k in zip(drawn.panels, shown, strict=True):
         values = [_measures(design, k) for design in designs]
-        _groups(axes, values, colours_of(result))
+        _groups(axes, values, colours_of(result, loads=True))
         _frame(axes, names, values, wide)
         axes.tick_params(labelbottom=k == shown[-1])
         if len(several) > 1:
@@ -85,7 +85,7 @@ def _frame(axes: Axes, names: list[str], values: list[Array], wide: float) -> No
 
 def _legend(result: Result) -> list[Artist]:
     handles: list[Artist] = []
-    for colour, name in zip(colours_of(result), names_of(result), strict=True):
+    for colour, name in zip(colours_of(result, loads=True), names_of(result, loads=True), strict=True):
         handles.append(Patch(facecolor=colour, edgecolor=colour, label=f"{name}: mean"))
         handles.append(Patch(facecolor="none", edgecolor=colour, linewidth=1.4, label="maximum"))
     return handles

@@ -9,11 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from laufruhe.plots.style import BEFORE, FAINT, INK, heading, page
+from laufruhe.plots.style import BEFORE, BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION, heading, page
+from laufruhe.report.wording import percent
 from laufruhe.studies.economics import Standing
 from laufruhe.studies.worth import verdicts, worths
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 DASHES = ((0, (6, 2)), (0, (2, 2)), (0, (1, 3)))
 LINE = 0.052
 
@@ -41,9 +42,8 @@ def economics(data: xr.Dataset) -> Figure:
 
 
 def _source(data: xr.Dataset) -> str:
-    return (
-        f"{data.attrs['source']}. Computed with Laufruhe; filled dots: no other point has less force, mass and shafts."
-    )
+    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
+    return f"{source}Computed with Laufruhe; filled dots: no other point has less force, mass and shafts."
 
 
 def _colours(data: xr.Dataset) -> dict[str, str]:
@@ -102,7 +102,7 @@ def _table(axes: Axes, data: xr.Dataset, colours: dict[str, str]) -> None:
         row = data.sel(build=worth.build)
         axes.plot([0.0, 0.05], [y - 0.012] * 2, color=colours[worth.build], linewidth=2.5, clip_on=False)
         shafts = int(row["shafts"])
-        fall = f"{-100.0 * worth.fall:+.1f} %"
+        fall = percent(-worth.fall)
         _write(axes, y, f"{worth.build}, {shafts} shaft{'s' if shafts > 1 else ''}", weight="bold")
         what = f"{float(row['optimum']):.0f} {unit} ({fall}) with {float(row['optimum_mass']):.2f} kg"
         _write(axes, y - LINE, what)

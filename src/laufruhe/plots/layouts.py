@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from laufruhe.plots.style import AFTER, INK, heading, page
+from laufruhe.plots.style import AFTER, INK, PALE, credit, heading, page
 
-AGAINST = "#8fc4e8"
 ROW = 0.2
 NAMES = 1.1
 
@@ -30,12 +29,11 @@ def free_forces(data: xr.Dataset) -> Figure:
     _make_room(panels, drawn.figure.get_figwidth())
     legend: list[Artist] = [
         Patch(color=AFTER, label="free"),
-        Patch(color=AGAINST, label="of it against the crank"),
+        Patch(color=PALE, label="of it against the crank"),
         Line2D([], [], color=INK, marker="o", markersize=3.5, linestyle="", label="literature"),
     ]
     words = "Pistons alone, over one cylinder's force, couples times the spacing."
-    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
-    heading(drawn.figure, data.attrs["title"], words, legend, f"{source}Computed with Laufruhe.")
+    heading(drawn.figure, data.attrs["title"], words, legend, credit(data))
     return drawn.figure
 
 
@@ -43,7 +41,7 @@ def _column(axes: Axes, data: xr.Dataset, what: str) -> None:
     rows = list(range(data.sizes["case"]))
     free, against, printed = (data[name].values for name in (what, f"{what}_against", f"{what}_printed"))
     axes.barh(rows, free, 0.62, color=AFTER, linewidth=0)
-    axes.barh(rows, against, 0.26, color=AGAINST, linewidth=0)
+    axes.barh(rows, against, 0.26, color=PALE, linewidth=0)
     axes.plot(printed, rows, "o", color=INK, markersize=3.5, clip_on=False)
     most = float(max(free.max(initial=0.0), np.nanmax(printed, initial=0.0))) or 1.0
     for row, value in zip(rows, free, strict=True):

@@ -11,6 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import NDArray
 
@@ -20,10 +21,10 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.run_up import RunUp, run_through
 from laufruhe.physics.speed_map import SpeedMap, speed_map, split_loads
-from laufruhe.plots.style import AFTER, FAINT, INK, colours_of, heading, names_of, page, source_line
+from laufruhe.plots.style import AFTER, FAINT, INK, VERMILION, colours_of, heading, names_of, page, source_line
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_design import MountMeasure, mounting_in
-from laufruhe.report.measures import changed, hardest_point
+from laufruhe.report.measures import changed, hardest_point, load_designs
 from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of
 from laufruhe.report.wording import figure, number
 from laufruhe.solvers.result import Result
@@ -33,7 +34,7 @@ Array = NDArray[np.float64]
 
 SPEEDS = 400
 REACH = 1.25
-LIMIT = "#D55E00"
+LIMIT = VERMILION
 # styles tell orders apart in print as well
 _STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 _RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
@@ -71,14 +72,14 @@ def _map_of(design: Evaluation, result: Result, speeds: Array) -> SpeedMap | Non
 
 def transmissibility(result: Result) -> Figure:
     """Foundation over exciting force by order and speed, with limits and operating points."""
-    designs = _designs(result)
+    designs = load_designs(result)
     facts = facts_of(result.final)
     top = _fastest(result, facts)
     speeds = np.linspace(top / SPEEDS, top, SPEEDS)
     drawn = page(1, 1, (6.8, 4.0))
     axes = drawn.panels[0]
     highest, legend = 1.0, list[Artist]()
-    for design, colour in zip(designs, colours_of(result), strict=True):
+    for design, colour in zip(designs, colours_of(result, loads=True), strict=True):
         field = _map_of(design, result, speeds)
         if field is None:
             continue
@@ -88,7 +89,7 @@ def transmissibility(result: Result) -> Figure:
                 curve = field.transmissibility[:, column[0]]
                 highest = max(highest, float(curve.max(initial=0.0)))
                 axes.plot(speeds * _RPM, curve, color=colour, linestyle=_STYLES[k], linewidth=1.6)
-    for colour, name in zip(colours_of(result), names_of(result), strict=True):
+    for colour, name in zip(colours_of(result, loads=True), names_of(result, loads=True), strict=True):
         legend.append(Line2D([], [], color=colour, linewidth=2.0, label=name))
     legend += [
         Line2D([], [], color=INK, linestyle=_STYLES[k], label=f"order {o:g}") for k, o in enumerate(facts.orders)
@@ -135,7 +136,8 @@ def _points(axes: Axes, result: Result, share: float) -> None:
         axes.axvline(point.speed * _RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)
         if len(points) <= 5 or k in (0, len(points) - 1):
             side = "top" if share > 0.5 else "bottom"
-            words: Any = {"size": 7.5, "color": FAINT, "va": side, "ha": "right", "rotation": 90}
+            words: Any = {"size": 7.5, "color": FAINT, "va": side, "ha": "right", "rotation": 90, "zorder": 4}
+            words["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.5}
             axes.text(point.speed * _RPM, share, point.name, transform=axes.get_xaxis_transform(), **words)
 
 
@@ -194,18 +196,17 @@ def _edges(result: Result) -> list[float]:
 
 def _bands(axes: Axes, result: Result) -> list[Artist]:
     """Bands that are to hold no natural frequency, and ends that none may pass."""
-    drawn = False
-    for limit in result.problem.mount_design.limits:
-        if limit.quantity.measure is not MountMeasure.FREQUENCIES:
-            continue
-        if limit.outside is not None:
-            axes.axhspan(*limit.outside, color=LIMIT, alpha=0.13, linewidth=0)
-            drawn = True
-        for edge in (limit.minimum, limit.maximum):
-            if edge is not None:
-                axes.axhline(edge, color=LIMIT, linewidth=2.4, alpha=0.5, zorder=4)
-                drawn = True
-    return [Line2D([], [], color=LIMIT, linewidth=2.0, label="limit")] if drawn else []
+    limits = [m for m in result.problem.mount_design.limits if m.quantity.measure is MountMeasure.FREQUENCIES]
+    bands = [limit.outside for limit in limits if limit.outside is not None]
+    edges = [edge for limit in limits for edge in (limit.minimum, limit.maximum) if edge is not None]
+    for band in bands:
+        axes.axhspan(*band, color=LIMIT, alpha=0.13, linewidth=0)
+    for edge in edges:
+        axes.axhline(edge, color=LIMIT, linewidth=2.4, alpha=0.5, zorder=4)
+    return [
+        *([Line2D([], [], color=LIMIT, alpha=0.5, linewidth=2.4, label="limit")] if edges else []),
+        *([Patch(facecolor=LIMIT, alpha=0.13, label="no natural frequency")] if bands else []),
+    ]
 
 
 def modes(result: Result) -> Figure:

@@ -27,7 +27,7 @@ from laufruhe.plots.style import (
     thin,
 )
 from laufruhe.problem.evaluation import mount_samples
-from laufruhe.report.measures import changed, hardest_point
+from laufruhe.report.measures import hardest_point, load_designs
 from laufruhe.report.wording import trimmed
 from laufruhe.solvers.result import Result
 
@@ -40,7 +40,7 @@ PANEL = 2.9
 def figure(result: Result) -> Figure:
     """One panel for each mount, all to one scale."""
     k = hardest_point(result)
-    designs = [result.initial, result.final] if changed(result) else [result.final]
+    designs = load_designs(result)
     paths = [_closed(mount_samples(design, k)) for design in designs]
     mounts = result.problem.engine.mounts[:MOST_PANELS]
     lateral, vertical = _reach(paths, len(mounts))
@@ -50,9 +50,9 @@ def figure(result: Result) -> Figure:
     drawn = page(math.ceil(len(mounts) / columns), columns, panel, len(mounts), gap=0.5, lead=0.3)
     quarters = (len(paths[0]) - 1) // (4 * result.problem.engine.cycle.turns)
     for m, (axes, mount) in enumerate(zip(drawn.panels, mounts, strict=True)):
-        for path, colour, name in zip(paths, colours_of(result), names_of(result), strict=True):
+        for path, colour, name in zip(paths, colours_of(result, loads=True), names_of(result, loads=True), strict=True):
             _path(axes, path[:, m], colour, name, quarters)
-        _frame(axes, mount, lateral, vertical)
+        _frame(axes, mount, result.final.engine.mounts[m], lateral, vertical)
     _label(drawn, columns)
     heading(
         drawn.figure,
@@ -89,7 +89,7 @@ def _path(axes: Axes, path: Array, colour: str, name: str, quarters: int) -> Non
         axes.plot(*dots[0, 1:], "o", markersize=7, markerfacecolor="none", markeredgecolor=colour, markeredgewidth=1.3)
 
 
-def _frame(axes: Axes, mount: Mount, lateral: float, vertical: float) -> None:
+def _frame(axes: Axes, mount: Mount, moved: Mount, lateral: float, vertical: float) -> None:
     axes.set(xlim=(-lateral, lateral), ylim=(-vertical, vertical), aspect="equal")
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     axes.axvline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
@@ -97,8 +97,12 @@ def _frame(axes: Axes, mount: Mount, lateral: float, vertical: float) -> None:
         direction.set_major_locator(MaxNLocator(4, symmetric=True, steps=[1, 2, 5, 10]))
     name = fitted(mount.name, PANEL * lateral / max(lateral, vertical) + 0.9, 10)
     axes.set_title(name, loc="left", pad=17, size=10, color=INK, parse_math=False)
-    x, y, z = (trimmed(1e3 * value).replace("-", "−") for value in mount.position)
-    axes.annotate(f"at {x}, {y}, {z} mm", (0, 1), (0, 6), "axes fraction", "offset points", size=7, color=FAINT)
+    words = f"at {_place(mount)} mm" if mount.position == moved.position else f"moved to {_place(moved)} mm"
+    axes.annotate(words, (0, 1), (0, 6), "axes fraction", "offset points", size=7, color=FAINT)
+
+
+def _place(mount: Mount) -> str:
+    return ", ".join(trimmed(1e3 * value).replace("-", "−") for value in mount.position)
 
 
 def _label(drawn: Page, columns: int) -> None:
@@ -122,7 +126,7 @@ def _left_out(paths: list[Array]) -> str:
 def _legend(result: Result) -> list[Artist]:
     lines: list[Artist] = [
         Line2D([], [], color=colour, linewidth=2.0, label=name)
-        for colour, name in zip(colours_of(result), names_of(result), strict=True)
+        for colour, name in zip(colours_of(result, loads=True), names_of(result, loads=True), strict=True)
     ]
     dot = Line2D([], [], color=INK, marker="o", linestyle="none", markersize=3.6, label="every 90° of the crank")
     ring = Line2D(

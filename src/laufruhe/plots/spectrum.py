@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from laufruhe.physics.metrics import order_amplitude
 from laufruhe.plots.style import FAINT, colours_of, heading, names_of, page, point_name, source_line
 from laufruhe.problem.evaluation import Evaluation, PointLoads
-from laufruhe.report.measures import changed, hardest_point, mount_orders, padded
+from laufruhe.report.measures import hardest_point, load_designs, mount_orders, padded
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ NOTHING = 1e-9
 def figure(result: Result) -> Figure:
     """Mount forces by order; of an engine without mounts, the shaking force and its couples."""
     k = hardest_point(result)
-    designs = [result.initial, result.final] if changed(result) else [result.final]
+    designs = load_designs(result)
     with_mounts = bool(result.problem.engine.mounts)
     panels = _mount_panels(result) if with_mounts else _shaking_panels()
     base = _base(designs[0], k, with_mounts)
@@ -38,7 +38,7 @@ def figure(result: Result) -> Figure:
     last = base * max(len(series[0]) - 1 for series in amplitudes)
     drawn = page(len(panels), 1, (6.4, 3.4 if len(panels) == 1 else 1.75))
     for axes, (label, _), series in zip(drawn.panels, panels, amplitudes, strict=True):
-        _bars(axes, series, base, colours_of(result))
+        _bars(axes, series, base, colours_of(result, loads=True))
         _frame(axes, label, series, last)
         axes.tick_params(labelbottom=axes is drawn.panels[-1])
     drawn.panels[-1].set_xlabel("order, multiples of crank speed")
@@ -111,5 +111,6 @@ def _subtitle(result: Result, k: int, with_mounts: bool) -> str:
 
 def _legend(result: Result) -> list[Artist]:
     return [
-        Patch(facecolor=colour, label=name) for colour, name in zip(colours_of(result), names_of(result), strict=True)
+        Patch(facecolor=colour, label=name)
+        for colour, name in zip(colours_of(result, loads=True), names_of(result, loads=True), strict=True)
     ]

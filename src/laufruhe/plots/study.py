@@ -14,11 +14,13 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator
 
-from laufruhe.plots.style import AFTER, BEFORE, heading, page
-from laufruhe.report.study_tables import settled, swept_names, with_unit
+from laufruhe.plots.style import AFTER, BEFORE, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, credit, heading, page
+from laufruhe.report.study_tables import readable_metric, settled, swept_names, with_unit
+from laufruhe.report.wording import number
 
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#332288", "#999933")
+COLOURS = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, "#332288", "#999933")
 PANEL = (6.4, 3.6)
 # width of a letter of a tick [inch], and the points of a line from which on dots would hide it
 LETTER, MOST_DOTS = 0.066, 40
@@ -28,6 +30,7 @@ LABELLED: dict[str, Any] = {"marker": "o", "markersize": 6, "linestyle": ""}
 
 def counterweight_fraction(data: xr.Dataset) -> Figure:
     """The metric over the fraction, the proven optimum of every line marked; or the best fraction over speed."""
+    data = readable_metric(data)
     if "optimum" not in data.coords:
         return _best_fraction(data)
     names = swept_names(data)
@@ -59,6 +62,7 @@ def _best_fraction(data: xr.Dataset) -> Figure:
         place = _places(data, names[-1])[chosen]
         for k in fractions:
             lower.plot(place, data["decided"].values[chosen, k], color=colour)
+    _along(lower, data[names[-1]].values)
     lower.set_ylabel("best balance fraction")
     lower.set_xlabel(with_unit(data[names[-1]]))
     return _headed(figure, data, legend, f"Every point: {_claimed(data)}.")
@@ -66,6 +70,7 @@ def _best_fraction(data: xr.Dataset) -> Figure:
 
 def balancer_sizing(data: xr.Dataset) -> Figure:
     """Bars of every set of shafts, the plain engine drawn once; lines where something is swept."""
+    data = readable_metric(data)
     if swept_names(data):
         return _over_sweep(data, ["shafts"], "Every set of shafts at its own optimum.")
     plain = data["shafts"].values == "none"
@@ -85,9 +90,13 @@ def balancer_sizing(data: xr.Dataset) -> Figure:
 
 def layout_comparison(data: xr.Dataset) -> Figure:
     """Bars of every engine as given and at its optimum; lines where something is swept."""
+    data = readable_metric(data)
     words = f"Engines of {data.attrs['at']}." if data.attrs["at"] == "equal cylinders" else f"At {data.attrs['at']}."
     if swept_names(data):
-        return _over_sweep(data, [], words)
+        alone = len(set(data["case"].values.tolist())) == 1
+        open_points = (data["proof"].values != "as given").any()
+        claim = f"Every point: {_claimed(data)}." if open_points else "As given."
+        return _over_sweep(data, [], claim if alone else words)
     return _bars(data, data["case"].values, words)
 
 
@@ -108,11 +117,25 @@ def _lines(axes: Axes, data: xr.Dataset, names: Sequence[str], variable: str) ->
         style = {"marker": "." if chosen.sum() <= MOST_DOTS else "", "markersize": 4} if numbers else LABELLED
         axes.plot(places[chosen], data[variable].values[chosen], color=colour, **style)
         legend.append(Line2D([], [], color=colour, label=label, **({} if numbers else LABELLED)))
-    if not numbers:
+    if numbers:
+        _along(axes, values)
+    else:
         labels = list(dict.fromkeys(values.tolist()))
         axes.set_xticks(range(len(labels)), [str(label) for label in labels], size=8)
     _metric_axis(axes, data)
     return legend
+
+
+def _along(axes: Axes, values: Any) -> None:
+    """A logarithmic axis for values that grow by equal factors."""
+    each = np.unique(values[np.isfinite(values)])
+    if len(each) < 4 or each[0] <= 0.0 or not np.allclose(np.diff(np.log(each)), np.log(each[1] / each[0]), rtol=1e-6):
+        return
+    axes.set_xscale("log")
+    within = (1.0, 2.0, 5.0) if each[-1] > 20.0 * each[0] else (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)
+    axes.xaxis.set_major_locator(LogLocator(10.0, within, numticks=12))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.minorticks_off()
 
 
 def _places(data: xr.Dataset, name: str) -> Any:
@@ -169,11 +192,12 @@ def _bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> Figure
     most = max(np.nanmax(given, initial=0.0), np.nanmax(best, initial=0.0))
     for k in range(count):
         if single[k]:
-            _bar(axes, k, best[k], 0.5, BEFORE if plain[k] else AFTER, most)
+            _bar(axes, k, best[k], 0.5 if single.all() else 0.36, BEFORE if plain[k] else AFTER, most)
             continue
         for shift, value, colour in ((-0.2, given[k], BEFORE), (0.2, best[k], AFTER)):
             _bar(axes, k + shift, value, 0.36, colour, most)
     axes.set_xticks(range(count), [str(label) for label in labels], size=7.5)
+    axes.set_xlim(-0.6, count - 0.4)
     axes.grid(axis="x", visible=False)
     _metric_axis(axes, data, *(() if single.all() else ("objective_given",)))
     grey = "no shafts" if once is not None else "as given"
@@ -184,13 +208,16 @@ def _bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> Figure
 
 def _bar(axes: Axes, place: float, value: float, width: float, colour: str, most: float) -> None:
     """One bar and its value; what rounding leaves of a balanced engine is zero."""
+    if not np.isfinite(value):
+        axes.text(place, 0.02 * most, "no design", ha="center", va="bottom", size=7.5)
+        return
     drawn = axes.bar([place], [value], width, color=colour, linewidth=0)
-    axes.bar_label(drawn, [f"{settled(value, most):.4g}" if np.isfinite(value) else "none"], size=7.5)
+    axes.bar_label(drawn, [number(settled(value, most))], size=7.5)
 
 
 def _claimed(data: xr.Dataset) -> str:
     """What may be said of all that was decided."""
-    decided = data["proof"].values != "as given"
+    decided = (data["proof"].values != "as given") & np.isfinite(data["objective"].values)
     return "proven optimum" if np.all(data["proof"].values[decided] == "global") else "best found"
 
 
@@ -207,12 +234,12 @@ def _page(panels: int, wide: float = PANEL[0]) -> tuple[Figure, tuple[Axes, ...]
 
 
 def _metric_axis(axes: Axes, data: xr.Dataset, *drawn: str) -> None:
-    axes.set_ylabel(f"{data.attrs['metric']} [{data['objective'].attrs['units']}]")
+    unit = data["objective"].attrs["units"]
+    axes.set_ylabel(f"{data.attrs['metric']} [{unit}]" if unit else data.attrs["metric"])
     top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", *drawn))
     axes.set_ylim(0.0, 1.08 * top or 1.0)
 
 
 def _headed(figure: Figure, data: xr.Dataset, legend: Sequence[Artist], words: str) -> Figure:
-    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
-    heading(figure, data.attrs["title"], words, _legend(legend), f"{source}Computed with Laufruhe.")
+    heading(figure, data.attrs["title"], words, _legend(legend), credit(data))
     return figure

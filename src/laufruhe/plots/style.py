@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 from matplotlib.artist import Artist
@@ -18,11 +18,16 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from laufruhe.report.measures import changed
+from laufruhe.report.measures import changed, load_designs
 from laufruhe.solvers.result import Result
 
-# Okabe and Ito's blue beside a grey of clearly other lightness: told apart by every eye and in print.
-BEFORE, AFTER = "#8a8a8a", "#0072B2"
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Okabe and Ito: told apart by every eye, and by their lightness in print
+GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
+PURPLE, PALE = "#CC79A7", "#8fc4e8"
+BEFORE, AFTER = GREY, BLUE
 INK, FAINT = "#222222", "#666666"
 DPI = 150
 LEFT, RIGHT, TOP, BOTTOM = 0.85, 0.3, 1.2, 0.85
@@ -125,6 +130,12 @@ def source_line(result: Result, note: str = "") -> str:
     return f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
 
 
+def credit(data: xr.Dataset, note: str = "") -> str:
+    """Source line of a study's dataset."""
+    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
+    return f"{source}{note}Computed with Laufruhe."
+
+
 def fitted(text: str, inches: float, points: float) -> str:
     """Text cut to one line of a figure this wide; DejaVu Sans takes half its size a letter."""
     most = int((inches - 0.6) * 72.0 / (0.53 * points))
@@ -138,14 +149,16 @@ def point_name(result: Result, k: int) -> str:
     return points[k].name if len(points) == 1 else f"{points[k].name} (largest loads of {len(points)} points)"
 
 
-def names_of(result: Result) -> tuple[str, ...]:
-    """What the series are called: one where nothing was decided."""
-    return ("as given", "as decided") if changed(result) else ("as given",)
+def names_of(result: Result, loads: bool = False) -> tuple[str, ...]:
+    """What the series are called: one where nothing was decided, or where it is loads that only one design has."""
+    if not changed(result):
+        return ("as given",)
+    return ("as given", "as decided")[-len(load_designs(result)) :] if loads else ("as given", "as decided")
 
 
-def colours_of(result: Result) -> tuple[str, ...]:
+def colours_of(result: Result, loads: bool = False) -> tuple[str, ...]:
     """One colour for each of `names_of`."""
-    return (BEFORE, AFTER) if changed(result) else (AFTER,)
+    return (BEFORE, AFTER)[-len(names_of(result, loads)) :]
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -12,10 +12,10 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
 from laufruhe.physics.modes import GRAVITY
-from laufruhe.plots.style import AFTER, FAINT, INK, heading, page
+from laufruhe.plots.style import AFTER, FAINT, INK, PALE, credit, heading, page
+from laufruhe.report.wording import percent
 from laufruhe.studies.tolerance_study import rise_of
 
-SPREAD = "#8fc4e8"
 LEAST = 0.1
 """Left end of the axis [kp]; what is smaller stands there with its value."""
 TALL = 0.7
@@ -40,29 +40,26 @@ def tolerance(data: xr.Dataset) -> Figure:
     axes.grid(axis="y", visible=False)
     axes.set_xlabel("largest free force over the cycle [kp]")
     legend: list[Artist] = [
-        Patch(color=SPREAD, label=f"{data.attrs['engines']:,} random engines"),
+        Patch(color=PALE, label=f"{data.attrs['engines']:,} random engines"),
         Line2D([], [], color=AFTER, marker="|", markersize=12, markeredgewidth=2.5, linestyle="", label="worst sum"),
         Line2D([], [], color=INK, marker="D", markersize=6, linestyle="", label="drawing"),
     ]
     if len(stated):
         legend.append(Line2D([], [], color=FAINT, linestyle=(0, (3, 2)), label="stated"))
     words = "What tolerances add to the free force. Percents: what 95 of 100 add to the mean mount force at most."
-    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
-    heading(
-        drawn.figure, data.attrs["title"], words, legend, f"{source}Seed {data.attrs['seed']}. Computed with Laufruhe."
-    )
+    heading(drawn.figure, data.attrs["title"], words, legend, credit(data, f"Seed {data.attrs['seed']}. "))
     return drawn.figure
 
 
 def _label(data: xr.Dataset) -> str:
     """Name, and what tolerances do to the mounts."""
     rise = rise_of(data)
-    return str(data["case"].item()) + (f"\n{100.0 * rise:+.1f} %" if np.isfinite(rise) else "")
+    return str(data["case"].item()) + (f"\n{percent(rise)}" if np.isfinite(rise) else "")
 
 
 def _row(axes: Axes, data: xr.Dataset, row: int) -> None:
     places, density = _density(data["random"].values / GRAVITY, data["share"].values)
-    axes.fill_between(places, row, row - TALL * density, color=SPREAD, linewidth=0)
+    axes.fill_between(places, row, row - TALL * density, color=PALE, linewidth=0)
     worst, nominal = float(data["worst"]) / GRAVITY, float(data["nominal"]) / GRAVITY
     axes.plot([worst], [row - 0.3], "|", color=AFTER, markersize=14, markeredgewidth=2.5)
     axes.text(worst * 1.08, row - 0.3, f"{worst:.0f}", size=8, va="center", color=AFTER)

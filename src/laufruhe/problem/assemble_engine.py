@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
 from laufruhe.machine.layouts import Layout, Mechanism, Throw, boxer, build, even_throws, inline, vee
 from laufruhe.machine.slider_crank import radius_for_stroke
 from laufruhe.physics.seiliger_cycle import motored_cycle
-from laufruhe.problem.complaints import Refused, blamed_on, measured, nearest
+from laufruhe.problem.complaints import Refused, blamed_on, nearest
 from laufruhe.problem.file_models import (
     EngineTable,
     OperatingPointTable,
@@ -24,6 +23,7 @@ from laufruhe.problem.file_models import (
     TraceTable,
     WiebeTable,
 )
+from laufruhe.problem.read_trace import trace_of
 
 _CYCLES = {str(cycle): cycle for cycle in Cycle}
 _ONLY_FOR = {
@@ -195,21 +195,8 @@ def _free_part(table: EngineTable, part: SliderCrankTable, k: int, shafts: dict[
         mechanism = _mechanism(merged)
         rotating = part.rotating_mass if part.rotating_mass is not None else table.rotating_mass
         first = (part.bank_angle - part.throw) / shaft.ratio % (math.tau / abs(shaft.ratio))
-        return SliderCrank(
-            name=f"cylinder {k + 1}",
-            x=part.x,
-            crank_radius=mechanism.crank_radius,
-            rod_length=mechanism.rod_length,
-            reciprocating_mass=mechanism.reciprocating_mass,
-            throw=part.throw,
-            bank=part.bank_angle,
-            offset=mechanism.offset,
-            rotating_mass=rotating + mechanism.rod_rotating_mass,
-            rod_inertia_deficit=mechanism.rod_inertia_deficit,
-            bore=mechanism.bore,
-            firing_angle=part.firing_angle if part.firing_angle is not None else first,
-            shaft=shaft,
-        )
+        fires = part.firing_angle if part.firing_angle is not None else first
+        return mechanism.cylinder(k + 1, part.x, part.throw, part.bank_angle, fires, rotating, shaft)
 
 
 def all_different(things: list[Any], where: str, rule: str) -> None:
@@ -279,35 +266,7 @@ def gas_of(file: ProblemFile, folder: Path) -> GasModel | None:
         return None
     with blamed_on("gas"):
         if isinstance(table, TraceTable):
-            return _trace(table, folder)
+            return trace_of(table, folder)
         given = {key: value for key, value in table.model_dump().items() if value is not None and key != "model"}
         kinds: dict[type, type[Seiliger] | type[Wiebe]] = {SeiligerTable: Seiliger, WiebeTable: Wiebe}
         return kinds[type(table)](**given)
-
-
-def _trace(table: TraceTable, folder: Path) -> PressureTrace:
-    path = folder / table.file
-    try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            rows = [row for row in csv.reader(stream) if row and not row[0].lstrip().startswith("#")]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise Refused(
-            "gas.file", table.file, f"cannot be read ({_why(error)})", "give a CSV file beside the problem"
-        ) from None
-    angle = measured(f"1 {table.angle_unit}", "rad", "gas.angle_unit", table.angle_unit)
-    pressure = measured(f"1 {table.pressure_unit}", "Pa", "gas.pressure_unit", table.pressure_unit)
-    numbers = []
-    for line, row in enumerate(rows):
-        try:
-            numbers.append((float(row[0]) * angle, float(row[1]) * pressure))
-        except (ValueError, IndexError):
-            if line > 0:
-                raise Refused(
-                    "gas.file", table.file, f"row {line + 1} is no pair of numbers", "write: crank angle, pressure"
-                ) from None
-    extra = {} if table.crankcase_pressure is None else {"crankcase_pressure": table.crankcase_pressure}
-    return PressureTrace(tuple(a for a, _ in numbers), tuple(p for _, p in numbers), **extra)
-
-
-def _why(error: Exception) -> str:
-    return error.strerror or "error" if isinstance(error, OSError) else type(error).__name__

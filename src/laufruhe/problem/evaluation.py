@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -10,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.mixed_norms import Norm, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base
@@ -69,12 +71,15 @@ class Evaluation:
         Per operating point.
     samples
         Steps over the cycle at which measures are taken.
+    resonance
+        What has no answer, in words; loads and travel of the orders concerned are infinite.
     """
 
     engine: Engine
     fidelity: Fidelity
     loads: tuple[PointLoads, ...]
     samples: int
+    resonance: str = ""
 
     @cached_property
     def mount_names(self) -> list[str]:
@@ -95,9 +100,13 @@ class Evaluation:
         )
 
     def value(self, quantity: Quantity) -> float:
-        """A quantity of this design [SI]; a maximum is sought between the samples too."""
+        """A quantity of this design [SI]; a maximum is sought between the samples too. Infinite on a resonance."""
         finer = PEAK_REFINEMENT if quantity.norm is Norm.MAXIMUM else 1
-        return self.rows(quantity, finer * self.samples).value
+        if not self.resonance:
+            return self.rows(quantity, finer * self.samples).value
+        with np.errstate(invalid="ignore"):
+            value = self.rows(quantity, finer * self.samples).value
+        return value if math.isfinite(value) else math.inf
 
 
 def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
@@ -127,9 +136,16 @@ def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None
         If the engine drives a direction that no mount carries.
     """
     engine = problem.engine if engine is None else engine
-    wrenches = [(point, shaking_loads(engine, point, problem.fidelity)) for point in problem.points]
+    wrenches = [(point, _wrench(engine, point, problem.fidelity)) for point in problem.points]
     loads = _on_mounts(engine, problem.fidelity, wrenches)
     return Evaluation(engine, problem.fidelity, loads, samples or problem.fidelity.samples)
+
+
+def _wrench(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    try:
+        return shaking_loads(engine, point, fidelity)
+    except ModelError as error:
+        raise ModelError(f"at {point.name}: {error}") from None
 
 
 def remounted(evaluation: Evaluation, engine: Engine) -> Evaluation:
@@ -168,6 +184,9 @@ def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
 
 def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
     """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
+    forces = evaluation.loads[k].mount_forces
+    if forces is not None and not np.all(np.isfinite(forces.coefficients)):
+        return [CycleMeasures(math.inf, math.inf, math.inf)] * len(evaluation.engine.mounts)
     fine = _one_period(evaluation, k, PEAK_REFINEMENT)
     coarse = fine[::PEAK_REFINEMENT]
     most = lengths(fine).max(axis=0)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import AfterValidator, BeforeValidator, GetCoreSchemaHandler, GetJsonSchemaHandler, WithJsonSchema
 from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
@@ -28,7 +28,7 @@ class Open:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Number:
     """A pydantic field that reads a number with a unit into SI (C1).
 
     Attributes
@@ -89,50 +89,50 @@ class Quantity:
 
     def _number(self, given: Any) -> float:
         if isinstance(given, bool) or not isinstance(given, int | float | str):
-            raise _complaint(f"is no {'number' if not self.unit else 'number with a unit'}; {units.advice(self.unit)}")
+            raise refusal(f"is no {'number' if not self.unit else 'number with a unit'}; {units.advice(self.unit)}")
         if isinstance(given, str):
             try:
                 return units.parse(given, self.unit)
             except units.UnitError as error:
-                raise _complaint(str(error)) from None
+                raise refusal(str(error)) from None
         if self.unit and self.plain is None:
-            raise _complaint(f"has no unit, {units.dimension_name(self.unit)} needs one; {units.advice(self.unit)}")
+            raise refusal(f"has no unit, {units.dimension_name(self.unit)} needs one; {units.advice(self.unit)}")
         try:
             value = float(given) * (self.plain if self.plain is not None else 1.0)
         except OverflowError:
             value = math.inf
         if not math.isfinite(value):
-            raise _complaint("is not finite; give a number")
+            raise refusal("is not finite; give a number")
         return value
 
     def _bounded(self, value: float) -> float:
         if abs(value) > LARGEST:
-            raise _complaint(f"is beyond any engine; {units.advice(self.unit)}")
+            raise refusal(f"is beyond any engine; {units.advice(self.unit)}")
         if value <= self.above:
-            raise _complaint(f"must be more than {units.shown(self.above, self.unit)}; {units.advice(self.unit)}")
+            raise refusal(f"must be more than {units.shown(self.above, self.unit)}; {units.advice(self.unit)}")
         if value < self.least:
-            raise _complaint(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
+            raise refusal(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
         if value > self.most:
-            raise _complaint(f"must be at most {units.shown(self.most, self.unit)}; give a smaller value")
+            raise refusal(f"must be at most {units.shown(self.most, self.unit)}; give a smaller value")
         return value
 
     def _open(self, given: dict[str, Any]) -> Open:
         if not self.openable:
-            raise _complaint("cannot be left open; give a number")
+            raise refusal("cannot be left open; give a number")
         unknown = set(given) - {"between", "start"}
         if unknown:
-            raise _complaint(
+            raise refusal(
                 f"has an unknown key '{min(unknown)}'; write {{ between = [low, high] }}, start = ... is optional"
             )
         pair = given.get("between")
         if not isinstance(pair, list) or len(pair) != 2:
-            raise _complaint("needs two bounds; write { between = [low, high] }")
+            raise refusal("needs two bounds; write { between = [low, high] }")
         low, high = (self._bounded(self._number(bound)) for bound in pair)
         if low > high:
-            raise _complaint("has its bounds reversed; write the smaller one first")
+            raise refusal("has its bounds reversed; write the smaller one first")
         start = self._bounded(self._number(given["start"])) if "start" in given else min(max(0.0, low), high)
         if not low <= start <= high:
-            raise _complaint("starts outside its bounds; move start or the bounds")
+            raise refusal("starts outside its bounds; move start or the bounds")
         return Open(low, high, start)
 
 
@@ -163,50 +163,59 @@ class OrOpen:
         if isinstance(given, str):
             if given == "open":
                 return given
-            raise _complaint(f'is neither a list nor "open"; write for example {self.example} or "open"')
+            raise refusal(f'is neither a list nor "open"; write for example {self.example} or "open"')
         return inner(given)
 
 
-def _complaint(text: str) -> PydanticCustomError:
+def refusal(text: str) -> PydanticCustomError:
+    """What a validator raises: a rule, and a remedy after '; '."""
     # braces would be read as a template
     return PydanticCustomError("laufruhe", "{text}", {"text": text})
 
 
 def _turning(ratio: float) -> float:
     if abs(ratio) < SLOWEST:
-        raise _complaint(f"is a shaft that hardly turns; give at least {SLOWEST:g} either way")
+        raise refusal(f"is a shaft that hardly turns; give at least {SLOWEST:g} either way")
     return ratio
+
+
+def _side(given: Any) -> Any:
+    """A bare number as text: which unit is missing, if any, is known with the quantity."""
+    return repr(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
 
 
 _DEG = math.radians(1.0)
 
-Length: TypeAlias = Annotated[float, Quantity("m")]
-PositiveLength: TypeAlias = Annotated[float, Quantity("m", above=0.0)]
-Mass: TypeAlias = Annotated[float, Quantity("kg", least=0.0)]
-PositiveMass: TypeAlias = Annotated[float, Quantity("kg", above=0.0)]
-Inertia: TypeAlias = Annotated[float, Quantity("kg m^2")]
-PositiveInertia: TypeAlias = Annotated[float, Quantity("kg m^2", above=0.0)]
-Pressure: TypeAlias = Annotated[float, Quantity("Pa")]
-PositivePressure: TypeAlias = Annotated[float, Quantity("Pa", above=0.0)]
-Angle: TypeAlias = Annotated[float, Quantity("rad", plain=_DEG)]
-OpenAngle: TypeAlias = Annotated[float | Open, Quantity("rad", plain=_DEG, openable=True)]
-Speed: TypeAlias = Annotated[float, Quantity("rad/s", above=0.0)]
-PistonSpeed: TypeAlias = Annotated[float, Quantity("m/s", above=0.0)]
-Time: TypeAlias = Annotated[float, Quantity("s", above=0.0)]
-Ratio: TypeAlias = Annotated[float, Quantity("", least=-100.0, most=100.0), AfterValidator(_turning)]
-NonNegative: TypeAlias = Annotated[float, Quantity("", least=0.0)]
-Positive: TypeAlias = Annotated[float, Quantity("", above=0.0)]
-Fraction: TypeAlias = Annotated[float | Open, Quantity("", least=-10.0, most=10.0, openable=True)]
-NonNegativeLength: TypeAlias = Annotated[float, Quantity("m", least=0.0)]
-Unbalance: TypeAlias = Annotated[float, Quantity("kg m", least=0.0)]
-Force: TypeAlias = Annotated[float, Quantity("N", above=0.0)]
-OpenUnbalance: TypeAlias = Annotated[float | Open, Quantity("kg m", least=0.0, openable=True)]
-OpenMass: TypeAlias = Annotated[float | Open, Quantity("kg", least=0.0, openable=True)]
-LossFactor: TypeAlias = Annotated[float, Quantity("", least=0.0, most=10.0)]
-Stiffness: TypeAlias = Annotated[float, Quantity("N/m", least=0.0)]
-Frequency: TypeAlias = Annotated[float, Quantity("Hz", above=0.0)]
-OpenLossFactor: TypeAlias = Annotated[float | Open, Quantity("", least=0.0, most=10.0, openable=True)]
-OpenLength: TypeAlias = Annotated[float | Open, Quantity("m", openable=True)]
-OpenStiffness: TypeAlias = Annotated[float | Open, Quantity("N/m", least=0.0, openable=True)]
-OpenDamping: TypeAlias = Annotated[float | Open, Quantity("N s/m", least=0.0, openable=True)]
+Length: TypeAlias = Annotated[float, Number("m")]
+PositiveLength: TypeAlias = Annotated[float, Number("m", above=0.0)]
+Mass: TypeAlias = Annotated[float, Number("kg", least=0.0)]
+PositiveMass: TypeAlias = Annotated[float, Number("kg", above=0.0)]
+Inertia: TypeAlias = Annotated[float, Number("kg m^2")]
+PositiveInertia: TypeAlias = Annotated[float, Number("kg m^2", above=0.0)]
+Pressure: TypeAlias = Annotated[float, Number("Pa")]
+PositivePressure: TypeAlias = Annotated[float, Number("Pa", above=0.0)]
+Angle: TypeAlias = Annotated[float, Number("rad", plain=_DEG)]
+OpenAngle: TypeAlias = Annotated[float | Open, Number("rad", plain=_DEG, openable=True)]
+Speed: TypeAlias = Annotated[float, Number("rad/s", above=0.0)]
+PistonSpeed: TypeAlias = Annotated[float, Number("m/s", above=0.0)]
+Time: TypeAlias = Annotated[float, Number("s", above=0.0)]
+Ratio: TypeAlias = Annotated[float, Number("", least=-100.0, most=100.0), AfterValidator(_turning)]
+NonNegative: TypeAlias = Annotated[float, Number("", least=0.0)]
+Positive: TypeAlias = Annotated[float, Number("", above=0.0)]
+Fraction: TypeAlias = Annotated[float | Open, Number("", least=-10.0, most=10.0, openable=True)]
+NonNegativeLength: TypeAlias = Annotated[float, Number("m", least=0.0)]
+Unbalance: TypeAlias = Annotated[float, Number("kg m", least=0.0)]
+Force: TypeAlias = Annotated[float, Number("N", above=0.0)]
+OpenUnbalance: TypeAlias = Annotated[float | Open, Number("kg m", least=0.0, openable=True)]
+OpenMass: TypeAlias = Annotated[float | Open, Number("kg", least=0.0, openable=True)]
+LossFactor: TypeAlias = Annotated[float, Number("", least=0.0, most=10.0)]
+Stiffness: TypeAlias = Annotated[float, Number("N/m", least=0.0)]
+Frequency: TypeAlias = Annotated[float, Number("Hz", above=0.0)]
+OpenLossFactor: TypeAlias = Annotated[float | Open, Number("", least=0.0, most=10.0, openable=True)]
+OpenLength: TypeAlias = Annotated[float | Open, Number("m", openable=True)]
+OpenStiffness: TypeAlias = Annotated[float | Open, Number("N/m", least=0.0, openable=True)]
+OpenDamping: TypeAlias = Annotated[float | Open, Number("N s/m", least=0.0, openable=True)]
+Side: TypeAlias = Annotated[
+    str, BeforeValidator(_side), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
+]
 Throws: TypeAlias = Annotated[list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]")]

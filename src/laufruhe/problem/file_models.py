@@ -333,9 +333,9 @@ class ConstraintTable(QuantityTable):
     """A limit on a quantity."""
 
     limit: QuantityName
-    max: str | None = Field(default=None, description="With the unit of the quantity.", examples=["6 kg"])
-    min: str | None = Field(default=None, description="Of natural frequencies, decoupling or sag.")
-    outside: Annotated[list[str], Field(min_length=2, max_length=2)] | None = Field(
+    max: f.Side | None = Field(default=None, description="With the unit of the quantity.", examples=["6 kg"])
+    min: f.Side | None = Field(default=None, description="Of natural frequencies, decoupling or sag.")
+    outside: Annotated[list[f.Side], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="A band that holds no natural frequency.", examples=[["12 Hz", "20 Hz"]]
     )
     name: Name | None = None
@@ -368,6 +368,9 @@ class SearchTable(Table):
 
     starts: int = Field(default=16, ge=1, le=10_000)
     seed: int = Field(default=0, ge=0)
+    boxes: int | None = Field(
+        default=None, ge=0, le=1_000_000, description="That bounds of stiffness may be divided into for a proof."
+    )
 
 
 class ProblemFile(Table):

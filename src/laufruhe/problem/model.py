@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import html
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +15,7 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountDesign
 from laufruhe.problem.phasing import Phasing
-from laufruhe.problem.quantity import Quantity
+from laufruhe.problem.quantity import ON_MOUNTS, Quantity, Subject
 
 Array = NDArray[np.float64]
 
@@ -94,7 +95,7 @@ class Limit:
     maximum: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Problem:
     """Everything that a solver and a report need to know.
 
@@ -138,10 +139,58 @@ class Problem:
     mount_design: MountDesign = NOTHING_ASKED
     phasing: Phasing | None = None
 
+    def __repr__(self) -> str:
+        return f"<Problem {self.summary}>"
+
+    def _repr_html_(self) -> str:
+        return f"<strong>{html.escape(self.title)}</strong><br>{html.escape(self.summary)}"
+
+    @property
+    def summary(self) -> str:
+        """What the problem is about and what of it is open, in one line."""
+        engine = self.engine
+        parts = [
+            self.name,
+            f"{len(engine.slider_cranks)} cylinder(s), {engine.cycle}",
+            f"{len(engine.mounts)} mount(s)",
+            f"{len(self.points)} operating point(s)",
+            f"{len(self.limits) + len(self.mount_design.limits)} constraint(s)",
+        ]
+        names = list(self.phasing.open_names) if self.phasing is not None else []
+        names += [decision.name + ("" if decision.fixed_angle else " and angle") for decision in self.decisions]
+        names += [decision.name for decision in self.mount_design.decisions]
+        return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
+
     @property
     def start(self) -> tuple[complex, ...]:
         """Decisions of the design as given."""
         return tuple(decision.start for decision in self.decisions)
+
+    @property
+    def feels_gas(self) -> bool:
+        """Whether gas loads what is minimised or limited: its roll moment alone, and all where it drives the speed."""
+        asked = [term.quantity for term in self.objective] + [limit.quantity for limit in self.limits]
+        felt = any(quantity.subject in (*ON_MOUNTS, Subject.ROLL_MOMENT) for quantity in asked)
+        has_gas = self.fidelity.gas and any(point.gas is not None for point in self.points)
+        return has_gas and (felt or self.fidelity.is_uneven)
+
+    @property
+    def objective_name(self) -> str:
+        """What is minimised, in words; empty where nothing is."""
+        parts = [(term.weight, term.quantity.name) for term in self.objective]
+        parts += [(weight, quantity.name) for quantity, weight in self.mount_design.terms]
+        if len(parts) == 1 and parts[0][0] == 1.0:
+            return parts[0][1]
+        return " + ".join(f"{weight:g} x {name}" for weight, name in parts)
+
+    @property
+    def objective_unit(self) -> str | None:
+        """SI unit of what is minimised, empty where its terms have several; None where nothing is."""
+        units = {term.quantity.unit for term in self.objective}
+        units |= {quantity.unit for quantity, _ in self.mount_design.terms}
+        if not units:
+            return None
+        return units.pop() if len(units) == 1 else ""
 
     def at(self, fidelity: Fidelity) -> Problem:
         """The same problem at another fidelity, every design of an open star included."""

@@ -49,7 +49,12 @@ def asked_of_mounts(file: ProblemFile, found: MountsFound, points: Sequence[str]
     ]
     _check_together(limits)
     return replace(
-        found.design, terms=tuple(terms), limits=tuple(limits), starts=file.search.starts, seed=file.search.seed
+        found.design,
+        terms=tuple(terms),
+        limits=tuple(limits),
+        starts=file.search.starts,
+        seed=file.search.seed,
+        boxes=file.search.boxes,
     )
 
 
@@ -126,6 +131,10 @@ def _check_together(limits: Sequence[MountLimit]) -> None:
     for low, high in pairs:
         if low.minimum is not None and high.maximum is not None and low.minimum > high.maximum:
             unit = low.quantity.unit
-            names = f"'{low.name}'" if low is high else f"'{low.name}' and '{high.name}'"
             rule = f"at least {units.shown(low.minimum, unit)} and at most {units.shown(high.maximum, unit)}"
-            raise Refused("constraints", None, f"{names} contradict each other: {rule}", "let the limits leave room")
+            said = (
+                f"'{low.name}' and '{high.name}' contradict each other"
+                if low is not high
+                else f"'{low.name}' contradicts itself"
+            )
+            raise Refused("constraints", None, f"{said}: {rule}", "let the limits leave room")

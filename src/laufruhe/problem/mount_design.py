@@ -158,6 +158,8 @@ class MountDesign:
         What is forbidden.
     starts, seed
         Points that a search starts from where the problem is not convex.
+    boxes
+        That bounds of stiffness may be divided into for a proof; as is worth it when None.
     """
 
     numbers: tuple[tuple[float, ...], ...] = ()
@@ -166,6 +168,7 @@ class MountDesign:
     limits: tuple[MountLimit, ...] = ()
     starts: int = 16
     seed: int = 0
+    boxes: int | None = None
 
     @property
     def asked(self) -> bool:

@@ -150,8 +150,9 @@ class _Scene:
         for key in ("motions", "frequency"):
             if getattr(table, key) is not None:
                 raise Refused(f"{at}.{key}", None, f"means nothing for a {subject}", "leave it out")
-        if subject not in ON_MOUNTS and (table.mounts or table.direction_weights):
-            raise Refused(f"{at}.mounts", None, "goes with mount forces and travels only", "leave it out")
+        for key in ("mounts", "direction_weights"):
+            if getattr(table, key) is not None and subject not in ON_MOUNTS:
+                raise Refused(f"{at}.{key}", None, "goes with mount forces and travels only", "leave it out")
         self._known(table.mounts, self.mounts, f"{at}.mounts", "mount")
         self._known(table.operating_points, self.points, f"{at}.operating_points", "operating point")
         weights = table.direction_weights

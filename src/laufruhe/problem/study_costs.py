@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
-from pydantic_core import PydanticCustomError
 
 from laufruhe.problem import fields as f
 from laufruhe.problem.file_models import Name, Table
@@ -31,7 +30,7 @@ class ClaimTable(Table):
     @model_validator(mode="after")
     def _says_something(self) -> ClaimTable:
         if self.says is None and self.falls_by is None:
-            raise _refused("claims nothing; give says, falls_by, or both")
+            raise f.refusal("claims nothing; give says, falls_by, or both")
         return self
 
 
@@ -48,9 +47,9 @@ class BuildTable(Table):
     @model_validator(mode="after")
     def _is_not_plain(self) -> BuildTable:
         if not self.shafts and self.case is None:
-            raise _refused("has no shafts, so it is the plain engine, which is always there; name its shafts")
+            raise f.refusal("has no shafts, so it is the plain engine, which is always there; name its shafts")
         if len(set(self.shafts)) < len(self.shafts):
-            raise _refused("names a shaft twice; name each once")
+            raise f.refusal("names a shaft twice; name each once")
         return self
 
 
@@ -68,9 +67,9 @@ class EconomicsTable(PartTable):
     @classmethod
     def _ascend(cls, limits: list[float]) -> list[float]:
         if len(limits) < 2:
-            raise _refused("is no front; give two masses or more")
+            raise f.refusal("is no front; give two masses or more")
         if any(b <= a for a, b in pairwise(limits)):
-            raise _refused("must ascend; order the masses and name each once")
+            raise f.refusal("must ascend; order the masses and name each once")
         return limits
 
     @model_validator(mode="after")
@@ -79,16 +78,16 @@ class EconomicsTable(PartTable):
         names = [*built, *(case.name for case in self.more_cylinders)]
         twice = [name for name in names if names.count(name) > 1]
         if twice:
-            raise _refused(f"has two engines called '{twice[0]}'; give each its own name ('{PLAIN}' is taken)")
+            raise f.refusal(f"has two engines called '{twice[0]}'; give each its own name ('{PLAIN}' is taken)")
         cases = [case.name for case in self.cases]
         for build in self.builds:
             if build.claim is not None and build.claim.against not in built:
-                raise _refused(f"compares '{build.name}' with '{build.claim.against}'; use one of: {', '.join(built)}")
+                raise f.refusal(f"compares '{build.name}' with '{build.claim.against}'; use one of: {', '.join(built)}")
             if build.case is not None and build.case not in cases:
-                raise _refused(f"builds '{build.name}' on case '{build.case}'; use one of: {', '.join(cases)}")
+                raise f.refusal(f"builds '{build.name}' on case '{build.case}'; use one of: {', '.join(cases)}")
         for case in (*self.cases, *self.more_cylinders):
             if case.equal_power_to is not None:
-                raise _refused(f"rebuilds '{case.name}' by itself; leave equal_power_to out of its cases")
+                raise f.refusal(f"rebuilds '{case.name}' by itself; leave equal_power_to out of its cases")
         return self
 
     def settings(self) -> dict[str, Any]:
@@ -111,7 +110,7 @@ class TolerancesTable(Table):
     def _is_something(self) -> TolerancesTable:
         aligned = self.alignment * sum(self.aligned_masses)
         if not self.reciprocating_mass + self.unbalance + aligned > 0.0:
-            raise _refused("leave nothing to chance; give one above zero (alignment needs aligned_masses)")
+            raise f.refusal("leave nothing to chance; give one above zero (alignment needs aligned_masses)")
         return self
 
 
@@ -169,8 +168,3 @@ class FreeForcesTable(PartTable):
     def settings(self) -> dict[str, Any]:
         """The unit of length alone: what is printed elsewhere changes nothing."""
         return {"kind": self.kind, "spacing": self.spacing}
-
-
-def _refused(text: str) -> PydanticCustomError:
-    # braces would be read as a template
-    return PydanticCustomError("laufruhe", "{text}", {"text": text})

@@ -67,12 +67,12 @@ def _options(here: Any) -> dict[str, Any]:
     return {}
 
 
-def field_at(where: str) -> fields.Quantity | None:
+def field_at(where: str) -> fields.Number | None:
     """How the number at a path is read; None where text, a list or a choice stands there."""
     here: list[Any] = [ProblemFile]
     for part in where.split("."):
         here = [inner for annotation in here for inner in _inside(annotation, part)]
-    return next((found for annotation in here for found in _quantities(annotation)), None)
+    return next((found for annotation in here for found in _numbers(annotation)), None)
 
 
 def _inside(annotation: Any, part: str) -> list[Any]:
@@ -88,9 +88,9 @@ def _inside(annotation: Any, part: str) -> list[Any]:
     return [inner for one in get_args(annotation) for inner in _inside(one, part)]
 
 
-def _quantities(annotation: Any) -> list[fields.Quantity]:
-    if isinstance(annotation, fields.Quantity):
+def _numbers(annotation: Any) -> list[fields.Number]:
+    if isinstance(annotation, fields.Number):
         return [annotation]
     if get_origin(annotation) is list:
         return []
-    return [found for one in get_args(annotation) for found in _quantities(one)]
+    return [found for one in get_args(annotation) for found in _numbers(one)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from laufruhe.problem.study_paths import field_at
 
 MOST_POINTS = 100_000
 _DIGITS = 12
+_SIDES = {"max": "at most", "min": "at least"}
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,14 @@ class Axis:
 
     @property
     def name(self) -> str:
-        """The last word of the path, as a reader says it."""
-        return self.quantity.split(".")[-1].replace("_", " ")
+        """The end of the path, as a reader says it: a place goes with its list, a side with its limit."""
+        *before, last = self.quantity.replace("_", " ").split(".")
+        if before and last.isdigit():
+            return f"{before[-1]} {last}"
+        if before[:1] == ["constraints"]:
+            of = f"limit {before[1]}" if before[1].isdigit() else before[1]
+            return f"{of}, {_SIDES.get(last, last)}"
+        return last
 
     def by_value(self) -> dict[Value, float]:
         """Numbers of the values; none where these are labels."""
@@ -95,9 +103,9 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
     else:
         numbers = np.linspace(low, high, sweep.points)
     texts = [f"{number:.{_DIGITS}g}" for number in numbers]
-    if unit == "1" or not isinstance(sweep.first, str):
+    if not isinstance(sweep.first, str) or (unit == "1" and not _is_limit(sweep.quantity)):
         return tuple(float(text) for text in texts)
-    return tuple(f"{text} {unit}" for text in texts)
+    return tuple(texts) if unit == "1" else tuple(f"{text} {unit}" for text in texts)
 
 
 def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, ...]]:
@@ -114,13 +122,24 @@ def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str
         raise Refused(given, list(values), "is not finite", "give numbers")
     plain = [float(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
     texts = [value for value in values if isinstance(value, str)]
-    if field is None or len(plain) + len(texts) < len(values):
+    wanted = field.unit if field is not None else _limited_unit(quantity, texts)
+    if wanted is None or len(plain) + len(texts) < len(values):
         return ("1", tuple(plain)) if len(plain) == len(values) else ("", None)
     if not texts:
-        return "deg" if field.plain is not None else "1", tuple(plain)
+        return "deg" if field is not None and field.plain is not None else "1", tuple(plain)
     if plain:
         raise Refused(given, list(values), "mixes numbers with and without a unit", "write all alike")
-    numbers = tuple(measured(text, field.unit, given) for text in texts)
+    numbers = tuple(measured(text, wanted, given) for text in texts)
     unit = units.unit_of(texts[0])
-    one = units.parse(f"1 {unit}", field.unit)
+    one = units.parse(f"1 {unit}", wanted)
     return unit or "1", tuple(float(f"{number / one:.{_DIGITS}g}") for number in numbers)
+
+
+def _is_limit(quantity: str) -> bool:
+    """Whether a path is that of a side of a limit, whose dimension is told by its text alone."""
+    first, *_, last = quantity.split(".")
+    return first == "constraints" and last in _SIDES
+
+
+def _limited_unit(quantity: str, texts: Sequence[str]) -> str | None:
+    return units.dimension_of(texts[0]) if texts and _is_limit(quantity) else None

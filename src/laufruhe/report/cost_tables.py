@@ -8,6 +8,7 @@ import xarray as xr
 
 from laufruhe.physics.modes import GRAVITY
 from laufruhe.report.study_tables import NOTHING, number, table
+from laufruhe.report.wording import percent
 from laufruhe.studies.economics import Standing
 from laufruhe.studies.free_forces import printed_agree
 from laufruhe.studies.tolerance import CAUSES
@@ -29,7 +30,7 @@ def economics(data: xr.Dataset) -> list[str]:
         row = data.sel(build=name)
         force, worth = float(row["optimum"]), judged.get(str(name))
         more = str(row["standing"].item()) == Standing.NEXT
-        change = NOTHING if force == plain else f"{100.0 * (force / plain - 1.0):+.1f} %"
+        change = NOTHING if force == plain else percent(force / plain - 1.0)
         told = f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else NOTHING
         label = f"{name}, no shafts, equal power" if more else str(name)
         cells = [label, str(int(row["shafts"])), f"{float(row['optimum_mass']):.2f}", number(force)]
@@ -67,7 +68,7 @@ def tolerance(data: xr.Dataset) -> list[str]:
         often = float(row["random"].sel(share=0.95, method="nearest")) / GRAVITY
         cells = [str(name), f"{nominal:.3g}", f"{worst:.1f}", *parts, f"{float(row['mean']) / GRAVITY:.1f}"]
         cells += [f"{often:.1f}", f"{nominal / worst:.2g}", number(float(row["mount"]) / GRAVITY, 3)]
-        rows.append([*cells, f"{100.0 * rise_of(row):+.1f} %"])
+        rows.append([*cells, percent(rise_of(row))])
     return [*table(head, rows, len(rows)), "", *_said(tolerance_verdicts(data))]
 
 

@@ -30,7 +30,7 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         "left out:",
         *(_line(part.what, part.why, part.share) for part in choice.left_out),
         "saved:",
-        f"  {pruned} force components sampled in place of {whole}" + (f", 1/{whole / pruned:.0f}" if pruned else ""),
+        f"  {pruned} force components sampled in place of {whole}{_saved(whole, pruned)}",
         f"  {milliseconds[0]:.3f} ms for another design in place of {milliseconds[1]:.3f} ms",
     ]
     return "\n".join(lines) + "\n"
@@ -49,6 +49,11 @@ def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         "milliseconds": {"kept": milliseconds[0], "exact": milliseconds[1]},
     }
     return strict(content)
+
+
+def _saved(whole: int, pruned: int) -> str:
+    """How many times fewer numbers; nothing where the tolerance asks for as many or more."""
+    return f", 1/{whole / pruned:.2g}" if 0 < pruned < whole else ""
 
 
 def _line(what: str, why: str, share: float) -> str:

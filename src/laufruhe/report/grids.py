@@ -13,6 +13,7 @@ from laufruhe.report.measures import (
     hardest_point,
     is_met,
     limits_of,
+    load_designs,
     mount_measures,
     mount_orders,
     padded,
@@ -73,7 +74,7 @@ def priced(price: float, unit: str, of: str) -> str:
     if not price:
         return DASH
     (name, factor), (of_name, of_factor) = readable(unit), readable(of)
-    units = f"{name or '1'} per {of_name}" if of_name else name
+    units = f"{name} per {of_name}".strip() if of_name else name
     return f"{number(price * factor / of_factor)} {units}".rstrip()
 
 
@@ -101,25 +102,23 @@ def _limit_row(limit: LimitValue, unit: str) -> tuple[str, ...]:
 def _mounts(result: Result) -> Grid:
     measures = mount_measures(result)
     several = len(result.problem.points) > 1
-    scale = max((m.initial.max for m in measures), default=0.0)
+    compared = len(load_designs(result)) > 1
+    scale = max((m.initial.max if compared else m.final.max for m in measures), default=0.0)
     rows = []
     for m in measures:
         lead = (m.point, m.mount) if several else (m.mount,)
-        if changed(result):
+        if compared:
             change = percent(m.final.mean / m.initial.mean - 1.0) if m.initial.mean > 1e-9 * scale else DASH
             values = (m.initial.mean, m.final.mean), (m.initial.max, m.final.max)
             (a, b), (c, d) = ((number(x, scale=scale) for x in pair) for pair in values)
             rows.append((*lead, a, b, change, c, d))
         else:
             rows.append((*lead, *(number(x, scale=scale) for x in (m.final.mean, m.final.max, m.final.rms))))
-    head = (
-        ("mean before", "mean after", "change", "max before", "max after")
-        if changed(result)
-        else ("mean", "max", "rms")
-    )
+    head = ("mean before", "mean after", "change", "max before", "max after") if compared else ("mean", "max", "rms")
     at = "" if several else f" at {result.problem.points[0].name}"
+    note = f"The design as given has none: {result.initial.resonance}." if result.initial.resonance else ""
     first = ("at", "mount") if several else ("mount",)
-    return Grid(f"Mount forces{at} [N]", (*first, *head), tuple(rows), left=len(first))
+    return Grid(f"Mount forces{at} [N]", (*first, *head), tuple(rows), note=note, left=len(first))
 
 
 def _orders(result: Result) -> Grid:
@@ -139,14 +138,15 @@ def _orders(result: Result) -> Grid:
         (f"{j * base:g}", *(aligned(value, top) for value, top in zip(table[j], scale, strict=True)))
         for j in sorted(kept)
     )
-    head = [f"{name}{when}" for name in names for when in ((" before", " after") if changed(result) else ("",))]
+    when = (" before", " after") if len(load_designs(result)) > 1 else ("",)
+    head = [f"{name}{side}" for name in names for side in when]
     note = f"Amplitudes; the largest {ORDERS_SHOWN} of {len(present)} orders." if len(present) > len(kept) else ""
     return Grid(f"Orders at {result.problem.points[k].name}", ("order", *head), rows, note=note)
 
 
 def _order_columns(result: Result, k: int) -> tuple[list[Array], list[str]]:
     """Amplitudes by order, before and after where the design changed."""
-    designs = [result.initial, result.final] if changed(result) else [result.final]
+    designs = load_designs(result)
     columns: list[list[Array]] = []
     names = ["shaking force [N]", "moment [N m]"]
     for design in designs:

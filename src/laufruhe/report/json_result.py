@@ -24,6 +24,8 @@ from laufruhe.report.mounting import is_elastic, modes_as_dict
 from laufruhe.report.ranking import phasing_record
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
+from laufruhe.solvers.certificate import Proof
+from laufruhe.solvers.mount_result import objective_of
 from laufruhe.solvers.result import Result
 
 
@@ -68,16 +70,20 @@ def as_dict(result: Result) -> dict[str, Any]:
 
 
 def _objective(result: Result) -> dict[str, Any] | None:
+    """Null where nothing is minimised; without a design its value alone is."""
     o = result.objective
-    if o is None:
+    if o is not None:
+        return {"name": o.name, "value": o.value, "unit": o.unit, "initial": o.initial, "reduction": o.reduction}
+    given = objective_of(result.problem, result.initial, result.initial)
+    if given is None:
         return None
-    return {"name": o.name, "value": o.value, "unit": o.unit, "initial": o.initial, "reduction": o.reduction}
+    return {"name": given.name, "value": None, "unit": given.unit, "initial": given.initial, "reduction": None}
 
 
-def _certificate(result: Result) -> dict[str, Any] | None:
+def _certificate(result: Result) -> dict[str, Any]:
     c = result.certificate
     if c is None:
-        return None
+        return {"kind": str(Proof.NONE), "lower_bound": None, "gap": None, "kkt_residual": None, "method": ""}
     return {
         "kind": str(c.kind),
         "lower_bound": c.lower_bound,

@@ -94,6 +94,11 @@ def changed(result: Result) -> bool:
     return result.final is not result.initial
 
 
+def load_designs(result: Result) -> list[Evaluation]:
+    """Designs whose loads are shown: as given and as decided; a resonance of the one given leaves the other."""
+    return [result.initial, result.final] if changed(result) and not result.initial.resonance else [result.final]
+
+
 def _stated(limit: Limit, value: float) -> LimitValue:
     active = value >= limit.maximum * (1.0 - 1e-5)
     return LimitValue(limit.name, value, limit.maximum, limit.quantity.unit, active, 0.0)

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from laufruhe.report.grid import Grid
-from laufruhe.report.wording import DASH, number, trimmed
+from laufruhe.report.wording import DASH, number, percent, trimmed
 from laufruhe.solvers.ranking import PhasingResult, RankedOrder, RankedStar
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
@@ -98,7 +98,7 @@ def _trade(result: Result, phasing: PhasingResult) -> Grid:
             trimmed(math.degrees(p.deviation)),
             number(p.value, scale=even),
             number(p.lower_bound, scale=even),
-            f"{100.0 * (p.value / even - 1.0):+.1f} %".replace("-", "−") if even else DASH,
+            percent(p.value / even - 1.0).replace("-", "−") if even else DASH,
             f"{p.kkt_residual:.0e}" if p.kkt_residual else DASH,
         )
         for p in phasing.trade

@@ -59,7 +59,9 @@ def _part(name: str, data: xr.Dataset, folder: Path) -> list[str]:
     from laufruhe.report.study_kinds import SHOWN
 
     shown, title, source = SHOWN[data.attrs["kind"]], data.attrs["title"], data.attrs["source"]
-    data.to_netcdf(folder / f"{name}.nc")
+    # a name with a space cannot be marked as a coordinate there
+    spaced = {str(coord): str(coord).replace(" ", "_") for coord in data.coords if " " in str(coord)}
+    data.rename(spaced).to_netcdf(folder / f"{name}.nc")
     _flat(data).to_csv(folder / f"{name}.csv")
     save(shown.picture(data), folder / f"{name}.png")
     words = data.attrs["kind"].capitalize() + "." + (f" Source: {source}" if source else "")

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from laufruhe.report.wording import percent
+from laufruhe.units import readable
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -35,6 +38,17 @@ def settled(value: float, scale: float) -> float:
     return 0.0 if abs(value) < NEGLIGIBLE * abs(scale) else value
 
 
+def readable_metric(data: xr.Dataset) -> xr.Dataset:
+    """The dataset with its metric in the unit that a reader expects: a sag in mm, a stiffness in N/mm."""
+    unit, factor = readable(data["objective"].attrs["units"])
+    if factor == 1.0:
+        return data
+    names = ("objective_given", "objective", "lower_bound")
+    return data.assign(
+        {name: (factor * data[name]).assign_attrs({**data[name].attrs, "units": unit}) for name in names}
+    )
+
+
 def by_point(data: xr.Dataset, *named: str) -> list[str]:
     """The table of a part whose points were solved.
 
@@ -43,10 +57,12 @@ def by_point(data: xr.Dataset, *named: str) -> list[str]:
     named
         Coordinates that tell rows apart beside case and swept values.
     """
+    data = readable_metric(data)
     columns = ["case", *named, *swept_names(data)]
     metric, unit = data.attrs["metric"], data["objective"].attrs["units"]
     head = ["case", *named, *(with_unit(data[name]) for name in swept_names(data))]
-    head += [f"{metric}, as given [{unit}]", f"at the optimum [{unit}]", f"lower bound [{unit}]", "change"]
+    in_unit = f" [{unit}]" if unit else ""
+    head += [f"{metric}, as given{in_unit}", f"at the optimum{in_unit}", f"lower bound{in_unit}", "change"]
     head += [*(["largest mount force [N]"] if data.sizes["mount"] else []), "proof"]
     rows = [_row(data.isel(point=k), columns) for k in range(min(data.sizes["point"], MOST_ROWS))]
     return table(head, rows, data.sizes["point"])
@@ -69,7 +85,7 @@ def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
     best = settled(best, given)
     proof, status = str(row["proof"].item()), str(row["status"].item())
     decided = proof != "as given"
-    change = f"{100.0 * (best / given - 1.0):+.1f} %" if decided and given and best == best else NOTHING
+    change = percent(best / given - 1.0) if decided and given and best == best else NOTHING
     cells = [_cell(row[name].item()) for name in columns]
     cells += [number(given), number(best) if decided else NOTHING, number(bound), change]
     if row.sizes["mount"]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from laufruhe.problem.model import Problem
 from laufruhe.report.measures import breaks_a_limit, changed
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.result import DecisionValue, Result, Status
@@ -66,22 +65,6 @@ def percent(share: float) -> str:
     return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH
 
 
-def one_line(problem: Problem) -> str:
-    """What a problem is about, for the screen."""
-    engine = problem.engine
-    parts = [
-        problem.name,
-        f"{len(engine.slider_cranks)} cylinder(s), {engine.cycle}",
-        f"{len(engine.mounts)} mount(s)",
-        f"{len(problem.points)} operating point(s)",
-        f"{len(problem.limits) + len(problem.mount_design.limits)} constraint(s)",
-    ]
-    names = list(problem.phasing.open_names) if problem.phasing is not None else []
-    names += [decision.name + ("" if decision.fixed_angle else " and angle") for decision in problem.decisions]
-    names += [decision.name for decision in problem.mount_design.decisions]
-    return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
-
-
 def headline(result: Result) -> str:
     """The result in one sentence."""
     o = result.objective
@@ -94,6 +77,9 @@ def headline(result: Result) -> str:
         return f"{name} of the design as given: {figure(o.value, o.unit)}."
     if abs(o.reduction) < UNFELT:
         return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
+    if math.isinf(o.initial):
+        found = f"{name} is {figure(o.value, o.unit)}, {_proven(result.certificate)}"
+        return f"{found}; the design as given stands on a resonance."
     change = percent(-o.reduction)
     given, decided = figure(o.initial, o.unit), figure(o.value, o.unit, scale=o.initial)
     sentence = f"{name} falls from {given} to {decided}"

@@ -7,12 +7,14 @@ from collections.abc import Callable
 from functools import partial
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.solvers.accuracy import error_of, solve_within
 from laufruhe.solvers.direct_cones import solve_direct
-from laufruhe.solvers.result import ObjectiveValue, Result, Status
-from laufruhe.solvers.unbalances import objective_name, solve_unbalances
+from laufruhe.solvers.mount_result import objective_of
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.unbalances import solve_unbalances
 
 __all__ = ["Result", "Status", "solve", "state"]
 
@@ -39,10 +41,14 @@ def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many
     """
     if problem.mount_design.decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
+    if problem.phasing is None and not (problem.decisions or problem.mount_design.decisions):
+        return state(problem)
     if problem.phasing is not None and problem.mount_design.asked:
         from laufruhe.solvers.mount_stars import solve_star_mounts
 
         return solve_star_mounts(problem, say)
+    if problem.phasing is None and not problem.decisions and not problem.mount_design.decisions:
+        return state(problem)
     if problem.mount_design.asked:
         from laufruhe.solvers.mounts import solve_mounts
 
@@ -53,29 +59,28 @@ def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many
         return solve_within(problem, solve_phasing)
     if problem.decisions and not problem.objective:
         raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
-    if not problem.decisions:
-        return state(problem)
     return solve_within(problem, partial(solve_unbalances, cones=solve_direct if many else None))
 
 
-def state(problem: Problem) -> Result:
-    """The design as given, evaluated and not changed."""
+def state(problem: Problem, to_start_from: bool = False) -> Result:
+    """The design as given, evaluated and not changed.
+
+    Parameters
+    ----------
+    to_start_from
+        Whether it is only where a search starts, so that it may stand on a resonance.
+    """
     started = time.perf_counter()
-    evaluation = evaluate(problem)
-    objective = None
-    if problem.objective:
-        value = objective_value(problem, evaluation)
-        unit = problem.objective[0].quantity.unit
-        objective = ObjectiveValue(objective_name(problem), value, unit, value)
+    evaluation = evaluate_start(problem) if to_start_from else evaluate(problem)
     return Result(
         problem=problem,
         status=Status.FEASIBLE,
-        objective=objective,
+        objective=objective_of(problem, evaluation, evaluation),
         certificate=None,
         decisions=(),
         limits=(),
         initial=evaluation,
         final=evaluation,
-        error_estimate=error_of(problem, evaluation),
+        error_estimate=0.0 if evaluation.resonance else error_of(problem, evaluation),
         timing={"evaluate": time.perf_counter() - started},
     )

@@ -176,11 +176,15 @@ class AffineModel:
         cycle = self.problem.engine.cycle
         return max(int(self.problem.fidelity.samples * float(cycle.base_order / self.base)), 24)
 
-    def at(self, samples: int) -> AffineProblem:
-        """The problem with its load rows at `samples` steps over their common period."""
+    def at(self, samples: int, averaged: bool = False) -> AffineProblem:
+        """The problem with its load rows at `samples` steps over their common period.
+
+        Rows of means may be averaged about their angles: what bounds these, bounds the
+        whole cycle (P7).
+        """
         problem = self.problem
-        terms = tuple((term.weight, self.norm(term.quantity, samples)) for term in problem.objective)
-        limits = tuple((limit.maximum, self.norm(limit.quantity, samples)) for limit in problem.limits)
+        terms = tuple((term.weight, self.norm(term.quantity, samples, averaged)) for term in problem.objective)
+        limits = tuple((limit.maximum, self.norm(limit.quantity, samples, averaged)) for limit in problem.limits)
         return AffineProblem(terms, limits, self.domains, samples)
 
     def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
@@ -188,27 +192,37 @@ class AffineModel:
         slopes = self._slopes[Subject.SHAKING_FORCE]
         return [(loads.wrench, tuple(by)) for loads, by in zip(self.bare.loads, slopes, strict=True)]
 
-    def norm(self, quantity: Quantity, samples: int) -> AffineNorm:
-        """A quantity at `samples` steps over the common period."""
+    def norm(self, quantity: Quantity, samples: int, averaged: bool = False) -> AffineNorm:
+        """A quantity at `samples` steps over the common period, a mean averaged about them where asked."""
         if quantity.subject in MASSES:
             bare = mass_rows(quantity, self.bare.engine.rotors)
             slopes = [mass_rows(quantity, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]
             return _stacked(bare, slopes, self._keep_all)
         subject = quantity.subject if quantity.subject in ON_MOUNTS else Subject.SHAKING_FORCE
-        bare = self._rows(quantity, [loads.signal(quantity.subject) for loads in self.bare.loads], samples)
+        averaged = averaged and quantity.norm is Norm.SUM
+        bare = self._rows(quantity, [loads.signal(quantity.subject) for loads in self.bare.loads], samples, averaged)
         by_point = self._slopes[subject]
         slopes = [
-            self._rows(quantity, [by_point[p][k] for p in range(len(by_point))], samples).vectors
+            self._rows(quantity, [by_point[p][k] for p in range(len(by_point))], samples, averaged).vectors
             for k in range(len(self._changes))
         ]
         return _stacked(bare, slopes, self._keep_all)
 
-    def _rows(self, quantity: Quantity, signals: Sequence[Spectrum], samples: int) -> Rows:
+    def _rows(self, quantity: Quantity, signals: Sequence[Spectrum], samples: int, averaged: bool) -> Rows:
         finest = common_base([self.base, *(signal.base for signal in signals)])
         step = int(self.base / finest)
         period = [Spectrum(self.base, s.rebased(finest).coefficients[::step]) for s in signals]
+        if averaged:
+            period = [_averaged(signal, samples) for signal in period]
         names = [mount.name for mount in self.problem.engine.mounts]
         return load_rows(quantity, self.problem.points, period, names, samples)
+
+
+def _averaged(signal: Spectrum, samples: int) -> Spectrum:
+    """Averages under a triangle that falls to zero one step to either side: sinc^2 times each order (P7)."""
+    c = signal.coefficients
+    share = np.sinc(np.arange(len(c)) / samples) ** 2
+    return Spectrum(signal.base, c * share.reshape(-1, *(1,) * (c.ndim - 1)))
 
 
 def _change(problem: Problem, k: int, direction: complex) -> tuple[Rotor, ...]:

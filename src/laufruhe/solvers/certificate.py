@@ -8,6 +8,7 @@ form. Any Z and mu give a valid bound; the solver only proposes good ones.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -26,7 +27,8 @@ FLOOR = 1e-3
 
 def gap_unit(value: float, given: float) -> float:
     """What a gap of an objective is counted in, beside that of the design as given; never zero."""
-    return max(value, FLOOR * given) or 1.0
+    # a design as given that stands on a resonance has no size
+    return max(value, FLOOR * given if math.isfinite(given) else 0.0) or 1.0
 
 
 class Proof(StrEnum):
@@ -164,8 +166,15 @@ def _spread(fine: AffineNorm, samples: int, z: Array) -> Array:
     return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)
 
 
-def kkt_residual(problem: AffineProblem, x: Array, bound: Bound) -> float:
-    """Largest violation of the optimality conditions, each relative to its own scale (P5)."""
+def kkt_residual(problem: AffineProblem, x: Array, bound: Bound, whole: float | None = None) -> float:
+    """Largest violation of the optimality conditions, each relative to its own scale (P5).
+
+    Parameters
+    ----------
+    whole
+        What parts of the objective are relative to; the objective itself when left out,
+        which a perfectly balanced engine does not have.
+    """
     scales = problem.scales
     steps = [0.0]
     reach = float(np.abs(_gradient_size(problem, bound) * scales).max(initial=0.0)) or 1.0
@@ -177,7 +186,7 @@ def kkt_residual(problem: AffineProblem, x: Array, bound: Bound) -> float:
         moved[part] = x[part] - step
         steps.append(float(np.abs((domain.project(moved) - x[part]) / scales[part]).max(initial=0.0)))
     prices = bound.multipliers.shadow_prices(problem)
-    whole = problem.objective(x) or 1.0
+    whole = whole or problem.objective(x) or 1.0
     for (weight, norm), z in zip(problem.terms, bound.multipliers.terms, strict=True):
         # the dual row of an optimum points along its row: <Z, V> = norm(V)
         steps.append(weight * (norm.value(x) - float(np.vdot(z, norm.rows(x)))) / whole)

@@ -105,9 +105,16 @@ class ConicProgram:
             warnings.simplefilter("ignore")
             try:
                 self._program.solve(solver=cp.CLARABEL, **TIGHT)
-            except cp.error.SolverError as error:
-                raise SolverError(f"the cone solver gave up ({error})") from None
+            except cp.error.SolverError:
+                self._solve_loosely()
         return self._answer(problem)
+
+    def _solve_loosely(self) -> None:
+        """At the solver's own tolerances, which tell limits that all but contradict each other from those that do."""
+        try:
+            self._program.solve(solver=cp.CLARABEL)
+        except cp.error.SolverError as error:
+            raise SolverError(f"the cone solver gave up ({error})") from None
 
     def _take(self, problem: AffineProblem) -> None:
         if not self._reusable:

@@ -7,6 +7,7 @@ two solves, so a point's result hangs on that point alone.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -130,16 +131,24 @@ def solve_direct(problem: AffineProblem) -> ConicSolution:
     cost = np.zeros(columns)
     for (weight, _), block in zip(problem.terms, blocks, strict=False):
         cost[slice(*_span(block))] = weight * block.value
-    return _answer(problem, blocks, starts, _solved(rows, cost))
+    found = _solved(rows, cost, TIGHT)
+    if not _is_told(found):
+        # limits that all but contradict each other
+        found = _solved(rows, cost, {})
+    return _answer(problem, blocks, starts, found)
 
 
-def _solved(rows: _Rows, cost: Array) -> Any:
+def _is_told(found: Any) -> bool:
+    return any(word in str(found.status) for word in ("Solved", "PrimalInfeasible"))
+
+
+def _solved(rows: _Rows, cost: Array, tolerances: Mapping[str, float]) -> Any:
     import clarabel
     from scipy.sparse import csc_array
 
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    for name, tolerance in TIGHT.items():
+    for name, tolerance in tolerances.items():
         setattr(settings, name, tolerance)
     nothing = csc_array((rows.columns, rows.columns))
     right = np.concatenate(rows.right)
@@ -150,7 +159,7 @@ def _answer(problem: AffineProblem, blocks: list[_Block], starts: list[int], fou
     status, seconds, iterations = str(found.status), float(found.solve_time), int(found.iterations)
     if "PrimalInfeasible" in status:
         return ConicSolution(None, Multipliers((), ()), seconds, iterations)
-    if "Solved" not in status:
+    if not _is_told(found):
         raise SolverError(f"the cone solver stopped with status '{status}'")
     x = np.asarray(found.x)[: problem.size] * problem.units
     for domain in problem.domains:

@@ -36,8 +36,9 @@ from laufruhe.problem.mount_design import (
     mounting_in,
     torque_roll_rows,
 )
+from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.mount_values import excess, whole_objective
-from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.mount_result import FEASIBLE, infeasible_mounts, mount_result
 from laufruhe.solvers.result import Result
 
@@ -294,7 +295,7 @@ def solve_convex_mounts(problem: Problem) -> Result:
 
     started = time.perf_counter()
     program = convex_program(problem)
-    initial = evaluate(problem)
+    initial = evaluate_start(problem)
     modelled = time.perf_counter()
     found = solve_cones(program)
     solved = time.perf_counter()
@@ -306,7 +307,7 @@ def solve_convex_mounts(problem: Problem) -> Result:
     final = evaluate(problem, problem.design(problem.start, [float(v) for v in x]))
     value, given = whole_objective(problem, final), whole_objective(problem, initial)
     bound = float(max(bound, 0.0))
-    gap = float(max(value - bound, 0.0) / max(abs(value), 1e-3 * abs(given), 1e-300))
+    gap = float(max(value - bound, 0.0) / gap_unit(value, given))
     worst = max((excess(limit, final) for limit in problem.mount_design.limits), default=0.0)
     proven = gap <= problem.tolerance and worst <= FEASIBLE
     certificate = Certificate(

@@ -13,10 +13,11 @@ from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
+from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.phasing import Candidate
 from laufruhe.solvers.accuracy import sampling_error
-from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.domain import domains_of
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mount_program import JointProgram
@@ -30,6 +31,7 @@ from laufruhe.solvers.mount_result import (
 from laufruhe.solvers.mount_starts import columns_of, start_points, unbalances_of
 from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
+from laufruhe.solvers.subdivision import Divided, divided_bound, divides
 from laufruhe.solvers.throw_moves import ThrowMoves
 from laufruhe.solvers.transmitted_bound import transmitted_bound
 from laufruhe.solvers.unbalances import decision_values, solve_unbalances
@@ -38,6 +40,8 @@ Array = NDArray[np.float64]
 
 SLACK = 1e-5
 WORTH_SAYING = 1.01
+# a bound from boxes that is nearer than this is called a proof within its gap
+SMALL_GAP = 0.05
 MOST_MARGINS = 3
 ITERATIONS = 150
 MOST_AROUND = 3
@@ -103,7 +107,7 @@ def _solved(
 ) -> tuple[Result, Array]:
     """Result, and deviations of the throws."""
     started = time.perf_counter()
-    initial = evaluate(problem)
+    initial = evaluate_start(problem)
     points = start_points(problem)
     points = points if first is None else [first, *points[1:]]
     joint = JointProgram(problem, moves=moves)
@@ -261,16 +265,19 @@ def _result(
     timing: dict[str, float],
 ) -> Result:
     objective = objective_of(problem, initial, design.evaluation)
-    scale = max(abs(design.value), 1e-3 * abs(objective.initial)) if objective else 1.0
+    scale = gap_unit(design.value, objective.initial) if objective else 1.0
     # throws that move are not in the bound
-    bound = _bound(problem) if joint.moves is None else 0.0
-    gap = max(design.value - bound, 0.0) / (scale or 1.0)
-    certificate = Certificate(
-        Proof.GLOBAL if gap <= problem.tolerance else Proof.LOCAL, bound, gap, best.kkt_residual,
-        _method(optima, scale, proven),
-    )  # fmt: skip
     met = design.excess <= 10.0 * FEASIBLE
+    divided = Divided(_bound(problem) if joint.moves is None else 0.0, 0)
+    if joint.moves is None and met and divides(problem):
+        divided = divided_bound(problem, design.value, problem.tolerance * scale, divided.bound)
+    gap = max(design.value - divided.bound, 0.0) / scale
+    certificate = Certificate(
+        _proof(gap, problem.tolerance, divided), divided.bound, gap, best.kkt_residual,
+        _method(optima, scale, proven, divided),
+    )  # fmt: skip
     prices = [joint.price(limit.name, best.multipliers) for limit in problem.mount_design.limits]
+    limits = (*_load_limits(problem, design, joint, best), *mount_limits(problem, design.evaluation, prices))
     status = Status.FAILED if not met else Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     return Result(
         problem=design.problem,
@@ -278,25 +285,45 @@ def _result(
         objective=objective,
         certificate=certificate,
         decisions=(*mount_decisions(problem, design.mounts), *_unbalance_values(problem, design.unbalances)),
-        limits=(*_load_limits(problem, design, joint, best), *mount_limits(problem, design.evaluation, prices)),
+        limits=limits,
         initial=initial,
         final=design.evaluation,
-        message="" if met else "the best design found breaks a limit",
+        message="" if met else f"the best design found breaks {_broken_among(limits)}; relax it, or open more",
         error_estimate=sampling_error(problem, design.evaluation) if problem.objective else 0.0,
         timing=timing,
     )
 
 
-def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design, float] | None) -> str:
+def _proof(gap: float, tolerance: float, divided: Divided) -> Proof:
+    if gap <= tolerance:
+        return Proof.GLOBAL
+    return Proof.WITHIN_GAP if divided.boxes and gap <= SMALL_GAP else Proof.LOCAL
+
+
+def _method(
+    optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design, float] | None, divided: Divided
+) -> str:
     usable = [o for o in optima if o.usable]
     apart = distinct(optima, scale)
-    text = f"IPOPT from {len(optima)} starts, {len(usable)} of which ended at "
+    text = f"IPOPT from {len(optima)} start{'s' if len(optima) > 1 else ''}, {len(usable)} of which ended at "
     text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
     if len(apart) > 1 and apart[-1].value > WORTH_SAYING * apart[0].value > 0.0:
         text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
     if proven is not None:
         text += f"; balance on these mounts proven within {proven[1]:.0e}"
+    if divided.boxes:
+        text += f"; bounds of stiffness divided into {divided.boxes} boxes"
     return text
+
+
+def _broken_among(limits: Sequence[LimitValue]) -> str:
+    """Names of the limits that a design breaks."""
+    names = []
+    for limit in limits:
+        sign = 1.0 if limit.side == "at most" else -1.0
+        if sign * (limit.value - limit.limit) > 10.0 * FEASIBLE * abs(limit.limit):
+            names.append(f"'{limit.name}'")
+    return " and ".join(names) or "a limit"
 
 
 def _load_limits(problem: Problem, design: _Design, joint: JointProgram, best: LocalOptimum) -> tuple[LimitValue, ...]:

@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from laufruhe.errors import ModelError
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.rigid_body import moved_wrench
-from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import (
     MountLimit,
@@ -35,7 +35,7 @@ from laufruhe.problem.mount_design import (
     mounting_in,
     torque_roll_rows,
 )
-from laufruhe.problem.mount_values import whole_objective
+from laufruhe.problem.mount_resonance import objective_size, off_resonance
 from laufruhe.problem.quantity import ON_MOUNTS, Quantity
 from laufruhe.solvers.affine import AffineModel
 from laufruhe.solvers.gathered import Gathered
@@ -52,6 +52,8 @@ Array = NDArray[np.float64]
 SOFTNESS = (1e-2, 1e-4, 1e-7)
 # bounds of a stiffness that are further apart leave a start no place between them
 WIDE = 100.0
+# orders that a complaint names
+MOST_NAMED = 6
 # a typical deviation of a throw [rad]
 TURN = 0.1
 
@@ -71,7 +73,8 @@ class JointProgram:
 
     def __init__(self, problem: Problem, margin: float = 0.0, moves: ThrowMoves | None = None) -> None:
         self.problem, self._margin, self.moves = problem, margin, moves
-        self.model = AffineModel(problem)
+        # loads and unbalances alone are taken from it, whatever the mounts
+        self.model = AffineModel(off_resonance(problem))
         self._mounting = mounting_in(problem.engine)
         design = problem.mount_design
         self._count = len(design.decisions)
@@ -93,7 +96,7 @@ class JointProgram:
         )
         self._vectors, self._squares = ca.MX.sym("V", 36 * self._modal), ca.MX.sym("l", 6 * self._modal)
         self._square_unit = float(np.trace(self._root @ self._mounting.stiffness @ self._root.T)) / 6.0
-        self._unit = abs(whole_objective(problem, evaluate(problem))) or 1.0
+        self._unit = objective_size(problem)
         self.program = self._built()
 
     def _loads_of(self, moves: ThrowMoves | None) -> Loads:
@@ -243,6 +246,10 @@ class JointProgram:
             numbers = self.problem.mount_design.numbers_at([self._d[k] for k in range(self._count)])
             return sum((k for row in numbers for k in row[:3]), ca.MX(0.0))
         pairs = self._transmitted(quantity)
+        if not pairs:
+            felt = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
+            there = ", ".join(f"{order:g}" for order in felt[:MOST_NAMED]) or "none"
+            raise ModelError(f"nothing is to be felt of {quantity.name}; name an order that is there: {there}")
         ratios = [ca.sqrt(force / firm) for force, firm in pairs]
         top = self._top(ca.mmax(ca.vertcat(*ratios)))
         for force, firm in pairs:

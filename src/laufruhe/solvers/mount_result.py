@@ -19,25 +19,14 @@ FEASIBLE = 1e-6
 ACTIVE = 1e-5
 
 
-def mount_objective_name(problem: Problem) -> str:
-    """The objective in words."""
-    parts = [(term.weight, term.quantity.name) for term in problem.objective]
-    parts += [(weight, quantity.name) for quantity, weight in problem.mount_design.terms]
-    if len(parts) == 1 and parts[0][0] == 1.0:
-        return parts[0][1]
-    return " + ".join(f"{weight:g} x {name}" for weight, name in parts)
-
-
 def objective_of(problem: Problem, initial: Evaluation, final: Evaluation) -> ObjectiveValue | None:
     """The objective of the design and of the one given; None where nothing is minimised."""
-    if problem.objective:
-        unit = problem.objective[0].quantity.unit
-    elif problem.mount_design.terms:
-        unit = problem.mount_design.terms[0][0].unit
-    else:
+    unit = problem.objective_unit
+    if unit is None:
         return None
-    value, given = whole_objective(problem, final), whole_objective(problem, initial)
-    return ObjectiveValue(mount_objective_name(problem), value, unit, given)
+    value = whole_objective(problem, final)
+    given = value if final is initial else whole_objective(problem, initial)
+    return ObjectiveValue(problem.objective_name, value, unit, given)
 
 
 def mount_decisions(

@@ -25,7 +25,6 @@ from laufruhe.problem.phasing import Candidate, Method, Phasing
 from laufruhe.problem.quantity import MASSES, Quantity, Subject
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.mount_nonlinear import solve_moved
-from laufruhe.solvers.mount_result import mount_objective_name
 from laufruhe.solvers.mounts import solve_mounts
 from laufruhe.solvers.phasing_result import names_of, no_result, phase_decisions
 from laufruhe.solvers.ranking import PhasingResult, RankedStar, ranked_orders, ranked_star
@@ -237,7 +236,7 @@ def _result(problem: Problem, phasing: Phasing, found: list[_Found], designs: in
         status=Status.OPTIMAL if proven else Status.FEASIBLE,
         objective=None
         if objective is None
-        else ObjectiveValue(mount_objective_name(problem), objective.value, objective.unit, initial),
+        else ObjectiveValue(problem.objective_name, objective.value, objective.unit, initial),
         certificate=certificate,
         decisions=(*phase_decisions(problem, phasing, best.candidate, _built(phasing, best)), *result.decisions),
         initial=replace(given, samples=result.final.samples),

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.evaluation import evaluate, remounted
+from laufruhe.problem.evaluation import Evaluation, remounted
 from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED
+from laufruhe.problem.mount_resonance import evaluate_start, objective_size, off_resonance
 from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.solvers.domain import Domain, domains_of
 from laufruhe.solvers.nonlinear import spread_starts
@@ -31,7 +32,7 @@ def _balanced(problem: Problem) -> list[complex] | None:
     """Unbalances that are best on the mounts as given, where that is convex."""
     if not problem.decisions or not problem.objective:
         return None
-    result = solve_unbalances(replace(problem, mount_design=NOTHING_ASKED))
+    result = solve_unbalances(replace(off_resonance(problem), mount_design=NOTHING_ASKED))
     return unbalances_of(problem, result) if result.decisions else None
 
 
@@ -55,10 +56,12 @@ def start_points(problem: Problem) -> list[tuple[list[float], Array]]:
         design.seed,
     )
     best = columns_of(domains, problem.start if balanced is None else balanced)
-    found = [(given.tolist(), best)]
+    initial = evaluate_start(problem)
+    # on a resonance a search has nowhere to go
+    found = [] if initial.resonance else [(given.tolist(), best)]
     spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
     spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
-    for k, row in enumerate(_promising(problem, spread, len(low), design.starts - 1)):
+    for k, row in enumerate(_promising(problem, initial, spread, len(low), design.starts - len(found))):
         mounts = row[: len(low)]
         own = row[len(low) :].copy()
         for domain in domains:
@@ -67,20 +70,18 @@ def start_points(problem: Problem) -> list[tuple[list[float], Array]]:
     return found
 
 
-def _promising(problem: Problem, pool: Array, count: int, wanted: int) -> Array:
+def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, wanted: int) -> Array:
     """Points of the pool that break limits on mounts least and are worth most; a third taken as they come."""
-    given = replace(evaluate(problem), samples=POOL_SAMPLES)
-    whole = abs(whole_objective(problem, given)) or 1.0
-    scores = []
-    for row in pool:
+    given = replace(initial, samples=POOL_SAMPLES, resonance="")
+    misses, values = np.full(len(pool), np.inf), np.full(len(pool), np.inf)
+    for k, row in enumerate(pool):
         try:
             design = remounted(given, problem.mount_design.applied(problem.engine, row[:count].tolist()))
         except ModelError:
-            scores.append(np.inf)
             continue
-        misses = sum(max(excess(limit, design), 0.0) for limit in problem.mount_design.limits)
-        scores.append(misses + whole_objective(problem, design) / whole)
-    best = np.argsort(scores, kind="stable")
+        misses[k] = sum(max(excess(limit, design), 0.0) for limit in problem.mount_design.limits)
+        values[k] = whole_objective(problem, design)
+    best = np.argsort(misses + values / objective_size(problem), kind="stable")
     chosen = list(best[: wanted - wanted // 3])
     chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
     return pool[chosen]

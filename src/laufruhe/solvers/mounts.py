@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from laufruhe.problem.model import Problem
 from laufruhe.solvers.result import Result
 
@@ -24,7 +26,15 @@ def solve_mounts(problem: Problem, workers: int | None = None) -> Result:
     from laufruhe.solvers.mount_convex import is_convex, solve_convex_mounts
 
     if is_convex(problem):
-        return solve_convex_mounts(problem)
+        return _remarked(solve_convex_mounts(problem))
     from laufruhe.solvers.mount_nonlinear import solve_joint
 
-    return solve_joint(problem, workers)
+    return _remarked(solve_joint(problem, workers))
+
+
+def _remarked(result: Result) -> Result:
+    """The result, with a word on a design as given that has no finite loads."""
+    why = result.initial.resonance
+    if not why or result.message:
+        return result
+    return replace(result, message=f"the design as given has no finite loads: {why}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from laufruhe.errors import SolverError
 from laufruhe.machine.layouts import Layout
@@ -14,11 +14,11 @@ from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Phasing
 from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.phasing_result import final_result, names_of, no_design, no_result, phase_decisions, solve_fixed
-from laufruhe.solvers.ranking import PhasingResult, ranked_orders, ranked_star
+from laufruhe.solvers.ranking import ORDERS_LISTED, PhasingResult, RankedOrder, ranked_orders, ranked_star
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.star_answers import searched
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.unbalances import objective_name
+from laufruhe.solvers.unbalances import KEPT
 
 
 def solve_phasing(problem: Problem) -> Result:
@@ -89,41 +89,97 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
         return no_result(problem, _no_order(phasing, layout, throws))
     # the small ones first: a shaft that buys nothing is not built
     sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
-    best: tuple[tuple[int, ...], Result] | None = None
-    for built in sets:
+    told = orders if problem.feels_gas and not all(_is_even(order) for order in orders) else orders[:1]
+    designs = [(order, built) for built in sets for order in told]
+    solved, complete = _solved(problem, phasing, throws, designs)
+    if not solved:
+        return no_result(problem, "no firing order and no set of shafts that may be built keeps the limits")
+    given = evaluate(problem)
+    initial = objective_value(problem, given)
+    best = solved[0]
+    for design in solved[1:]:
+        if design.value < best.value - _share(problem) * gap_unit(best.value, initial):
+            best = design
+    bound = min(design.bound for design in solved) if complete else 0.0
+    names = names_of(phasing, best.built)
+    entry = ranked_star(phasing, layout, throws, None, best.value, bound, complete, names, (bank, split))
+    rest = tuple(order for order in orders if order != best.order)
+    entry = replace(entry, firing_orders=(best.order, *rest)[:ORDERS_LISTED], even=_is_even(best.order))
+    method = f"{len(told)} of {count} firing order(s), {len(sets)} set(s) of shafts looked at"
+    gap = (best.value - bound) / gap_unit(best.value, initial)
+    proven = gap <= problem.tolerance
+    own = best.result.certificate
+    certificate = Certificate(
+        Proof.GLOBAL if proven else Proof.WITHIN_GAP, bound, gap, own.kkt_residual if own else 0.0,
+        f"{own.method}; {method}" if own else method,
+    )  # fmt: skip
+    candidate = Candidate(throws, best.order.order, bank, split)
+    return replace(
+        best.result,
+        problem=replace(best.result.problem, phasing=phasing),
+        status=Status.OPTIMAL if proven else Status.FEASIBLE,
+        objective=ObjectiveValue.of(problem, best.value, initial),
+        certificate=certificate,
+        decisions=(*phase_decisions(problem, phasing, candidate, names), *best.result.decisions),
+        initial=replace(given, samples=best.result.final.samples),
+        phasing=PhasingResult((entry,), layout.throw_positions, layout.banks, count * len(sets), len(solved), method),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """A firing order and sets of shafts with everything else at its optimum."""
+
+    order: RankedOrder
+    built: tuple[int, ...]
+    result: Result
+
+    @property
+    def value(self) -> float:
+        return _value(self.result)
+
+    @property
+    def bound(self) -> float:
+        """What no design of this order and these shafts goes under."""
+        return self.result.certificate.lower_bound if self.result.certificate else self.value
+
+
+def _solved(
+    problem: Problem,
+    phasing: Phasing,
+    throws: tuple[float, ...],
+    designs: Sequence[tuple[RankedOrder, tuple[int, ...]]],
+) -> tuple[list[_Solved], bool]:
+    """Those designs that keep the limits, and whether time was enough for all."""
+    started = time.perf_counter()
+    bank, split = (b[0] if b is not None else None for b in (phasing.bank, phasing.split))
+    found: list[_Solved] = []
+    for order, built in designs:
+        if found and time.perf_counter() - started > phasing.time_limit:
+            return found, False
         names = names_of(phasing, built)
         left_out = tuple(n for group in phasing.shafts.optional for n in group if n not in names)
-        candidate = Candidate(throws, orders[0].order, bank, split, left_out)
-        result = solve_fixed(replace(phasing.realise(candidate), tolerance=problem.tolerance))
-        if result.objective is None:
-            continue
-        worth = problem.tolerance * gap_unit(result.objective.value, result.objective.initial)
-        if best is None or result.objective.value < _value(best[1]) - worth:
-            best = built, result
-    if best is None:
-        return no_result(problem, "no set of shafts that may be built keeps the limits")
-    built, result = best
-    given = evaluate(problem)
-    value, bound = _value(result), result.certificate.lower_bound if result.certificate else _value(result)
-    entry = ranked_star(
-        phasing, layout, throws, None, value, bound, True, names_of(phasing, built), (bank, split)
-    )  # fmt: skip
-    entry = replace(entry, order_count=count)
-    method = f"{len(orders)} firing order(s), {len(sets)} set(s) of shafts looked at"
-    candidate = Candidate(throws, orders[0].order, bank, split)
-    certificate = result.certificate or Certificate(Proof.GLOBAL, value, 0.0, 0.0, method)
-    return replace(
-        result,
-        problem=replace(result.problem, phasing=phasing),
-        status=Status.OPTIMAL if result.certificate is None else result.status,
-        objective=ObjectiveValue(
-            objective_name(problem), value, problem.objective[0].quantity.unit, objective_value(problem, given)
-        ),
-        certificate=replace(certificate, method=f"{certificate.method}; {method}"),
-        decisions=(*phase_decisions(problem, phasing, candidate, names_of(phasing, built)), *result.decisions),
-        initial=replace(given, samples=result.final.samples),
-        phasing=PhasingResult((entry,), layout.throw_positions, layout.banks, count * len(sets), len(sets), method),
-    )
+        candidate = Candidate(throws, order.order, bank, split, left_out)
+        result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem)))
+        kept = result.status in (Status.OPTIMAL, Status.FEASIBLE) and _keeps(result)
+        if kept and result.objective is not None:
+            found.append(_Solved(order, built, result))
+    return found, True
+
+
+def _share(problem: Problem) -> float:
+    """Tolerance of one design, and by how much another has to be better: both together are what was asked."""
+    return 0.5 * problem.tolerance
+
+
+def _keeps(result: Result) -> bool:
+    """Whether a design keeps its limits; those of a design without decisions nobody has looked at."""
+    limits = result.problem.limits
+    return all(result.final.value(limit.quantity) <= limit.maximum * (1.0 + KEPT) for limit in limits)
+
+
+def _is_even(order: RankedOrder) -> bool:
+    return max(order.intervals) - min(order.intervals) <= 1e-9 * math.tau
 
 
 def _value(result: Result) -> float:

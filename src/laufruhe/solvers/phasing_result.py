@@ -16,7 +16,7 @@ from laufruhe.solvers.star_answers import Answer, Decided
 from laufruhe.solvers.star_cuts import owners_of, solve_design
 from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_model import StarModel
-from laufruhe.solvers.unbalances import objective_name, solve_unbalances
+from laufruhe.solvers.unbalances import solve_unbalances
 
 
 def final_result(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
@@ -57,9 +57,7 @@ def final_result(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         result,
         problem=replace(chosen, phasing=phasing),
         status=status,
-        objective=ObjectiveValue(
-            objective_name(problem), value, problem.objective[0].quantity.unit, objective_value(problem, initial)
-        ),
+        objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
         certificate=certificate,
         decisions=(*phase_decisions(problem, phasing, candidate, shafts), *result.decisions),
         initial=initial,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -64,16 +65,23 @@ class LimitValue:
 
 @dataclass(frozen=True)
 class ObjectiveValue:
-    """The objective of the design and of the one given."""
+    """The objective of the design and of the one given, which is infinite where that stands on a resonance."""
 
     name: str
     value: float
     unit: str
     initial: float
 
+    @classmethod
+    def of(cls, problem: Problem, value: float, initial: float) -> ObjectiveValue:
+        """What a problem minimises, of a design and of the one given [SI]."""
+        return cls(problem.objective_name, value, problem.objective_unit or "", initial)
+
     @property
     def reduction(self) -> float:
-        """Share by which the initial value fell."""
+        """Share by which the initial value fell; not a number where that is infinite."""
+        if math.isinf(self.initial):
+            return math.nan
         return 1.0 - self.value / self.initial if self.initial else 0.0
 
 
@@ -121,7 +129,8 @@ class Result:
         lines = [f"<Result {self.problem.name}: {self.status}"]
         if self.objective is not None:
             o = self.objective
-            lines.append(f"  {o.name} {o.value:.6g} {o.unit} (as given {o.initial:.6g} {o.unit})")
+            given = f"{o.initial:.6g} {o.unit}" if math.isfinite(o.initial) else "on a resonance"
+            lines.append(f"  {o.name} {o.value:.6g} {o.unit} (as given {given})")
         if self.certificate is not None:
             lines.append(f"  proof {self.certificate.kind}, gap {self.certificate.gap:.1e}")
         lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in self.decisions]

@@ -139,15 +139,12 @@ def search_designs(
     bounds = np.zeros((len(stars), len(sets)))
     open_ = np.ones(bounds.shape, dtype=bool)
     solved: list[Solved] = []
-    infeasible = 0
-    complete = True
+    infeasible, complete = 0, True
     while open_.any():
         values = distinct_values(model.space, solved)
         target = values[count - 1] if len(values) >= count else float("inf")
-        waiting = np.where(open_, bounds, np.inf)
-        at = int(np.argmin(waiting))
-        row, column = divmod(at, len(sets))
-        if waiting[row, column] >= target - tolerance * max(target, floor):
+        row, column = divmod(int(np.argmin(np.where(open_, bounds, np.inf))), len(sets))
+        if bounds[row, column] >= target - tolerance * max(target, floor):
             break
         if time.perf_counter() - started > time_limit:
             complete = False
@@ -161,16 +158,20 @@ def search_designs(
             continue
         found, cut = answer
         solved.append(found)
-        for start in range(0, len(stars), _CHUNK):
-            part = slice(start, start + _CHUNK)
-            np.maximum(bounds[part], cut.bounds(stars[part], sets, owners), out=bounds[part])
+        _raise(bounds, cut, stars, sets, owners)
         bounds[row, column] = max(found.bound, bounds[row, column])
-    beyond = float(np.where(open_, bounds, np.inf).min()) if bounds.size else np.inf
+    beyond = float(np.where(open_, bounds, np.inf).min(initial=np.inf))
     solved.sort(key=lambda s: (s.value, s.star, s.built))
     least = min([beyond, *(s.bound for s in solved)])
-    return CutsFound(
-        tuple(solved), least, beyond, complete, bounds.size, infeasible, time.perf_counter() - started
-    )  # fmt: skip
+    seconds = time.perf_counter() - started
+    return CutsFound(tuple(solved), least, beyond, complete, bounds.size, infeasible, seconds)
+
+
+def _raise(bounds: Array, cut: Cut, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> None:
+    """What a cut proves of every star and set of shafts, in place and in blocks."""
+    for start in range(0, len(stars), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        np.maximum(bounds[part], cut.bounds(stars[part], sets, owners), out=bounds[part])
 
 
 def distinct_values(space: StarSpace, solved: Sequence[Solved]) -> list[float]:

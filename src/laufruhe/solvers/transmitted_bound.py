@@ -32,6 +32,7 @@ from laufruhe.problem.mount_design import (
     MountMeasure,
     mounting_in,
 )
+from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.quantity import Quantity, Subject
 from laufruhe.solvers.affine import AffineModel
 from laufruhe.solvers.domain import Domain
@@ -112,7 +113,7 @@ def transmitted_bound(problem: Problem) -> float:
     bounded = [(term.weight, term.quantity) for term in problem.objective if _is_bounded(term.quantity)]
     if not bounded or not problem.points:
         return 0.0
-    softest, model = softest_of(problem), AffineModel(problem)
+    softest, model = softest_of(problem), AffineModel(off_resonance(problem))
     return sum(weight * _of_quantity(problem, quantity, softest, model) for weight, quantity in bounded)
 
 

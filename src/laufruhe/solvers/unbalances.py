@@ -28,6 +28,7 @@ MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
 MOST_ROWS = 60_000
 NEGLIGIBLE = 1e-6
+KEPT = 10.0 * FEASIBLE
 ACTIVE = 1e-5
 SAME_LOAD = 1e-10
 
@@ -40,6 +41,8 @@ class _Optimum:
     ----------
     problem
         Rows on the grid that the bound holds on.
+    judge
+        Rows at the angles that its limits are judged at.
     excess
         Largest relative excess over a limit, sought between the angles too.
     """
@@ -47,6 +50,7 @@ class _Optimum:
     x: Array
     bound: Bound
     problem: AffineProblem
+    judge: AffineProblem
     gap: float
     excess: float
     samples: int
@@ -75,11 +79,15 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     # most designs are given with what is open at zero, and that one is known
     initial = evaluate(problem) if any(problem.start) else model.bare
     modelled = time.perf_counter()
-    optimum = _refine(problem, model, objective_value(problem, initial), cones or _stated)
+    optimum, samples = _refine(problem, model, objective_value(problem, initial), cones or _stated)
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
-        return _infeasible(problem, model, initial, timing)
+        conflict = _conflict(_tightened(model.at(samples), 0.0), [limit.name for limit in problem.limits])
+        return _infeasible(problem, conflict, initial, timing)
+    hopeless = _hopeless(problem, optimum)
+    if hopeless:
+        return _infeasible(problem, hopeless, initial, timing)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     final = evaluate(problem, problem.design(values), cycle_samples)
@@ -88,20 +96,27 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     return replace(result, timing={**timing, "evaluate": time.perf_counter() - solved})
 
 
-def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSolver) -> _Optimum | None:
-    """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6)."""
+def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSolver) -> tuple[_Optimum | None, int]:
+    """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6).
+
+    Returns
+    -------
+    The optimum, None where the limits cannot be met, and the angles that told.
+    """
     samples, best = model.full_samples, None
     for _ in range(MOST_DOUBLINGS + 1):
         found = _allowed(problem, model, samples, initial, cones)
         if found is None:
             # fewer angles ask for less: what they cannot meet, all cannot
-            return best
+            return best if best is not None and best.excess <= KEPT else None, samples
         best = found
+        if _hopeless(problem, best):
+            break
         rows = len(best.problem.terms[0][1].weights)
         if (best.gap <= problem.tolerance and best.excess <= FEASIBLE) or rows > MOST_ROWS:
             break
         samples *= 2
-    return best
+    return best, samples
 
 
 def _allowed(problem: Problem, model: AffineModel, samples: int, initial: float, cones: ConeSolver) -> _Optimum | None:
@@ -128,11 +143,12 @@ def _attempt(
     if solution.x is None:
         return None
     x = _settled(problem, fine, solution.x)
-    bound = best_bound(fine, coarse, x, solution.multipliers)
-    judge = model.at(PEAK_REFINEMENT * samples) if _has_peaks(problem) else fine
+    bound = best_bound(model.at(fine.samples, averaged=True), coarse, x, solution.multipliers)
+    # peaks where the result will be measured
+    judge = model.at(PEAK_REFINEMENT * fine.samples) if _has_peaks(problem) else fine
     value = judge.objective(x)
     gap = (value - bound.value) / gap_unit(value, initial)
-    return _Optimum(x, bound, fine, max(gap, 0.0), judge.excess(x), samples)
+    return _Optimum(x, bound, fine, judge, max(gap, 0.0), judge.excess(x), samples)
 
 
 def _stated(affine: AffineProblem) -> ConicSolution:
@@ -147,8 +163,24 @@ def _has_peaks(problem: Problem) -> bool:
 
 
 def _tightened(affine: AffineProblem, margin: float) -> AffineProblem:
-    limits = tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits)
-    return replace(affine, limits=limits) if margin else affine
+    """Limits a little lower; those that nothing open acts on out of the solver's way, for they hold or nothing does."""
+    limits = tuple(
+        (maximum * (1.0 - margin) if norm.slope.any() else 2.0 * max(maximum, _alone(norm)), norm)
+        for maximum, norm in affine.limits
+    )
+    return replace(affine, limits=limits)
+
+
+def _alone(norm: AffineNorm) -> float:
+    return norm.value(np.zeros(norm.slope.shape[-1]))
+
+
+def _hopeless(problem: Problem, optimum: _Optimum) -> tuple[str, ...]:
+    """A limit that is broken and that nothing open acts on; none where there is no such."""
+    for limit, (maximum, norm) in zip(problem.limits, optimum.judge.limits, strict=True):
+        if not norm.slope.any() and _alone(norm) > maximum * (1.0 + KEPT):
+            return (limit.name,)
+    return ()
 
 
 def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
@@ -225,7 +257,7 @@ def _triangle(slope: Array) -> Array:
 def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Evaluation) -> Result:
     value, given = objective_value(problem, final), objective_value(problem, initial)
     bound = optimum.bound
-    residual = kkt_residual(optimum.problem, optimum.x, bound)
+    residual = kkt_residual(optimum.problem, optimum.x, bound, gap_unit(value, given))
     certificate = Certificate(
         kind=Proof.GLOBAL if optimum.gap <= problem.tolerance else Proof.WITHIN_GAP,
         lower_bound=bound.value,
@@ -238,7 +270,7 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         _limit_value(limit.name, limit.quantity.unit, final.value(limit.quantity), limit.maximum, price, value)
         for limit, price in zip(problem.limits, prices, strict=True)
     )
-    feasible = all(limit.value <= limit.limit * (1.0 + 10.0 * FEASIBLE) + 1e-12 for limit in limits)
+    feasible = all(limit.value <= limit.limit * (1.0 + KEPT) + 1e-12 for limit in limits)
     return Result(
         problem=problem,
         status=Status.OPTIMAL
@@ -246,7 +278,7 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         else Status.FEASIBLE
         if feasible
         else Status.FAILED,
-        objective=ObjectiveValue(objective_name(problem), value, problem.objective[0].quantity.unit, given),
+        objective=ObjectiveValue.of(problem, value, given),
         certificate=certificate,
         decisions=tuple(
             entry for domain in optimum.problem.domains for entry in decision_values(domain, optimum.x, bound.gradient)
@@ -257,13 +289,6 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
         message="" if feasible else "the design found breaks a limit between the angles it was solved at",
         error_estimate=error_of(problem, final),
     )
-
-
-def objective_name(problem: Problem) -> str:
-    """The objective in words."""
-    if len(problem.objective) == 1 and problem.objective[0].weight == 1.0:
-        return problem.objective[0].quantity.name
-    return " + ".join(f"{term.weight:g} x {term.quantity.name}" for term in problem.objective)
 
 
 def _limit_value(name: str, unit: str, value: float, maximum: float, price: float, objective: float) -> LimitValue:
@@ -295,12 +320,11 @@ def decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[Decision
     return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
 
 
-def _infeasible(problem: Problem, model: AffineModel, initial: Evaluation, timing: dict[str, float]) -> Result:
+def _infeasible(problem: Problem, conflict: tuple[str, ...], initial: Evaluation, timing: dict[str, float]) -> Result:
     limits = tuple(
         LimitValue(limit.name, initial.value(limit.quantity), limit.maximum, limit.quantity.unit, False, 0.0)
         for limit in problem.limits
     )
-    conflict = _conflict(model.at(model.full_samples), [limit.name for limit in problem.limits])
     return infeasible(problem, initial, limits, conflict, timing)
 
 

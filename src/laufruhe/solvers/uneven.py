@@ -27,7 +27,6 @@ from laufruhe.solvers.ranking import PhasingResult, RankedStar, TradePoint, rank
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_objective import amplitude_objective
-from laufruhe.solvers.unbalances import objective_name
 from laufruhe.solvers.uneven_bound import steady_bound, uneven_bound
 from laufruhe.solvers.uneven_model import UnevenModel
 from laufruhe.solvers.uneven_program import UnevenProgram, rides_of
@@ -271,7 +270,7 @@ def _result(
         result,
         problem=replace(result.problem, phasing=phasing),
         status=Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=ObjectiveValue(objective_name(problem), best.value, problem.objective[0].quantity.unit, initial),
+        objective=ObjectiveValue.of(problem, best.value, initial),
         certificate=certificate,
         decisions=(*phase_decisions(problem, phasing, best.candidate, shafts), *result.decisions),
         initial=replace(given, samples=result.final.samples),

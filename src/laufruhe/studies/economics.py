@@ -21,7 +21,6 @@ from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.model import Limit, Problem
 from laufruhe.problem.quantity import MASSES, Quantity, Subject
 from laufruhe.solvers import solve
-from laufruhe.solvers.unbalances import objective_name
 
 MASS_ON_SHAFTS = Quantity(Subject.BALANCER_MASS, Norm.SUM)
 LIMIT_NAME = "mass on shafts"
@@ -181,8 +180,8 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> Front:
         optimum=optimum,
         shafts=len(shafts_of(problem)),
         cylinders=len(problem.engine.slider_cranks),
-        objective=objective_name(problem),
-        unit=problem.objective[0].quantity.unit,
+        objective=problem.objective_name,
+        unit=problem.objective_unit or "",
     )
 
 

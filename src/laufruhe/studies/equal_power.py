@@ -21,9 +21,12 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
     Raises
     ------
     ModelError
-        If its cylinders differ in bore or stroke: one scale would not fit them.
+        If its cylinders differ in bore or stroke: one scale would not fit them. If it stands on
+        elastic mounts: the rules have none for a block and its springs.
     """
     cylinders = problem.engine.slider_cranks
+    if problem.engine.block is not None:
+        raise ModelError("equal power says nothing of a block and the springs under it; leave equal_power_to out")
     if len({(part.crank_radius, part.bore) for part in cylinders}) > 1:
         raise ModelError("cylinders differ in bore or stroke, so no one scale gives equal power; make them equal")
     scale = equal_power_scale(len(cylinders), reference_cylinders)

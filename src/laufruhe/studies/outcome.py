@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from laufruhe.errors import SolverError
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.problem.model import Problem
@@ -68,9 +71,9 @@ def solved(problem: Problem) -> Outcome:
     try:
         result = solve(problem, many=True)
     except SolverError:
-        return _outcome(state(problem), FAILED, "none")
+        return _outcome(state(problem, to_start_from=True), FAILED, "none")
     if result.objective is None:
-        return _outcome(state(problem), str(result.status), "none")
+        return _outcome(state(problem, to_start_from=True), str(result.status), "none")
     proof = str(result.certificate.kind) if result.certificate else AS_GIVEN if _is_closed(problem) else "none"
     return _outcome(result, str(result.status), proof)
 
@@ -85,12 +88,12 @@ def _outcome(shown: Result, status: str, proof: str) -> Outcome:
         unit=objective.unit if objective else "",
         status=status,
         proof=proof,
-        objective_given=objective.initial if objective else nothing,
+        objective_given=_finite(objective.initial) if objective else nothing,
         objective=objective.value if objective and designed else nothing,
         lower_bound=shown.certificate.lower_bound if shown.certificate else nothing,
         mounts=shown.initial.mount_names if shown.initial.engine.mounts else [],
-        mean_given=[mean for mean, _ in before],
-        maximum_given=[most for _, most in before],
+        mean_given=[_finite(mean) for mean, _ in before],
+        maximum_given=[_finite(most) for _, most in before],
         mean=[mean for mean, _ in after],
         maximum=[most for _, most in after],
         decisions={decision.name: decision.value for decision in shown.decisions},
@@ -98,8 +101,13 @@ def _outcome(shown: Result, status: str, proof: str) -> Outcome:
     )
 
 
+def _finite(value: float) -> float:
+    """NaN for what has no size: loads of a design as given that stands on a resonance."""
+    return value if math.isfinite(value) else math.nan
+
+
 def _is_closed(problem: Problem) -> bool:
-    return not problem.decisions and problem.phasing is None and not problem.mount_design.asked
+    return not problem.decisions and problem.phasing is None and not problem.mount_design.decisions
 
 
 def _over_points(problem: Problem, evaluation: Evaluation) -> list[tuple[float, float]]:
@@ -150,27 +158,21 @@ def dataset(
     extra
         Coordinates along the points.
     """
-    import numpy as np
     import xarray as xr
 
     outcomes = [Outcome(**record) for record in records]
     mounts = list(dict.fromkeys(name for o in outcomes for name in o.mounts))
     decided = {name: unit for o in outcomes for name, unit in o.units.items()}
-    metrics = {o.metric: o.unit for o in outcomes if o.metric}
+    metric, unit = _metric(outcomes)
 
     def per_mount(name: str) -> tuple[tuple[str, str], Any, dict[str, str]]:
         rows = [dict(zip(o.mounts, getattr(o, name), strict=True)) for o in outcomes]
-        values = np.array([[row.get(mount, np.nan) for mount in mounts] for row in rows], dtype=float)
         words = f"{name.replace('_', ' ')} of the mount's force"
-        return ("point", "mount"), values.reshape(len(rows), len(mounts)), {"units": "N", "long_name": words}
+        return ("point", "mount"), _table(rows, mounts), {"units": "N", "long_name": words}
 
     def each(name: str, words: str) -> tuple[str, Any, dict[str, str]]:
         return "point", np.array([getattr(o, name) for o in outcomes]), {"units": unit, "long_name": words}
 
-    # metrics of one part are of one dimension, or `kinds.swept.checked` has refused them
-    unit = next(iter(metrics.values()), "")
-    metric = next(iter(metrics), "") if len(metrics) == 1 else "objective"
-    values = np.array([[o.decisions.get(name, np.nan) for name in decided] for o in outcomes], dtype=float)
     return xr.Dataset(
         {
             "objective_given": each("objective_given", f"{metric} of the design as given"),
@@ -178,7 +180,7 @@ def dataset(
             "lower_bound": each("lower_bound", f"{metric} that no design falls below"),
             **{name: per_mount(name) for name in ("mean_given", "maximum_given", "mean", "maximum")},
             "decided": (
-                ("point", "decision"), values.reshape(len(outcomes), len(decided)),
+                ("point", "decision"), _table([o.decisions for o in outcomes], list(decided)),
                 {"long_name": "value decided, in decision_unit"},
             ),
         },
@@ -193,3 +195,15 @@ def dataset(
         },
         attrs={"title": part.title, "kind": part.settings()["kind"], "source": part.source, "metric": metric},
     )  # fmt: skip
+
+
+def _metric(outcomes: Sequence[Outcome]) -> tuple[str, str]:
+    """What the outcomes measure, and its unit: one, or `kinds.swept.checked` has refused them."""
+    metrics = {o.metric: o.unit for o in outcomes if o.metric}
+    return next(iter(metrics), "") if len(metrics) == 1 else "objective", next(iter(metrics.values()), "")
+
+
+def _table(rows: Sequence[Mapping[str, float]], columns: Sequence[str]) -> NDArray[np.float64]:
+    """A row each, NaN where it has no such column, shape (rows, columns)."""
+    values = [[row.get(column, math.nan) for column in columns] for row in rows]
+    return np.array(values, dtype=float).reshape(len(rows), len(columns))

@@ -41,7 +41,7 @@ def speed_sweep(problem: Problem, speeds: Sequence[float], samples: int = 360) -
         solution = solve_direct(coarse)
         if solution.x is None:
             raise SolverError(f"no design at {speed:g} rad/s")
-        bound = best_bound(fine, coarse, solution.x, solution.multipliers)
+        bound = best_bound(model.at(fine.samples, averaged=True), coarse, solution.x, solution.multipliers)
         values = tuple(complex(domain.complex_value(solution.x)) for domain in model.domains)
         found.append(SpeedPoint(speed, fine.objective(solution.x), bound.value, values))
     return tuple(found)

@@ -15,19 +15,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
-from laufruhe.plots.style import FAINT, page
-from laufruhe.plots.tractor.sheet import (
-    BLUE,
-    FORCE,
-    GREEN,
-    GREY,
-    ORANGE,
-    SERIES,
-    VERMILION,
-    dot,
-    entitled,
-    line,
-)
+from laufruhe.plots.style import BLUE, FAINT, GREEN, GREY, ORANGE, VERMILION, page
+from laufruhe.plots.tractor.sheet import FORCE, SERIES, dot, entitled, line
 from laufruhe.studies.tractor.engines import KILOPOND
 
 

@@ -14,12 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from laufruhe.plots.style import FAINT, heading
+from laufruhe.plots.style import BLUE, FAINT, GREEN, GREY, ORANGE, SKY, VERMILION, heading
 from laufruhe.report.wording import number
 from laufruhe.studies.tractor.engines import KILOPOND
 
-# Okabe and Ito: told apart by every eye, and by their lightness in print
-GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
 SERIES = (GREY, SKY, ORANGE, BLUE, VERMILION, GREEN)
 FORCE = "force on the mount [kp]"
 SOURCE = "After Hasselgruber 1964, {}. Computed with Laufruhe, exact kinematics."
@@ -42,9 +40,9 @@ def dot(colour: str, label: str) -> Line2D:
     return Line2D([], [], color=colour, label=label, linestyle="none", marker="o", markersize=5)
 
 
-def bar_legend(names: Sequence[str], colours: Sequence[str]) -> list[Artist]:
+def bar_legend(names: Sequence[str], colours: Sequence[str] = SERIES) -> list[Artist]:
     """Names of the series, and what filled and hollow means."""
-    fills: list[Artist] = [Patch(facecolor=c, label=n) for n, c in zip(names, colours, strict=True)]
+    fills: list[Artist] = [Patch(facecolor=c, label=n) for n, c in zip(names, colours[: len(names)], strict=True)]
     return [
         *fills,
         Patch(facecolor=FAINT, label="filled: mean"),
@@ -52,7 +50,7 @@ def bar_legend(names: Sequence[str], colours: Sequence[str]) -> list[Artist]:
     ]
 
 
-def pairs(
+def _pairs(
     axes: Axes,
     places: NDArray[np.float64],
     mean: NDArray[np.float64],
@@ -70,7 +68,14 @@ def pairs(
             axes.text(x, low - 0.012 * top, number(float(low), 3), ha="center", va="top", size=6.5, color="white")
 
 
-def group(
+def mount_bars(axes: Axes, data: xr.Dataset, colours: Sequence[str] = SERIES) -> None:
+    """Bars of every mount and of all, a series for each design or engine of a dataset."""
+    mean, most, names = _mounts_and_all(data)
+    _group(axes, mean, most, names, colours[: len(mean)])
+    axes.set_ylabel(FORCE)
+
+
+def _group(
     axes: Axes, mean: NDArray[np.float64], most: NDArray[np.float64], names: Sequence[str], colours: Sequence[str]
 ) -> None:
     """Groups of bars, shape (series, groups), names below the groups."""
@@ -79,14 +84,14 @@ def group(
     top = float(most.max())
     places = np.arange(mean.shape[1], dtype=float)
     for k, colour in enumerate(colours):
-        pairs(axes, places + (k - 0.5 * (count - 1)) * width, mean[k], most[k], colour, 0.9 * width, top)
+        _pairs(axes, places + (k - 0.5 * (count - 1)) * width, mean[k], most[k], colour, 0.9 * width, top)
     axes.set_xticks(places, list(names))
     axes.tick_params(axis="x", length=0)
     axes.grid(axis="x", visible=False)
     axes.set(xlim=(-0.6, places[-1] + 0.6), ylim=(0.0, 1.13 * top))
 
 
-def mounts_and_all(data: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
+def _mounts_and_all(data: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
     """Mean and largest of each mount and of all, shapes (design, mounts + 1) [kp]."""
     mean = np.column_stack([data["mean"].values, data["mean_of_mounts"].values]) / KILOPOND
     most = np.column_stack([data["maximum"].values, data["maximum"].max("mount").values]) / KILOPOND

@@ -12,7 +12,13 @@ from laufruhe.problem.quantity import MASSES, Quantity, counted_rotors
 from laufruhe.problem.study_models import BalancerSizingTable
 from laufruhe.studies.economics import shafts_of, with_shafts
 from laufruhe.studies.kinds.kind import Kind
-from laufruhe.studies.kinds.swept import checked, combinations, refused
+from laufruhe.studies.kinds.swept import (
+    check_moved_by_loads,
+    checked,
+    combinations,
+    refuse_open_phasing,
+    refused,
+)
 from laufruhe.studies.outcome import axes_of, coordinates, dataset, solved
 from laufruhe.studies.scenes import Point, Scenes
 
@@ -38,13 +44,13 @@ def shaft_groups(problem: Problem) -> list[tuple[str, ...]]:
 def _points(part: BalancerSizingTable, scenes: Scenes) -> list[Point]:
     """For every scene all sets of its groups of shafts, the plain engine first."""
     points = []
-    for case, problem in zip(part.cases, checked(part, scenes), strict=True):
+    problems = checked(part, scenes)
+    check_moved_by_loads(problems, part, scenes, "shaft")
+    for case, problem in zip(part.cases, problems, strict=True):
         groups = shaft_groups(problem)
         if not groups:
             raise refused(scenes, case, "balancer_shafts", "is missing, so there is nothing to size", "add a shaft")
-        if problem.phasing is not None:
-            rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
-            raise refused(scenes, case, "phasing", rule, remedy)
+        refuse_open_phasing(problem, case, scenes)
         if len(groups) > MOST_GROUPS:
             rule = f"makes {len(groups)} independent shafts, {2 ** len(groups)} sets of them"
             raise refused(scenes, case, "balancer_shafts", rule, f"study {MOST_GROUPS} or fewer")
@@ -75,7 +81,7 @@ def _counting(problem: Problem) -> Problem:
     limits = [(limit, counted(limit.quantity)) for limit in problem.limits]
     limits_left = tuple(replace(limit, quantity=quantity) for limit, quantity in limits if quantity is not None)
     terms_left = tuple(replace(term, quantity=quantity) for term, quantity in terms if quantity is not None)
-    if not terms_left:
+    if problem.objective and not terms_left and not problem.mount_design.terms:
         # the mass of no shafts is zero, whatever else is open
         return replace(problem, limits=limits_left, decisions=())
     return replace(problem, objective=terms_left, limits=limits_left)

@@ -10,7 +10,7 @@ from laufruhe.problem.study_models import CounterweightFractionTable
 from laufruhe.problem.study_paths import at
 from laufruhe.problem.study_sweeps import Axis
 from laufruhe.studies.kinds.kind import Kind
-from laufruhe.studies.kinds.swept import answer, checked, combinations, refused
+from laufruhe.studies.kinds.swept import answer, check_moved_by_loads, checked, combinations, refused
 from laufruhe.studies.outcome import axes_of, coordinates, dataset
 from laufruhe.studies.scenes import Point, Scenes
 
@@ -23,6 +23,7 @@ _FRACTION = "balance_fraction"
 def _points(part: CounterweightFractionTable, scenes: Scenes) -> list[Point]:
     """Every fraction swept, and last for each speed the fraction left open."""
     problems = checked(part, scenes)
+    check_moved_by_loads(problems, part, scenes, "counterweight")
     fraction = _fraction(part)
     if fraction is None:
         for case, problem in zip(part.cases, problems, strict=True):

@@ -25,7 +25,7 @@ from laufruhe.studies.economics import (
 )
 from laufruhe.studies.equal_power import check_comparable
 from laufruhe.studies.kinds.kind import Kind
-from laufruhe.studies.kinds.swept import refused
+from laufruhe.studies.kinds.swept import refuse_open_phasing, refused
 from laufruhe.studies.scenes import Point, Scenes
 
 if TYPE_CHECKING:
@@ -73,12 +73,12 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
     asked: dict[str, Point] = {}
     for point in points:
         problem = scenes.problem(point)
-        if problem.phasing is not None:
-            rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
-            raise refused(scenes, point.case, "phasing", rule, remedy)
+        refuse_open_phasing(problem, point.case, scenes)
         objective = tuple(problem.objective)
         if not objective:
-            raise refused(scenes, point.case, "objective", "is missing, so shafts have nothing to lower", "add one")
+            rule = f"is {problem.objective_name}, which is no load" if problem.objective_name else "is missing"
+            remedy = "minimise a load, such as mean mount force"
+            raise refused(scenes, point.case, "objective", f"{rule}, so shafts have nothing to lower", remedy)
         asked.setdefault(str(objective), point)
     if len(asked) > 1:
         first, second = list(asked.values())[:2]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import Any
 
 from laufruhe.errors import Complaint, InputError
 from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_design import MountMeasure
 from laufruhe.problem.study_parts import CaseTable, SweptPartTable
 from laufruhe.studies.outcome import axes_of, solved
 from laufruhe.studies.scenes import Point, Scenes
@@ -42,17 +44,48 @@ def checked(part: SweptPartTable, scenes: Scenes) -> list[Problem]:
         for axis in axes:
             scenes.problem(Point(case, {**first, axis.quantity: axis.values[-1]}, part.metric))
         _check_asked(found[-1], case, scenes)
-    units = {problem.objective[0].quantity.unit: case for problem, case in zip(found, part.cases, strict=True)}
+    units = {problem.objective_unit: case for problem, case in zip(found, part.cases, strict=True)}
     if len(units) > 1:
         (one, first_case), (two, second_case) = list(units.items())[:2]
-        rule = f"minimises in {one} in '{first_case.name}' and in {two} in '{second_case.name}'"
+        said = [unit or "several units together" for unit in (one, two)]
+        rule = f"minimises in {said[0]} in '{first_case.name}' and in {said[1]} in '{second_case.name}'"
         raise refused(scenes, part.cases[0], "objective", rule, "give the part one metric")
     return found
 
 
 def _check_asked(problem: Problem, case: CaseTable, scenes: Scenes) -> None:
-    if not problem.objective:
+    if problem.objective_unit is None:
         raise refused(scenes, case, "objective", "is missing, so a study has nothing to compare", "give a metric")
+
+
+def refuse_open_phasing(problem: Problem, case: CaseTable, scenes: Scenes) -> None:
+    """Of sets of shafts: an open star has a choice of its own.
+
+    Raises
+    ------
+    InputError
+        If something of the phasing is open.
+    """
+    if problem.phasing is not None:
+        rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
+        raise refused(scenes, case, "phasing", rule, remedy)
+
+
+def check_moved_by_loads(problems: Sequence[Problem], part: SweptPartTable, scenes: Scenes, what: str) -> None:
+    """Whether balancing can change what is minimised: the sag of a block, or the stiffness under it, knows no loads.
+
+    Raises
+    ------
+    InputError
+        If loads neither make up an objective nor are limited beside it.
+    """
+    for case, problem in zip(part.cases, problems, strict=True):
+        design = problem.mount_design
+        asked = [quantity for quantity, _ in design.terms] + [limit.quantity for limit in design.limits]
+        transmitted = any(quantity.measure is MountMeasure.TRANSMISSIBILITY for quantity in asked)
+        if not (problem.objective or problem.limits or transmitted):
+            rule = f"is {problem.objective_name}, which no {what} changes"
+            raise refused(scenes, case, "objective", rule, "minimise a mount force or transmissibility")
 
 
 def refused(scenes: Scenes, case: CaseTable, where: str, rule: str, remedy: str) -> InputError:

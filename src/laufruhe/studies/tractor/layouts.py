@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import xarray as xr
 
@@ -58,6 +60,40 @@ def equal_cylinder_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
     short, long = ({z: float(mean.sel(mounting=m, cylinders=z)) for z in CYLINDERS} for m in MOUNTINGS)
     peaks = {z: float(most.sel(mounting=LONG, cylinders=z)) for z in CYLINDERS}
     fronts = [float(front.sel(mounting=m, cylinders=4)) for m in MOUNTINGS]
+    return (
+        *_six_verdicts(short, long, peaks),
+        *_four_verdicts(short, long, fronts),
+        Verdict(
+            "Three cylinders come off well, long mounting (Fig. 12)",
+            "relatively good",
+            long[3],
+            "kp, mean",
+            long[3] < min(long[2], long[4]),
+            "less than two and than four cylinders",
+        ),
+        Verdict(
+            "Three cylinders: the long mounting lowers the forces (Fig. 12)",
+            "lower",
+            100.0 * (long[3] / short[3] - 1.0),
+            "% change",
+            long[3] < short[3],
+            "couples act on a longer arm",
+        ),
+        Verdict(
+            "Two cylinders, long mounting: second order loads the front mounts (Fig. 12)",
+            "front mounts chiefly",
+            _front_share(usual, 2),
+            "front over rear, mean",
+            _front_share(usual, 2) > 1.5,
+            "half as much again counts as chiefly",
+        ),
+    )
+
+
+def _six_verdicts(
+    short: Mapping[int, float], long: Mapping[int, float], peaks: Mapping[int, float]
+) -> tuple[Verdict, ...]:
+    """Of six cylinders: mean forces on both mountings and the largest on the long one, by number of cylinders [kp]."""
     listed = "; ".join(f"{z}: {short[z]:.0f} and {long[z]:.0f}" for z in CYLINDERS)
     behind = min(long[z] for z in (2, 3, 4)) / long[6] - 1.0
     return (
@@ -94,6 +130,14 @@ def equal_cylinder_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             abs(long[6] / short[6] - 1.0) < 1e-3,
             "a pure roll moment; 0.1 % is below what a bar shows",
         ),
+    )
+
+
+def _four_verdicts(
+    short: Mapping[int, float], long: Mapping[int, float], fronts: Sequence[float]
+) -> tuple[Verdict, ...]:
+    """Of four cylinders: mean forces by number of cylinders, and on the front mounts, short and long [kp]."""
+    return (
         Verdict(
             "Four cylinders come off badly (Fig. 12)",
             "relatively bad",
@@ -109,30 +153,6 @@ def equal_cylinder_verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
             "% on the front mounts",
             fronts[1] > fronts[0],
             f"from {fronts[0]:.0f} to {fronts[1]:.0f} kp; 77 % of the free force goes there instead of 50 %",
-        ),
-        Verdict(
-            "Three cylinders come off well, long mounting (Fig. 12)",
-            "relatively good",
-            long[3],
-            "kp, mean",
-            long[3] < min(long[2], long[4]),
-            "less than two and than four cylinders",
-        ),
-        Verdict(
-            "Three cylinders: the long mounting lowers the forces (Fig. 12)",
-            "lower",
-            100.0 * (long[3] / short[3] - 1.0),
-            "% change",
-            long[3] < short[3],
-            "couples act on a longer arm",
-        ),
-        Verdict(
-            "Two cylinders, long mounting: second order loads the front mounts (Fig. 12)",
-            "front mounts chiefly",
-            float(_front_share(usual, 2)),
-            "front over rear, mean",
-            float(_front_share(usual, 2)) > 1.5,
-            "half as much again counts as chiefly",
         ),
     )
 

@@ -1,0 +1,75 @@
+"""A design as given on a resonance that nothing damps, with mounts open: it has no finite loads, others have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.elastic_mounts import ResonanceError
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.problem.evaluation import Evaluation, PointLoads, evaluate
+from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_design import mounting_in
+from laufruhe.problem.mount_values import whole_objective
+
+# of the way between the bounds of what is open: places that no two resonances share
+_PLACES = (0.5, 0.38, 0.71, 0.17, 0.93)
+
+
+def evaluate_start(problem: Problem) -> Evaluation:
+    """The design that a search of mounts starts from; it alone may stand on a resonance that nothing damps.
+
+    Raises
+    ------
+    ModelError
+        As `evaluate`; where no mount is open on a resonance as well, for there is no way off it.
+    """
+    try:
+        return evaluate(problem)
+    except ResonanceError:
+        if not problem.mount_design.decisions:
+            raise
+    engine, mounting = problem.engine, mounting_in(problem.engine)
+    loads, words = [], ""
+    for point in problem.points:
+        wrench = shaking_loads(engine, point, problem.fidelity)
+        struck, why = mounting.resonant(wrench, point.speed)
+        words = words or why
+        answered = Spectrum(wrench.base, np.where(struck[:, None], 0.0, wrench.coefficients))
+        signals = [answer(answered, point.speed) for answer in (mounting.forces, mounting.travel)]
+        forces, travel = (
+            Spectrum(s.base, np.where(struck[:, None, None], np.inf, s.coefficients)) for s in signals
+        )  # fmt: skip
+        loads.append(PointLoads(point, wrench, forces, travel))
+    return Evaluation(engine, problem.fidelity, tuple(loads), problem.fidelity.samples, words)
+
+
+def off_resonance(problem: Problem) -> Problem:
+    """The problem with its mounts as given, or elsewhere within their bounds where these stand on a resonance.
+
+    Raises
+    ------
+    ResonanceError
+        If every place tried stands on one: what is open does not move it.
+    """
+    if not evaluate_start(problem).resonance:
+        return problem
+    decisions = problem.mount_design.decisions
+    for place in _PLACES:
+        values = [d.lower + place * (d.upper - d.lower) for d in decisions]
+        moved = replace(problem, engine=problem.mount_design.applied(problem.engine, values))
+        try:
+            evaluate(moved)
+        except ResonanceError as error:
+            last = error
+        else:
+            return moved
+    raise last
+
+
+def objective_size(problem: Problem) -> float:
+    """Size of what is minimised, for scales: that of the design as given if it has one; never zero."""
+    moved = off_resonance(problem)
+    return abs(whole_objective(moved, evaluate(moved))) or 1.0

@@ -1,0 +1,141 @@
+"""Studies of elastic mounts whose objective speaks of the mounts alone: sag, stiffness, transmissibility."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from laufruhe.cli import app
+from laufruhe.errors import InputError
+from laufruhe.problem.reader import load
+from laufruhe.problem.study_parts import SweepTable
+from laufruhe.problem.study_reader import load_study
+from laufruhe.problem.study_sweeps import axis_of
+from laufruhe.solvers import solve, state
+from laufruhe.studies import run
+from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed
+
+LIMIT = "constraints.1.max"
+SHAFT = """
+[[balancer_shafts]]
+name = "left"
+ratio = 2
+position = ["90 mm", "-60 mm"]
+[[balancer_shafts.unbalances]]
+x = "0 mm"
+unbalance = { between = ["0 kg m", "0.05 kg m"] }
+[search]
+starts = 2
+"""
+
+
+def study(folder: Path, kind: str, more: str = "", in_case: str = "", problem: str = SAG) -> Path:
+    (folder / "soft.toml").write_text(ENGINE + BLOCK + MOUNTS + problem)
+    path = folder / "s.toml"
+    path.write_text(
+        f'title = "t"\n[study]\n[[study.parts]]\nname = "p"\nkind = "{kind}"\ntitle = "t"\n{more}\n'
+        f'[[study.parts.cases]]\nname = "soft"\nproblem = "soft.toml"\n{in_case}\n'
+    )
+    return path
+
+
+def swept(quantity: str, text: str) -> str:
+    return f'[[study.parts.sweep]]\nquantity = "{quantity}"\n{text}\n'
+
+
+def computed(path: Path) -> xr.Dataset:
+    return run(load_study(path), path.parent, path.parent / "kept.jsonl")[0]["p"]
+
+
+SPAN = 'from = "10 Hz"\nto = "16 Hz"\npoints = 3'
+FREQUENCIES = swept(LIMIT, SPAN)
+
+
+def test_sag_over_the_highest_frequency_is_what_solve_finds(tmp_path: Path) -> None:
+    data = computed(study(tmp_path, "layout comparison", FREQUENCIES))
+    assert data[LIMIT].values.tolist() == [10.0, 13.0, 16.0]
+    assert data[LIMIT].attrs["units"] == "Hz"
+    assert data.attrs["metric"] == "static sag"
+    assert data["objective"].attrs["units"] == "m"
+    assert set(data["proof"].values) == {"global"}
+    given = state(load(tmp_path / "soft.toml")).objective
+    assert given is not None
+    for k, highest in enumerate((10, 13, 16)):
+        (tmp_path / "one.toml").write_text(ENGINE + BLOCK + MOUNTS + changed(SAG, ("40/3 Hz", f"{highest} Hz")))
+        alone = solve(load(tmp_path / "one.toml"))
+        assert alone.objective is not None
+        assert data["objective_given"].values[k] == pytest.approx(given.value, rel=1e-12)
+        assert data["objective"].values[k] == pytest.approx(alone.objective.value, rel=1e-7)
+        assert data["lower_bound"].values[k] <= data["objective"].values[k] * (1.0 + 1e-9)
+    assert (np.diff(data["objective"].values) < 0.0).all(), "more room for frequencies, less sag"
+
+
+def test_files_of_a_sag_study_are_in_the_units_of_a_reader(tmp_path: Path) -> None:
+    named = changed(SAG, ("[[constraints]]", '[[constraints]]\nname = "highest mode"'))
+    path = study(tmp_path, "layout comparison", swept("constraints.highest mode.max", SPAN), problem=named)
+    answer = CliRunner().invoke(app, ["study", str(path), "--out", str(tmp_path / "out")])
+    assert answer.exit_code == 0, answer.output
+    report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "| highest mode, at most [Hz] | static sag, as given [mm] |" in report
+    with xr.open_dataset(tmp_path / "out" / "p.nc") as data:
+        assert data["objective"].attrs["units"] == "m"
+        assert "constraints.highest_mode.max" in data.coords
+        assert f"{1e3 * float(data['objective'][0]):.5g} |" in report
+
+
+def test_a_metric_of_the_mounts_takes_the_place_of_the_objective(tmp_path: Path) -> None:
+    """Least stiffness over the mass of the block: the limit from above on frequencies leaves the lower bounds."""
+    sweep = 'metric = "total stiffness"\n' + swept("block.mass", 'values = ["400 kg", "440 kg"]')
+    data = computed(study(tmp_path, "layout comparison", sweep))
+    assert data["objective"].attrs["units"] == "N/m"
+    assert data["objective"].values == pytest.approx(4.0 * (120e3 + 120e3 + 20e3), rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["balancer sizing", "counterweight fraction"])
+def test_balancing_that_cannot_change_the_objective_is_refused(tmp_path: Path, kind: str) -> None:
+    path = study(tmp_path, kind, problem=SAG + SHAFT)
+    with pytest.raises(InputError, match=r"objective: is static sag, which no .* changes"):
+        computed(path)
+
+
+def test_economics_of_a_sag_says_that_it_is_no_load(tmp_path: Path) -> None:
+    six = changed(ENGINE, ("[0, 180, 180, 0]", "[0, 120, 240, 240, 120, 0]"))
+    (tmp_path / "six.toml").write_text(six + BLOCK + MOUNTS + SAG)
+    builds = 'mass_limits = ["0 kg", "1 kg"]\n[[study.parts.builds]]\nname = "b"\nshafts = ["left"]\n'
+    more = builds + '[[study.parts.more_cylinders]]\nname = "six"\nproblem = "six.toml"\n'
+    path = study(tmp_path, "economics", more, problem=SAG + SHAFT)
+    with pytest.raises(InputError, match="objective: is static sag, which is no load, so shafts have nothing to lower"):
+        computed(path)
+
+
+def test_equal_power_does_not_rebuild_a_block_on_springs(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="equal power says nothing of a block and the springs under it"):
+        computed(study(tmp_path, "layout comparison", in_case="equal_power_to = 2"))
+
+
+def test_shafts_are_sized_for_transmissibility(tmp_path: Path) -> None:
+    """Without its shaft the engine still minimises what its mounts transmit, and decides their stiffness."""
+    asked = '[objective]\nminimise = "transmissibility"\norders = [2]\n'
+    stiff = changed(MOUNTS, ('"4000 N/mm"', '"300 N/mm"'), ("400 N/mm", "200 N/mm"))
+    path = study(tmp_path, "balancer sizing", problem=SHAFT + asked)
+    (tmp_path / "soft.toml").write_text(ENGINE + BLOCK + stiff + SHAFT + asked)
+    data = computed(path)
+    assert data["shafts"].values.tolist() == ["none", "left"]
+    assert (data["objective"].values < 0.9 * data["objective_given"].values).all()
+    assert data["decision"].values.tolist()[:2] == ["front left.stiffness.z", "rear left.stiffness.z"]
+    assert np.isfinite(data["decided"].values[:, :2]).all()
+
+
+def test_limits_are_swept_in_their_own_dimension() -> None:
+    """A limit is text in the problem file; what it limits tells its unit, and plain numbers stay text."""
+    ratio = axis_of(SweepTable.model_validate({"quantity": LIMIT, "from": "0.2", "to": "0.4", "points": 3}))
+    assert ratio.values == ("0.2", "0.3", "0.4")
+    assert (ratio.unit, ratio.numbers) == ("1", (0.2, 0.3, 0.4))
+    listed = axis_of(SweepTable.model_validate({"quantity": "constraints.weight.max", "values": ["2 kg", "500 g"]}))
+    assert (listed.unit, listed.numbers, listed.name) == ("kg", (2.0, 0.5), "weight, at most")
+    place = axis_of(SweepTable.model_validate({"quantity": "mounts.places.a.position.1", "values": ["1 m", "2 m"]}))
+    assert place.name == "position 1"

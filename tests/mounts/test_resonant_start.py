@@ -1,0 +1,109 @@
+"""A design as given on a resonance that nothing damps: refused itself, and left behind where mounts are open."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from laufruhe.cli import app
+from laufruhe.physics.elastic_mounts import ResonanceError
+from laufruhe.problem.evaluation import evaluate, measured
+from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
+from laufruhe.problem.mount_values import whole_objective
+from laufruhe.solvers import solve
+from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
+
+# bounce at order 2 of 700 rpm: k = m (2 W)^2 / 4 on each of four mounts
+STRUCK = 420.0 * (2.0 * 700.0 * math.pi / 30.0) ** 2 / 4.0 / 1e3
+UNDAMPED = changed(MOUNTS, ("loss_factor = 0.1\n", ""))
+RESONANT = UNDAMPED.replace('start = "400 N/mm"', f'start = "{STRUCK!r} N/mm"')
+FORCE = '[objective]\nminimise = "rms mount force"\n[search]\nstarts = 4\n'
+
+
+def resonant(folder: Path, asked: str = FORCE, mounts: str = RESONANT) -> Problem:
+    return problem_of(folder, ENGINE, BLOCK, mounts, asked)
+
+
+def test_only_what_stands_on_the_resonance_is_infinite(tmp_path: Path) -> None:
+    problem = resonant(tmp_path)
+    with pytest.raises(ResonanceError):
+        evaluate(problem)
+    start = evaluate_start(problem)
+    assert start.resonance == "the bounce mode at 23.3333 Hz is driven at its own frequency and nothing damps it"
+    forces = start.loads[0].mount_forces
+    assert forces is not None
+    assert np.isinf(np.abs(forces.at(2))).all()
+    assert np.isfinite(np.abs(forces.at(4))).all()
+    assert np.abs(forces.at(4)).max() > 0.0
+    assert math.isinf(whole_objective(problem, start))
+    assert all(math.isinf(m.mean) for m in measured(start, 0))
+    fourth = resonant(tmp_path, FORCE.replace("[search]", "orders = [4]\n[search]"))
+    assert math.isfinite(whole_objective(fourth, evaluate_start(fourth)))
+
+
+def test_a_design_off_resonance_is_evaluated_as_ever(tmp_path: Path) -> None:
+    problem = resonant(tmp_path, mounts=UNDAMPED)
+    start, usual = evaluate_start(problem), evaluate(problem)
+    assert not start.resonance
+    assert whole_objective(problem, start) == whole_objective(problem, usual)
+    assert off_resonance(problem) is problem
+
+
+@pytest.mark.parametrize("starts", [1, 3])
+def test_the_search_ends_where_it_does_from_elsewhere(tmp_path: Path, starts: int) -> None:
+    asked = FORCE.replace("starts = 4", f"starts = {starts}")
+    found, usual = solve(resonant(tmp_path, asked)), solve(resonant(tmp_path, asked, UNDAMPED))
+    assert found.objective is not None
+    assert usual.objective is not None
+    assert found.certificate is not None
+    assert found.objective.value == pytest.approx(usual.objective.value, rel=1e-5)
+    assert math.isinf(found.objective.initial)
+    assert math.isnan(found.objective.reduction)
+    # an infinite start is no scale for a gap
+    assert found.certificate.gap > 0.1
+    assert "on a resonance" in repr(found)
+    assert found.message.endswith("nothing damps it")
+
+
+def test_a_convex_problem_keeps_its_proof(tmp_path: Path) -> None:
+    found = solve(resonant(tmp_path, SAG))
+    assert found.status == "optimal"
+    assert found.objective is not None
+    assert math.isfinite(found.objective.initial)
+
+
+def test_a_resonance_that_no_open_number_moves_is_refused(tmp_path: Path) -> None:
+    """Bounce at its own frequency, and only a lateral stiffness open."""
+    text = f"{STRUCK!r} N/mm"
+    stiff = f'stiffness = ["120 N/mm", {{ between = ["100 N/mm", "140 N/mm"] }}, "{text}"]'
+    given = f'stiffness = ["120 N/mm", "120 N/mm", {{ between = ["20 N/mm", "4000 N/mm"], start = "{text}" }}]'
+    mounts = RESONANT.replace(given, stiff)
+    assert mounts != RESONANT
+    with pytest.raises(ResonanceError, match="bounce"):
+        solve(resonant(tmp_path, mounts=mounts))
+
+
+def test_from_the_shell(tmp_path: Path) -> None:
+    """Evaluate refuses the design, check and solve take it; what has no size is null in the file, and said in words."""
+    resonant(tmp_path, FORCE.replace("starts = 4", "starts = 1"))
+    path, out = tmp_path / "problem.toml", tmp_path / "out"
+    refused = CliRunner().invoke(app, ["evaluate", str(path), "--out", str(out)])
+    assert (refused.exit_code, out.exists()) == (2, False)
+    assert CliRunner().invoke(app, ["check", str(path)]).exit_code == 0
+    solved = CliRunner().invoke(app, ["solve", str(path), "--out", str(out)])
+    assert solved.exit_code == 0, solved.output
+    assert "the design as given stands on a resonance" in solved.output
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    assert (result["objective"]["initial"], result["objective"]["reduction"]) == (None, None)
+    assert result["mounts"][0]["initial"] == {"mean": None, "max": None, "rms": None}
+    assert "bounce mode at 23.3333 Hz" in result["message"]
+    report = (out / "report.md").read_text(encoding="utf-8")
+    assert "The design as given has none: the bounce mode" in report
+    assert " inf" not in report
+    assert " nan" not in report

@@ -1,0 +1,198 @@
+"""What is under a box is under every design in it, and dividing ends at a proven optimum (E37-E41)."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from laufruhe.errors import InputError
+from laufruhe.problem.evaluation import evaluate, remounted
+from laufruhe.problem.model import Problem
+from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.problem.reader import load
+from laufruhe.solvers import solve
+from laufruhe.solvers.subdivision import _Search, divided_bound, divides
+from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+DAMPED = changed(
+    MOUNTS,
+    ('position  = ["300', 'damping = ["0 N s/m", "300 N s/m", "900 N s/m"]\nposition  = ["300'),
+    ('stiffness = ["120 N/mm", "120 N/mm"', 'stiffness = [{ between = ["60 N/mm", "300 N/mm"] }, "120 N/mm"'),
+)
+TWO_POINTS = ENGINE + '[[operating_points]]\nname = "fast"\nspeed = "1500 rpm"\nweight = 3\n'
+GAS = """
+[gas]
+model = "wiebe"
+imep  = "4 bar"
+start = -10
+duration = 60
+compression_ratio = 11
+[fidelity]
+samples = 720
+orders = 24
+"""
+ASKED = {
+    "rms": 'minimise = "rms mount force"',
+    "mean": 'minimise = "mean mount force"',
+    "maximum": 'minimise = "maximum mount force"',
+    "narrowed": """minimise = "rms mount force"
+orders = [2, 4]
+mounts = ["front left"]
+direction_weights = [1, 0.5, 2]""",
+    "at one point": 'minimise = "mean mount travel"\noperating_points = ["fast"]',
+    "largest travel": 'minimise = "maximum mount travel"',
+    "transmissibility": 'minimise = "transmissibility"',
+    "of orders": 'minimise = "transmissibility"\norders = [2, 4]',
+    "sum": """[[objective.terms]]
+quantity = "rms mount force"
+[[objective.terms]]
+quantity = "static sag"
+weight = 1e4""",
+}
+
+
+def asked_for(folder: Path, text: str, more: str = "", mounts: str = DAMPED) -> Problem:
+    head = text if text.startswith("[[") else f"[objective]\n{text}"
+    gas = changed(TWO_POINTS, ('stroke = "120 mm"', 'stroke = "120 mm"\nbore = "100 mm"')) + GAS
+    return problem_of(folder, gas, BLOCK, mounts, head + "\n" + more)
+
+
+def boxes(problem: Problem, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes within the bounds, from nearly all of them to a thousandth, stiffness by ratio."""
+    generator = np.random.default_rng(seed)
+    low, high = (np.array([getattr(d, side) for d in problem.mount_design.decisions]) for side in ("lower", "upper"))
+    centres = low * (high / low) ** generator.random((count, len(low)))
+    widths = (high - low) * 10.0 ** -generator.uniform(0.2, 4.0, (count, 1)) * generator.random((count, len(low)))
+    return np.clip(centres - widths, low, high), np.clip(centres + widths, low, high)
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> None:
+    problem = asked_for(tmp_path, ASKED[name])
+    assert divides(problem)
+    given = evaluate(problem)
+    search = _Search(problem, 1e-4 * whole_objective(problem, given))
+    low, high = boxes(problem, 40, 1)
+    bounds, _ = search.bounds(low, high)
+    generator = np.random.default_rng(2)
+    tight = []
+    for below, above, bound in zip(low, high, bounds, strict=True):
+        corners = generator.integers(0, 2, (3, len(below))).astype(float)
+        found = []
+        for share in (*generator.random((3, len(below))), *corners):
+            engine = problem.mount_design.applied(problem.engine, (below + share * (above - below)).tolist())
+            found.append(whole_objective(problem, remounted(given, engine)))
+        assert bound <= min(found) * (1.0 + 1e-9)
+        tight.append(bound / min(found))
+    assert max(tight) > 0.99
+    assert np.count_nonzero(np.array(tight) > 0.5) > 5
+
+
+def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
+    problem = asked_for(tmp_path, ASKED["mean"])
+    search = _Search(problem, 0.0)
+    centre = np.array([d.start for d in problem.mount_design.decisions])
+    value = whole_objective(problem, evaluate(problem))
+    lacking = []
+    for share in (1e-2, 1e-3):
+        low, high = centre * (1.0 - share), centre * (1.0 + share)
+        at = search.model.expanded(search.model.lines(), low[None], high[None])
+        under = search.model.under(problem.objective[0].quantity, search.model.lines(), at)
+        assert float(under.value[0]) == pytest.approx(value, rel=1e-10)
+        lacking.append(float(under.rest[0]) / value)
+    assert lacking[1] < 1.1e-2 * lacking[0]
+
+
+LIMITS = """
+[[constraints]]
+limit = "natural frequencies"
+min = "4 Hz"
+outside = ["9 Hz", "11 Hz"]
+[[constraints]]
+limit = "static sag"
+max = "6 mm"
+[[constraints]]
+limit = "total stiffness"
+max = "6000 N/mm"
+[[constraints]]
+limit = "maximum mount force"
+max = "1500 N"
+[[constraints]]
+limit = "transmissibility"
+max = "4"
+"""
+
+
+def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> None:
+    problem = asked_for(tmp_path, ASKED["rms"], LIMITS)
+    given = evaluate(problem)
+    low, high = boxes(problem, 120, 3)
+    bounds, _ = _Search(problem, 0.0).bounds(low, high)
+    generator = np.random.default_rng(4)
+    allowed_ones = 0
+    for below, above, bound in zip(low, high, bounds, strict=True):
+        engine = problem.mount_design.applied(problem.engine, generator.uniform(below, above).tolist())
+        design = remounted(given, engine)
+        broken = any(excess(limit, design) > 1e-5 for limit in problem.mount_design.limits)
+        broken |= any(design.value(limit.quantity) > limit.maximum for limit in problem.limits)
+        allowed_ones += not broken
+        assert np.isfinite(bound) or broken
+    assert 20 < np.count_nonzero(np.isinf(bounds)) < 130
+    assert allowed_ones > 5
+
+
+@pytest.mark.parametrize(
+    "text", [ASKED["rms"], 'minimise = "transmissibility"\norders = [2]', 'minimise = "mean mount travel"']
+)
+def test_few_open_stiffnesses_are_decided_with_proof(text: str, tmp_path: Path) -> None:
+    """A search over a grid of all designs, which knows nothing of boxes, finds nothing better either."""
+    limit = '[[constraints]]\nlimit = "static sag"\nmax = "4 mm"\n[search]\nstarts = 2\n'
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]", text, limit)
+    result = solve(problem)
+    assert result.certificate is not None
+    assert result.objective is not None
+    assert result.status == "optimal"
+    assert result.certificate.kind == "global"
+    assert result.certificate.gap <= problem.tolerance
+    assert result.certificate.method.endswith("boxes")
+    given = evaluate(problem)
+
+    axes = [np.geomspace(d.lower, d.upper, 25) for d in problem.mount_design.decisions]
+    values = []
+    for x in itertools.product(*axes):
+        design = remounted(given, problem.mount_design.applied(problem.engine, list(x)))
+        if all(excess(each, design) <= 0.0 for each in problem.mount_design.limits):
+            values.append(whole_objective(problem, design))
+    assert len(values) > 100
+    assert min(values) >= result.certificate.lower_bound
+    assert result.objective.value <= min(values) * (1.0 + 1e-6)
+
+
+def test_how_often_bounds_are_divided_may_be_said(tmp_path: Path) -> None:
+    parts = (ENGINE, BLOCK, MOUNTS, "[objective]", ASKED["rms"])
+    none, few = (problem_of(tmp_path, *parts, f"[search]\nboxes = {count}") for count in (0, 40))
+    value = 1.17
+    assert divided_bound(none, value, 1e-4, 0.5).boxes == 0
+    assert divided_bound(none, value, 1e-4, 0.5).bound == 0.5
+    found = divided_bound(few, value, 1e-4, 0.5)
+    assert 40 <= found.boxes < 40 + 2 * 64
+    assert 0.5 <= found.bound < 1.16
+    with pytest.raises(InputError, match=r"search\.boxes"):
+        problem_of(tmp_path, *parts, "[search]\nboxes = -1")
+
+
+def test_what_is_not_divided(tmp_path: Path) -> None:
+    """Positions, losses and unbalances move more than stiffness; sag alone is convex; nine numbers are too many."""
+    assert not divides(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG))
+    lossy = changed(MOUNTS, ('position  = ["300', 'loss_factor = { between = [0.05, 0.2] }\nposition  = ["300'))
+    assert not divides(problem_of(tmp_path, ENGINE, BLOCK, lossy, "[objective]", ASKED["rms"]))
+    many = load(PROBLEMS / "powertrain-least-force.toml")
+    assert divides(many)
+    assert divided_bound(many, 13.1, 1e-3).boxes == 0
+    assert not divides(load(PROBLEMS / "tractor-four-elastic.toml"))
+    assert divided_bound(replace(many, mount_design=replace(many.mount_design, boxes=3)), 13.1, 1e-3).boxes >= 3

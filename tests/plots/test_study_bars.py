@@ -1,0 +1,51 @@
+"""Pictures of study parts: what is on their axes, where points have no design or stand a factor apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from laufruhe.plots import study
+
+
+def part(objective: list[float], proof: list[str], **coords: list[object]) -> xr.Dataset:
+    """A dataset as studies make it, of these objectives."""
+    names = [f"case {k}" for k in range(len(objective))]
+    values = {name: ("point", np.array(entries)) for name, entries in {"case": names, **coords}.items()}
+    data = xr.Dataset(
+        {
+            "objective": ("point", objective, {"units": "N"}),
+            "objective_given": ("point", [30000.0] * len(objective), {"units": "N"}),
+            "lower_bound": ("point", objective, {"units": "N"}),
+            "proof": ("point", proof),
+        },
+        coords=values,
+        attrs={"metric": "mean mount force", "title": "t", "source": "", "at": "equal cylinders"},
+    )
+    for name in coords:
+        data[name].attrs.update({"units": "rpm", "long_name": name, "swept": 1})
+    return data
+
+
+def test_a_case_without_a_design_says_so_in_its_place() -> None:
+    figure = study.layout_comparison(part([21050.7, np.nan], ["global", "none"]))
+    axes = figure.axes[0]
+    shown = {text.get_text(): text.get_position()[0] for text in axes.texts}
+    low, high = axes.get_xlim()
+    assert low < shown["no design"] < high
+    assert "21051" in shown, "no exponents on bars"
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["as given", "proven optimum"]
+
+
+@pytest.mark.parametrize(
+    ("speeds", "scale"),
+    [([1000.0, 2000.0, 4000.0, 8000.0], "log"), ([1000.0, 2000.0, 3000.0, 4000.0], "linear"), ([1.0, 2.0], "linear")],
+)
+def test_values_that_grow_by_a_factor_stand_on_a_logarithmic_axis(speeds: list[float], scale: str) -> None:
+    data = part([1.0 + speed for speed in speeds], ["as given"] * len(speeds), speed=list(speeds))
+    data = data.assign_coords(case=("point", ["one"] * len(speeds)))
+    axes = study.layout_comparison(data).axes[0]
+    assert axes.get_xscale() == scale
+    ticks = [float(label.get_text().replace("−", "-")) for label in axes.get_xticklabels() if label.get_text()]
+    assert sum(speeds[0] <= tick <= speeds[-1] for tick in ticks) >= 2
