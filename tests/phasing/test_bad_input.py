@@ -9,7 +9,6 @@ from laufruhe.solvers.result import Status
 from phasing import engines
 
 OPEN = 'throws = "open"\nfiring_order = "open"'
-GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "80 bar"\nimep = "6 bar"\n'
 
 
 @pytest.mark.parametrize(
@@ -91,13 +90,6 @@ def test_a_search_cut_short_names_its_gap(tmp_path):
         (4, OPEN, "most_shafts = 1", engines.COUPLE, "phasing.most_shafts: limits optional shafts, and none is"),
         (4, OPEN, "best = 0", engines.COUPLE, "phasing.best"),
         (4, OPEN, 'method = "magic"', engines.COUPLE, "phasing.method.*is not allowed"),
-        (
-            4,
-            OPEN,
-            'intervals = { largest_deviation = "5 deg" }',
-            GAS + engines.MOUNTS + engines.MOUNT_FORCE,
-            "gas: acts on",
-        ),
         (2, "throws = [0, { between = [90, 270] }]", "", engines.COUPLE, "phasing.intervals: is missing, and throws"),
     ],
 )

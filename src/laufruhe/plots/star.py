@@ -171,9 +171,12 @@ def trade(result: Result) -> Figure:
     y = [p.value for p in points]
     axes.plot(x, y, color=AFTER, linewidth=1.6, zorder=2)
     axes.plot(x, y, "o", color=AFTER, markersize=5, zorder=3)
-    for deviation, value in zip(x, y, strict=True):
+    shown = [number(value, 3, max(y)) for value in y]
+    for k, (deviation, value) in enumerate(zip(x, y, strict=True)):
+        if k and shown[k] == shown[k - 1]:
+            continue
         axes.annotate(
-            number(value, 3, max(y)),
+            shown[k],
             (deviation, value),
             xytext=(5, 6),
             textcoords="offset points",
