@@ -90,7 +90,13 @@ def test_a_search_cut_short_names_its_gap(tmp_path):
         (4, OPEN, "most_shafts = 1", engines.COUPLE, "phasing.most_shafts: limits optional shafts, and none is"),
         (4, OPEN, "best = 0", engines.COUPLE, "phasing.best"),
         (4, OPEN, 'method = "magic"', engines.COUPLE, "phasing.method.*is not allowed"),
-        (2, "throws = [0, { between = [90, 270] }]", "", engines.COUPLE, "phasing.intervals: is missing, and throws"),
+        (
+            2,
+            "throws = [0, { between = [90, 270] }]",
+            "intervals = { largest_deviation = 0 }",
+            engines.COUPLE,
+            "phasing.intervals: allows even firing alone",
+        ),
     ],
 )
 def test_refused(tmp_path, cylinders, engine, phasing, rest, said):

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_orders, star_throws
-from laufruhe.machine.layouts import Layout
+from laufruhe.machine.layouts import Layout, even_throws
 
 if TYPE_CHECKING:
     from laufruhe.problem.model import Problem
+
+
+SOONEST = 1e-8
+"""What fires sooner after another fires with it [rad]."""
+_MOST_PERMUTED = 7
+_EVEN_STARS = 3
 
 
 class Method(StrEnum):
@@ -235,3 +243,33 @@ def _multiples(step: float, bounds: tuple[float, float], other: float) -> list[f
     low = math.ceil((bounds[0] + other) / step - 1e-9)
     high = math.floor((bounds[1] + other) / step + 1e-9)
     return [m * step - other for m in range(low, high + 1)]
+
+
+def bounded_stars(phasing: Phasing, layout: Layout) -> list[tuple[float, ...]]:
+    """Throws within their own bounds [rad]: the middle, then the even stars that need to move least to lie there.
+
+    Of many cylinders without a firing order the middle alone: they have too many even stars.
+    """
+    bounds = phasing.throw_bounds or ()
+    if phasing.firing_order is not None:
+        orders = [phasing.firing_order]
+    elif phasing.cylinders <= _MOST_PERMUTED:
+        orders = [(1, *rest) for rest in itertools.permutations(range(2, phasing.cylinders + 1))]
+    else:
+        orders = []
+    moves: dict[tuple[float, ...], float] = {}
+    for order in orders:
+        try:
+            even = even_throws(phasing.cycle, layout, order)
+        except ModelError:
+            continue
+        inside = tuple(_nearest(angle, *pair) for angle, pair in zip(even, bounds, strict=True))
+        moves[inside] = sum(1.0 - math.cos(a - b) for a, b in zip(inside, even, strict=True))
+    middle = tuple(0.5 * (low + high) for low, high in bounds)
+    return [middle, *sorted(moves, key=lambda star: round(moves[star], 12))[:_EVEN_STARS]]
+
+
+def _nearest(angle: float, low: float, high: float) -> float:
+    """The angle within bounds that is nearest on the circle."""
+    turned = angle + math.tau * round((0.5 * (low + high) - angle) / math.tau)
+    return min(max(turned, low), high)

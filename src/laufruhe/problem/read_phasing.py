@@ -26,12 +26,18 @@ from laufruhe.problem.complaints import Refused
 from laufruhe.problem.fields import Open
 from laufruhe.problem.file_models import BalancerShaftTable, EngineTable, PhasingTable, ProblemFile
 from laufruhe.problem.model import Problem
-from laufruhe.problem.phasing import Candidate, Intervals, Method, OrderCriterion, Phasing, ShaftChoice
+from laufruhe.problem.phasing import (
+    SOONEST,
+    Candidate,
+    Intervals,
+    Method,
+    OrderCriterion,
+    Phasing,
+    ShaftChoice,
+    bounded_stars,
+)
 
 Assemble = Callable[[ProblemFile], Problem]
-
-# what fires sooner after another fires with it [rad]
-SOONEST = 1e-8
 
 
 def is_open(file: ProblemFile) -> bool:
@@ -210,8 +216,8 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
         )  # fmt: skip
     if phasing.throw_bounds is not None and phasing.intervals.forbid_unevenness:
         raise Refused(
-            "phasing.intervals", None, "is missing, and throws between bounds fire unevenly",
-            'give largest_deviation, or write throws = "open" for even firing',
+            "phasing.intervals", None, "allows even firing alone, and throws between bounds fire unevenly",
+            'allow more, leave it out, or write throws = "open"',
         )  # fmt: skip
     if phasing.intervals.least > phasing.intervals.most:
         raise Refused("phasing.intervals.min", None, "is more than max", "swap or relax them")
@@ -225,8 +231,15 @@ def _first(phasing: Phasing) -> Candidate:
         if given is not None:
             return Candidate(given, phasing.firing_order, bank, split)
         if phasing.throw_bounds is not None:
-            middle = tuple(0.5 * (low + high) for low, high in phasing.throw_bounds)
-            return Candidate(middle, _most_even(phasing, layout, middle), bank, split)
+            stars = bounded_stars(phasing, layout)
+            return next(
+                (
+                    Candidate(throws, order, bank, split)
+                    for throws in stars
+                    if (order := _most_even(phasing, layout, throws))
+                ),
+                Candidate(stars[0], None, bank, split),
+            )
         try:
             pattern = even_patterns(phasing.cycle, layout)[0]
         except NoEvenStarError:

@@ -7,6 +7,7 @@ the even star it started from, because the exact model compares the two.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,10 +17,10 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.machine.firing import firing_turns, intervals_of
+from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
-from laufruhe.problem.phasing import Candidate, Intervals, OrderCriterion, Phasing
-from laufruhe.problem.quantity import ON_MOUNTS, Subject
+from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, Phasing, bounded_stars
 from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.nonlinear import solve_nonlinear
 from laufruhe.solvers.phasing_result import no_result, phase_decisions, solve_fixed
@@ -90,7 +91,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     SolverError
         If no start leads anywhere.
     """
-    starts = starts_of(phasing, even, ORDERS_WITH_GAS if _feels_gas(problem) else 1)
+    starts = starts_of(phasing, even, problem.feels_gas)
     if not starts:
         return no_result(problem, "no star and firing order to start from keeps the firing intervals allowed")
     found = [answer for start in starts[:STARTS] if (answer := local_optimum(phasing, start, phasing.intervals))]
@@ -147,41 +148,60 @@ def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...
     return intervals_of(phasing.cycle, turns)
 
 
-def _feels_gas(problem: Problem) -> bool:
-    """Whether gas loads what is minimised or limited: firing orders of one star then differ."""
-    asked = [term.quantity for term in problem.objective] + [limit.quantity for limit in problem.limits]
-    felt = any(quantity.subject in (*ON_MOUNTS, Subject.ROLL_MOMENT) for quantity in asked)
-    return felt and problem.fidelity.gas and any(point.gas is not None for point in problem.points)
-
-
-def starts_of(phasing: Phasing, even: Result | None, orders_each: int = 1) -> list[Start]:
-    """Designs to start from: the ranked even stars, or the middle of the throws' own bounds.
+def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> list[Start]:
+    """Designs to start from: the ranked even stars, or throws within their own bounds.
 
     Parameters
     ----------
-    orders_each
-        How many firing orders of a star are started from.
+    with_gas
+        Whether gas is felt: firing orders of one star then differ, and so does the star that
+        turns the other way, which inertia alone cannot tell from it.
     """
     if even is not None and even.phasing is not None:
-        return [
-            Start(Candidate(s.throws, firing.order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts)))
+        candidates = [
+            Candidate(s.throws, firing.order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts))
             for s in even.phasing.ranking
-            for firing in s.firing_orders[:orders_each]
+            for firing in s.firing_orders[: ORDERS_WITH_GAS if with_gas else 1]
         ]
-    out = []
+    else:
+        geometries = itertools.product(_ends(phasing.bank), _ends(phasing.split))
+        candidates = [candidate for geometry in geometries for candidate in _unranked(phasing, *geometry)]
+    if with_gas and phasing.throw_bounds is None and phasing.firing_order is None:
+        candidates = [image for candidate in candidates for image in (candidate, _turning_back(phasing, candidate))]
+    return [Start(candidate) for candidate in candidates]
+
+
+def _unranked(phasing: Phasing, bank: float | None, split: float | None) -> list[Candidate]:
+    """Throws within their bounds, or spread evenly, in firing orders that they can keep."""
+    layout = phasing.layout(bank, split)
+    if phasing.throw_bounds is None:
+        count = len(layout.throw_positions)
+        stars = [tuple(layout.banks[0] - layout.pin_offsets[0] + math.tau * k / count for k in range(count))]
+    else:
+        stars = bounded_stars(phasing, layout)
     free = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
-    for bank in _ends(phasing.bank):
-        for split in _ends(phasing.split):
-            layout = phasing.layout(bank, split)
-            throws = tuple(0.5 * (low + high) for low, high in phasing.throw_bounds or ())
-            if not throws:
-                count = len(layout.throw_positions)
-                throws = tuple(layout.banks[0] - layout.pin_offsets[0] + math.tau * k / count for k in range(count))
-            orders, _ = ranked_orders(free, layout, throws, None)
-            # the order whose intervals are nearest to those allowed
-            orders = tuple(sorted(orders, key=lambda o: _outside(phasing.intervals, o.intervals)))
-            out += [Start(Candidate(throws, o.order, bank, split)) for o in orders[:2]]
-    return out
+    found = []
+    for throws in stars:
+        orders, _ = ranked_orders(free, layout, throws, None)
+        kept = [order for order in orders if min(order.intervals) > SOONEST]
+        # the orders whose intervals are nearest to those allowed
+        kept.sort(key=lambda order: _outside(phasing.intervals, order.intervals))
+        found += [Candidate(throws, order.order, bank, split) for order in kept[:2]]
+    return found
+
+
+def _turning_back(phasing: Phasing, candidate: Candidate) -> Candidate:
+    """The star of a crank that turns the other way: banks change sides, firings follow each other backwards."""
+    layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
+    number = {(pin, bank): k + 1 for k, (pin, bank) in enumerate(zip(layout.pins, layout.banks, strict=True))}
+    partners = [number[pin, -bank] for pin, bank in zip(layout.pins, layout.banks, strict=True)]
+    order = [partners[k - 1] for k in reversed(candidate.firing_order or ())]
+    first = order.index(1) if order else 0
+    throws = [-angle for angle in candidate.throws]
+    # cylinder 1 at its dead centre when phi = 0 (C5)
+    shift = angle_of(layout.own_turn(0)) - throws[layout.pins[0]]
+    turned = tuple((angle + shift) % math.tau for angle in throws)
+    return replace(candidate, throws=turned, firing_order=(*order[first:], *order[:first]) or None)
 
 
 def _outside(allowed: Intervals, intervals: Sequence[float]) -> float:

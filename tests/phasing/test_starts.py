@@ -1,0 +1,69 @@
+"""Where the search of uneven throws starts: stars turned back, and throws within bounds of their own."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.phasing import SOONEST, Candidate, bounded_stars
+from laufruhe.solvers import solve
+from laufruhe.solvers.uneven import _turning_back, firing_intervals
+from phasing import engines
+
+OPEN = 'throws = "open"\nfiring_order = "open"'
+SPLIT = "\nbank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }"
+ALLOWED = 'intervals = { largest_deviation = "40 deg" }'
+MOUNT_FORCE = engines.MOUNTS + engines.MOUNT_FORCE
+
+
+@pytest.mark.parametrize("layout", ["inline", "vee"])
+def test_a_star_turned_back(tmp_path, layout):
+    """Its firings follow each other backwards, inertia shakes as before, and turned twice it is itself."""
+    vee = layout == "vee"
+    phasing = engines.problem(
+        tmp_path, 6, "four-stroke", OPEN + (SPLIT if vee else ""), ALLOWED, MOUNT_FORCE, layout
+    ).phasing
+    geometry = (math.radians(90.0), math.radians(20.0)) if vee else (None, None)
+    places = phasing.layout(*geometry)
+    first = places.banks[0] - places.pin_offsets[0]
+    angles = (0.0, 4.1, 2.0) if vee else (0.0, 4.1, 2.0, 2.2, 4.3, 0.1)
+    order = (1, 6, 3, 5, 2, 4) if vee else (1, 5, 3, 6, 2, 4)
+    star = Candidate(tuple((first + angle) % math.tau for angle in angles), order, *geometry)
+    back = _turning_back(phasing, star)
+
+    intervals, turned = firing_intervals(phasing, star), firing_intervals(phasing, back)
+    assert min(intervals) > SOONEST
+    assert max(intervals) - min(intervals) > 0.1
+    assert any(np.allclose(np.roll(intervals[::-1], k), turned, atol=1e-12) for k in range(6))
+    problems = [replace(phasing.realise(own), phasing=None) for own in (star, back)]
+    values = [objective_value(problem, evaluate(problem)) for problem in problems]
+    # the samples stand elsewhere in the cycle
+    assert values[0] == pytest.approx(values[1], rel=1e-6)
+    twice = _turning_back(phasing, back)
+    assert twice.firing_order == order
+    np.testing.assert_allclose(np.exp(1j * np.array(twice.throws)), np.exp(1j * np.array(star.throws)), atol=1e-12)
+
+
+@pytest.mark.parametrize("order", ["[1, 3, 4, 2]", '"open"'])
+def test_bounded_stars_lie_within(tmp_path, order):
+    """The middle cannot fire: three pistons would be at their dead centre at once. An even star within can."""
+    engine = f"throws = [0, 180, 180, {{ between = [-20, 380] }}]\nfiring_order = {order}"
+    phasing = engines.problem(tmp_path, 4, "four-stroke", engine).phasing
+    middle, *even = bounded_stars(phasing, phasing.layout(None, None))
+    assert np.degrees(middle) == pytest.approx([0.0, 180.0, 180.0, 180.0])
+    for star in even:
+        assert all(low <= angle <= high for angle, (low, high) in zip(star, phasing.throw_bounds, strict=True))
+    assert np.degrees(even[0]) % 360.0 == pytest.approx([0.0, 180.0, 180.0, 0.0])
+
+
+def test_a_throw_between_bounds_needs_nothing_beside_it(tmp_path):
+    """A four whose last throw is open is no worse than the even one, which the search starts from."""
+    engine = "throws = [0, 180, 180, { between = [0, 360] }]\nfiring_order = [1, 3, 4, 2]"
+    result = solve(engines.problem(tmp_path, 4, "four-stroke", engine, "", MOUNT_FORCE))
+    even = engines.problem(
+        tmp_path, 4, "four-stroke", "throws = [0, 180, 180, 0]\nfiring_order = [1, 3, 4, 2]", "", MOUNT_FORCE
+    )
+    assert result.objective.value <= objective_value(even, evaluate(even)) * (1.0 + 1e-6)
+    assert min(result.final.engine.firing_intervals) > SOONEST
