@@ -124,6 +124,11 @@ def common_base(orders: Sequence[Fraction]) -> Fraction:
     return reduce(_common, orders)
 
 
+def base_of(orders: Sequence[float]) -> Fraction:
+    """The largest lowest order of those that turn; one where none does."""
+    return common_base([as_order(order) for order in orders if order > 0.0] or [Fraction(1)])
+
+
 def spectrum_of(samples: NDArray[np.float64], base: Fraction) -> Spectrum:
     """Coefficients of a real signal sampled over one period, shape (n, ...) to (n//2 + 1, ...)."""
     count = len(samples)

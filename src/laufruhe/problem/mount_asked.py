@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from laufruhe import units
 from laufruhe.problem.assemble_mounts import MountsFound
-from laufruhe.problem.complaints import Refused, nearest
+from laufruhe.problem.complaints import Refused, measured, nearest
 from laufruhe.problem.file_models import ConstraintTable, ProblemFile, QuantityTable
 from laufruhe.problem.mount_design import MOUNT_NAMES, MountDesign, MountLimit, MountMeasure, MountQuantity
 
@@ -115,11 +115,7 @@ def _limit(table: ConstraintTable, where: str, found: MountsFound, points: Seque
 
 
 def _side(text: str, unit: str, where: str) -> float:
-    try:
-        value = units.parse(text, unit)
-    except units.UnitError as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise Refused(where, text, rule, remedy) from None
+    value = measured(text, unit, where)
     if value < 0.0:
         raise Refused(where, text, "is negative", "give a value of zero or more")
     return value

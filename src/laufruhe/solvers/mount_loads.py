@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any, Protocol
 
 import casadi as ca
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import OperatingPoint
-from laufruhe.numerics.spectrum import common_base
+from laufruhe.numerics.spectrum import base_of, common_base
 from laufruhe.problem.model import Problem
 from laufruhe.problem.quantity import MASSES, Quantity
 from laufruhe.solvers.affine import AffineModel
@@ -117,8 +116,7 @@ class MovedThrows:
         sizes = self._sizes(parts)
         kept = [int(k) for k in _felt(sizes, np.array([h for h, _ in found]))]
         orders = np.array([found[k][0] for k in kept])
-        period = common_base([Fraction(h).limit_denominator(1000) for h in orders if h > 0.0] or [Fraction(1)])
-        return SymbolicLoads(orders, float(period), parts[0][:, kept], parts[1][:, kept])
+        return SymbolicLoads(orders, float(base_of(orders.tolist())), parts[0][:, kept], parts[1][:, kept])
 
     def _sizes(self, parts: Sequence[Any]) -> Array:
         """Largest component of every order over designs drawn at random: a star that cancels shows nothing itself."""

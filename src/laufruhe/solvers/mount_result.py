@@ -21,12 +21,11 @@ ACTIVE = 1e-5
 
 def objective_of(problem: Problem, initial: Evaluation, final: Evaluation) -> ObjectiveValue | None:
     """The objective of the design and of the one given; None where nothing is minimised."""
-    unit = problem.objective_unit
-    if unit is None:
+    if problem.objective_unit is None:
         return None
     value = whole_objective(problem, final)
     given = value if final is initial else whole_objective(problem, initial)
-    return ObjectiveValue(problem.objective_name, value, unit, given)
+    return ObjectiveValue.of(problem, value, given)
 
 
 def mount_decisions(

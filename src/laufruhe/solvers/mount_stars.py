@@ -23,7 +23,7 @@ from laufruhe.problem.mount_design import NOTHING_ASKED
 from laufruhe.problem.mount_values import whole_objective
 from laufruhe.problem.phasing import Candidate, Method, Phasing
 from laufruhe.problem.quantity import MASSES, Quantity, Subject
-from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.certificate import FLOOR, Certificate, Proof
 from laufruhe.solvers.mount_nonlinear import solve_moved
 from laufruhe.solvers.mounts import solve_mounts
 from laufruhe.solvers.phasing_result import names_of, no_result, phase_decisions
@@ -39,7 +39,6 @@ from laufruhe.solvers.uneven import firing_intervals, starts_of
 MOST_SEARCHED = 3
 FEWER_STARTS = 4
 SHORTEST_SEARCH = 4
-FLOOR = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,9 +233,7 @@ def _result(problem: Problem, phasing: Phasing, found: list[_Found], designs: in
         result,
         problem=replace(result.problem, phasing=phasing),
         status=Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=None
-        if objective is None
-        else ObjectiveValue(problem.objective_name, objective.value, objective.unit, initial),
+        objective=None if objective is None else ObjectiveValue.of(problem, objective.value, initial),
         certificate=certificate,
         decisions=(*phase_decisions(problem, phasing, best.candidate, _built(phasing, best)), *result.decisions),
         initial=replace(given, samples=result.final.samples),

@@ -21,7 +21,7 @@ from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, Phasing, bounded_stars
-from laufruhe.solvers.certificate import Certificate, Proof
+from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.nonlinear import solve_nonlinear
 from laufruhe.solvers.phasing_result import no_result, phase_decisions, solve_fixed
 from laufruhe.solvers.ranking import PhasingResult, RankedStar, TradePoint, ranked_orders, ranked_star
@@ -36,7 +36,6 @@ Array = NDArray[np.float64]
 
 STARTS = 6
 ORDERS_WITH_GAS = 2
-FLOOR = 1e-3
 FEASIBLE = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 
@@ -266,11 +265,10 @@ def _result(
     layout = phasing.layout(best.candidate.bank_angle, best.candidate.split_pin)
     given = even.initial if even is not None else evaluate(problem)
     initial = objective_value(problem, given)
-    measure = max(best.value, FLOOR * initial) or 1.0
     bound, source = _bound(problem, phasing, phasing.intervals)
     bound = min(bound, best.value)
     # no norm lies under zero: who reaches it is done
-    gap = (best.value - bound) / measure
+    gap = (best.value - bound) / gap_unit(best.value, initial)
     proven = gap <= problem.tolerance
     shafts = [n for names in phasing.shafts.optional for n in names if n not in best.candidate.left_out]
     method = f"IPOPT from {len(found)} start(s), firing orders kept; bound from {source}"

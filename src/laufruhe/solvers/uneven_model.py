@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.numerics.spectrum import Spectrum, as_order, base_of
 from laufruhe.physics.mount_forces import RigidMounting
 from laufruhe.physics.mounting import mount_maps, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import inertia_coefficients, rotor_wrench
@@ -174,7 +174,7 @@ class UnevenModel:
             raise ValueError("an engine without mounts has no mount forces")
         if quantity.subject is Subject.MOUNT_FORCE:
             return mount_maps(self._mounting, order, speed)
-        base = Fraction(order).limit_denominator(1000)
+        base = as_order(order)
         units = np.stack([np.zeros((6, 6)), np.eye(6)]).astype(complex)
         spectra = [Spectrum(base or Fraction(1), units[:, k] if base else units[1:, k]) for k in range(6)]
         travels = [travel_of(self.problem.engine, self._mounting, unit, speed) for unit in spectra]
@@ -283,7 +283,7 @@ def _columns(wrench: NDArray[np.complex128]) -> Any:
 def _sampled(signal: Sequence[tuple[float, Any]]) -> Any:
     """Values of (order, coefficients of shape (d, 2)) at equal steps of their period, shape (samples, d)."""
     orders = [h for h, _ in signal]
-    base = float(common_base([Fraction(h).limit_denominator(1000) for h in orders if h > 0.0] or [Fraction(1)]))
+    base = float(base_of(orders))
     samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * max(orders) / base))
     cosine, sine = waves(orders, base, samples)
     real, imaginary = (ca.horzcat(*(c[:, side] for _, c in signal)) for side in (0, 1))

@@ -14,6 +14,7 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Intervals, Phasing
 from laufruhe.problem.quantity import Quantity
+from laufruhe.solvers.certificate import FLOOR
 from laufruhe.solvers.domain import Domain
 from laufruhe.solvers.nonlinear import NonlinearProgram
 from laufruhe.solvers.result import Result
@@ -23,7 +24,6 @@ from laufruhe.solvers.uneven_model import Symbols, UnevenModel
 Array = NDArray[np.float64]
 
 SOFTNESS = (1e-2, 1e-4, 1e-6)
-FLOOR = 1e-3
 SOFT_LIMIT = 1e-6
 
 
