@@ -50,6 +50,8 @@ UNITS = {"gas_force": "kp", "cancelling_speed": "m/s", "best_share": "1", "first
 
 LOWEST = Unprinted(12.0, 1.25, 1.15, 0.0, 0.20)
 HIGHEST = Unprinted(22.0, 1.40, 1.45, 1.0, 0.32)
+NEARNESS = 0.05
+"""Weight of a parameter's distance from its assumed value, over its range, beside what is allowed of a claim."""
 STARTS = (Unprinted(), Unprinted(14.0, 1.30, 1.40, 0.5, 0.22))
 
 ASSUMED_CASE = "assumed here"
@@ -169,9 +171,11 @@ def _fitted(residuals: Callable[[Unprinted], Sequence[float]], starts: Sequence[
     from scipy.optimize import least_squares
 
     low, high = _vector(LOWEST), _vector(HIGHEST)
+    assumed = (_vector(Unprinted()) - low) / (high - low)
 
     def scaled(x: Array) -> Array:
-        return np.array(residuals(Unprinted(*(low + x * (high - low)))))
+        # of what serves equally well the nearest to what is assumed elsewhere
+        return np.array([*residuals(Unprinted(*(low + x * (high - low)))), *(NEARNESS * (x - assumed))])
 
     fits = [
         least_squares(
