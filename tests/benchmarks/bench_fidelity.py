@@ -48,7 +48,7 @@ def seconds(work: Callable[[], object], repeats: int = 5) -> float:
 def product_rate() -> float:
     """Additions and multiplications a second of a large matrix product on one core."""
     a = np.random.default_rng(0).normal(size=(1200, 1200))
-    return 2.0 * 1200**3 / seconds(lambda: a @ a)
+    return 2.0 * 1200**3 / seconds(lambda: a @ a, 12)
 
 
 def four_cylinder() -> list[str]:
@@ -64,10 +64,10 @@ def four_cylinder() -> list[str]:
     one_whole, one = (seconds(lambda d=d: d.one(x), 2000) for d in (whole, cheap))
     empty = _one_row(cheap)
     floor = seconds(lambda: empty.one(x), 2000)
-    many_whole, many = (seconds(lambda d=d: d.objective(values), 3) for d in (whole, cheap))
+    many_whole, many = (seconds(lambda d=d: d.objective(values), 12) for d in (whole, cheap))
     choosing = seconds(lambda: (forget(), choose(problem, 1e-3)), 3)
     rate = product_rate()
-    both = seconds(lambda: cheap.objective(values, threads=2), 3)
+    both = seconds(lambda: cheap.objective(values, threads=2), 12)
     error = float(np.abs(cheap.objective(values[:2000]) / whole.objective(values[:2000]) - 1.0).max())
 
     def line(what: str, pair: Sequence[float]) -> str:
