@@ -16,7 +16,7 @@ from laufruhe.solvers.certificate import Proof
 from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_objective import amplitude_objective
 from laufruhe.solvers.star_search import search_stars
-from laufruhe.solvers.uneven import Start, local_optimum
+from laufruhe.solvers.uneven import local_optimum
 from laufruhe.solvers.uneven_bound import star_bounds, throw_costs, uneven_bound
 from laufruhe.solvers.uneven_model import Symbols, UnevenModel
 from laufruhe.solvers.uneven_program import rides_of
@@ -82,12 +82,12 @@ def test_no_optimum_lies_above_its_start(tmp_path, seed):
     start = Candidate(throws, order)
     problem = phasing.realise(start)
     given = evaluate(problem).value(problem.objective[0].quantity)
-    found = local_optimum(phasing, Start(start), phasing.intervals)
+    found = local_optimum(phasing, start, phasing.intervals)
     assert found.value <= given
     assert found.moved
     assert found.kkt_residual < 1e-6
     assert phasing.intervals.holds(found.result.final.engine.firing_intervals)
-    still = local_optimum(phasing, Start(start), Intervals(phasing.even_interval, phasing.even_interval))
+    still = local_optimum(phasing, start, Intervals(phasing.even_interval, phasing.even_interval))
     assert still.value == pytest.approx(given, rel=1e-12)
 
 

@@ -14,7 +14,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.reader import load
 from laufruhe.solvers import solve
 from laufruhe.solvers.throw_moves import ThrowMoves
-from laufruhe.solvers.uneven import Start, local_optimum
+from laufruhe.solvers.uneven import local_optimum
 from laufruhe.solvers.uneven_gas import LEFT_OUT
 from laufruhe.solvers.uneven_model import Symbols, UnevenModel
 from laufruhe.solvers.uneven_program import rides_of
@@ -168,7 +168,7 @@ def test_even_firing_stays_where_it_is_best(tmp_path, orders, stays):
     start = Candidate(tuple(math.tau * t / 3.0 for t in (0, 1, 2)), (1, 3, 2))
     given = light.realise(start)
     even = objective_value(given, evaluate(given))
-    found = local_optimum(light, Start(start), phasing.intervals)
+    found = local_optimum(light, start, phasing.intervals)
     if stays:
         assert not found.moved
         assert found.candidate.throws == start.throws

@@ -194,7 +194,7 @@ def _moved(problem: Problem, phasing: Phasing, found: list[_Found], say: Callabl
     starts: list[tuple[Candidate, Result | None]] = [
         (each.candidate, each.result) for each in found[:MOST_SEARCHED] if not each.key[0]
     ]
-    starts = starts or [(start.candidate, None) for start in starts_of(phasing, None)[:MOST_SEARCHED]]
+    starts = starts or [(start, None) for start in starts_of(phasing, None)[:MOST_SEARCHED]]
     out = []
     for k, (candidate, even) in enumerate(starts):
         say(f"throws that leave star {k + 1} of {len(starts)}")

@@ -40,13 +40,6 @@ FEASIBLE = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 
 
-@dataclass(frozen=True)
-class Start:
-    """A star and its firing order to start from."""
-
-    candidate: Candidate
-
-
 @dataclass(frozen=True, eq=False)
 class Uneven:
     """A local optimum, its unbalances solved once more as a convex problem.
@@ -101,17 +94,17 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     return _result(problem, phasing, even, found, trade)
 
 
-def local_optimum(phasing: Phasing, start: Start, intervals: Intervals) -> Uneven | None:
+def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> Uneven | None:
     """The local optimum that one star leads to; the star itself where nothing is better (S20)."""
-    best = _evaluated(phasing, start.candidate, 0.0, moved=False)
-    if best is not None and not intervals.holds(firing_intervals(phasing, start.candidate), 1e-7):
+    best = _evaluated(phasing, start, 0.0, moved=False)
+    if best is not None and not intervals.holds(firing_intervals(phasing, start), 1e-7):
         best = None
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
-    problem = replace(phasing.realise(start.candidate), phasing=None)
-    layout = phasing.layout(start.candidate.bank_angle, start.candidate.split_pin)
-    model = UnevenModel(problem, layout, rides_of(phasing, start.candidate))
-    program = UnevenProgram(phasing, model, start.candidate, intervals, best.result if best is not None else None)
+    problem = replace(phasing.realise(start), phasing=None)
+    layout = phasing.layout(start.bank_angle, start.split_pin)
+    model = UnevenModel(problem, layout, rides_of(phasing, start))
+    program = UnevenProgram(phasing, model, start, intervals, best.result if best is not None else None)
     if program.is_fixed:
         return best
     for optimum in solve_nonlinear(program.nonlinear, program.starts, workers=1, max_seconds=30.0):
@@ -147,7 +140,7 @@ def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...
     return intervals_of(phasing.cycle, turns)
 
 
-def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> list[Start]:
+def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> list[Candidate]:
     """Designs to start from: the ranked even stars, or throws within their own bounds.
 
     Parameters
@@ -167,7 +160,7 @@ def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> 
         candidates = [candidate for geometry in geometries for candidate in _unranked(phasing, *geometry)]
     if with_gas and phasing.throw_bounds is None and phasing.firing_order is None:
         candidates = [image for candidate in candidates for image in (candidate, _turning_back(phasing, candidate))]
-    return [Start(candidate) for candidate in candidates]
+    return candidates
 
 
 def _unranked(phasing: Phasing, bank: float | None, split: float | None) -> list[Candidate]:
@@ -228,7 +221,7 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
 
 
 def _trade(
-    problem: Problem, phasing: Phasing, starts: Sequence[Start], found: Sequence[Uneven]
+    problem: Problem, phasing: Phasing, starts: Sequence[Candidate], found: Sequence[Uneven]
 ) -> tuple[TradePoint, ...]:
     """The least objective found for less and less unevenness; never worse for more of it."""
     even = phasing.even_interval
