@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
+from laufruhe.files.reader import load
+from laufruhe.problem.problem import Problem
 
 # further keys of [engine] may follow
 FOUR = """

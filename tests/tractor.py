@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, OperatingPoint, Role, Rotor, Seiliger, Shaft
 from laufruhe.machine.layouts import Mechanism, build, inline
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.model import Drive, Limit, Problem, Term, UnbalanceDecision
-from laufruhe.problem.quantity import MEAN_MOUNT_FORCE
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE
+from laufruhe.problem.problem import Drive, Limit, Problem, Term, UnbalanceDecision
 
 RADIUS, LAMBDA, MASS, SPACING = 0.06, 0.26, 1.25, 0.125
 SPEED = 2500 * math.pi / 30

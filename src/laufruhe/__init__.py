@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from laufruhe.machine import Engine, OperatingPoint
-    from laufruhe.problem.model import Problem
+    from laufruhe.problem.problem import Problem
     from laufruhe.solvers.result import Result
 
 __version__ = "0.1.0"
@@ -28,7 +28,7 @@ def load(path: str | Path) -> Problem:
     laufruhe.errors.InputError
         With one line for everything wrong: file, key, value, rule, remedy.
     """
-    from laufruhe.problem.reader import load as read
+    from laufruhe.files.reader import load as read
 
     return read(path)
 
@@ -51,8 +51,8 @@ def evaluate(design: Problem | Engine, points: Sequence[OperatingPoint] = ()) ->
         Of an engine that stands in no problem.
     """
     from laufruhe.numerics.mixed_norms import Norm
-    from laufruhe.problem.model import Problem, Term
-    from laufruhe.problem.quantity import Quantity, Subject
+    from laufruhe.problem.measure import Quantity, Subject
+    from laufruhe.problem.problem import Problem, Term
     from laufruhe.solvers import state
 
     if isinstance(design, Problem):

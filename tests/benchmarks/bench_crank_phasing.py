@@ -21,21 +21,21 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from pages import RESULTS, ROOT, publish, spent
 
+from laufruhe.files.reader import load
+from laufruhe.load_models.star_model import StarModel
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import inline
 from laufruhe.physics.crank_stars import score_stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
+from laufruhe.problem.problem import Problem
 from laufruhe.report.grids import Grid
 from laufruhe.report.ranking import phasing_grids
 from laufruhe.solvers import solve
 from laufruhe.solvers.mixed_conic import solve_program
 from laufruhe.solvers.star_cuts import owners_of, search_designs, solve_design
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_model import StarModel
 from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm, enumerate_stars, search_stars
 
 OUT = RESULTS / "crank-phasing"

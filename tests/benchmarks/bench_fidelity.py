@@ -23,17 +23,17 @@ import numpy as np  # noqa: E402
 from pages import RESULTS, ROOT, publish, spent  # noqa: E402
 
 from laufruhe import load  # noqa: E402
+from laufruhe.fidelity.automatic import automatic, choose  # noqa: E402
+from laufruhe.load_models.batch import Designs, prepare, random_decisions  # noqa: E402
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
 from laufruhe.machine.layouts import Mechanism, boxer, build, inline  # noqa: E402
 from laufruhe.numerics.batch_norms import BatchNorm  # noqa: E402
 from laufruhe.numerics.mixed_norms import Norm  # noqa: E402
 from laufruhe.physics.fidelity import Fidelity  # noqa: E402
 from laufruhe.physics.shaking_loads import forget  # noqa: E402
-from laufruhe.problem.automatic import automatic, choose  # noqa: E402
 from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
-from laufruhe.problem.model import Problem, Term  # noqa: E402
-from laufruhe.problem.quantity import Quantity, Subject  # noqa: E402
-from laufruhe.solvers.batch import Designs, prepare, random_decisions  # noqa: E402
+from laufruhe.problem.measure import Quantity, Subject  # noqa: E402
+from laufruhe.problem.problem import Problem, Term  # noqa: E402
 
 OUT = RESULTS / "benchmarks" / "fidelity.md"
 DESIGNS = 100_000

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from pages import RESULTS, ROOT, publish
 
-from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
+from laufruhe.files.reader import load
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from laufruhe.solvers.mount_convex import is_convex
 

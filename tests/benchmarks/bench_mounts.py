@@ -15,15 +15,15 @@ from scipy.optimize import minimize
 
 sys.path.insert(0, str(ROOT / "tests"))
 
+from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.cores import processors
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.speed_map import speed_map, split_loads
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import mounting_in
 from laufruhe.problem.mount_values import excess, whole_objective
-from laufruhe.problem.reader import load
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint
 from laufruhe.solvers.mount_program import JointProgram
 from laufruhe.solvers.mount_starts import start_points

@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pages import RESULTS, ROOT, publish, spent
 
+from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import forget, shaking_loads
-from laufruhe.problem.model import Drive, Problem, Term, UnbalanceDecision
-from laufruhe.problem.quantity import Quantity, Subject
-from laufruhe.solvers.affine import AffineModel
+from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.problem.problem import Drive, Problem, Term, UnbalanceDecision
 
 OUT = RESULTS / "benchmarks" / "multibody.md"
 

@@ -18,8 +18,8 @@ import numpy as np
 from pages import RESULTS, ROOT, publish
 
 from laufruhe import load
-from laufruhe.problem.model import Problem
-from laufruhe.solvers.affine import AffineModel, AffineProblem
+from laufruhe.load_models.affine import AffineModel, AffineProblem
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conic import ConicProgram
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester.toml"

@@ -6,7 +6,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Result, solve, state
 from problem_files import FOUR, MOUNTS, SECOND_ORDER_SHAFTS, loaded
 

@@ -12,9 +12,9 @@ import pytest
 
 from cli import damage, scenes
 from laufruhe.errors import InputError, LaufruheError
+from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
+from laufruhe.problem.problem import Problem
 
 TIMES = 1000
 BATCHES = 3

@@ -9,8 +9,8 @@ from dataclasses import replace
 from laufruhe.machine import Block, Cycle, Engine, GasModel, Mount, OperatingPoint, Rotor, Seiliger, Shaft, Wiebe
 from laufruhe.machine.layouts import Mechanism, build, inline, vee
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.model import Problem, Term
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.problem.problem import Problem, Term
 
 SUBJECTS = (Subject.MOUNT_FORCE, Subject.SHAKING_FORCE, Subject.ROLL_MOMENT, Subject.ROCKING_COUPLE)
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import ModelError
+from laufruhe.fidelity.automatic import automatic
+from laufruhe.files.reader import load
+from laufruhe.load_models.batch import Designs, prepare, random_decisions
+from laufruhe.load_models.batch_engines import EngineArrays, EngineFamily
 from laufruhe.machine import OperatingPoint
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.automatic import automatic
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.reader import load
-from laufruhe.solvers.batch import Designs, prepare, random_decisions
-from laufruhe.solvers.batch_engines import EngineArrays, EngineFamily
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 # a study file has no engine of its own

@@ -18,14 +18,14 @@ import tractor
 from cli import scenes
 from fidelity.scenes import random_elastic_problem, random_problem
 from laufruhe.errors import InputError, ModelError
+from laufruhe.fidelity.automatic import choose
+from laufruhe.fidelity.error_bounds import reference
+from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.problem.automatic import choose
-from laufruhe.problem.error_bounds import reference
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from problem_files import written
 
@@ -102,7 +102,7 @@ def _shuffled(rng: random.Random, parts: tuple[Any, ...]) -> tuple[Any, ...]:
 
 THREADS = """
 from laufruhe import load, solve
-from laufruhe.problem.automatic import choose
+from laufruhe.fidelity.automatic import choose
 found = solve(load("problems/tractor-four-lanchester.toml"))
 print(found.objective.value, found.certificate.lower_bound, choose(found.problem, 1e-3).error_estimate)
 """
@@ -135,8 +135,8 @@ def test_automatic_finds_what_is_not_there() -> None:
 def test_gas_that_the_objective_cannot_see_is_dropped() -> None:
     engine = replace(tractor.engine((0, 180, 180, 0)), mounts=())
     from laufruhe.numerics.mixed_norms import Norm
-    from laufruhe.problem.model import Term
-    from laufruhe.problem.quantity import Quantity, Subject
+    from laufruhe.problem.measure import Quantity, Subject
+    from laufruhe.problem.problem import Term
 
     force = Term(Quantity(Subject.SHAKING_FORCE, Norm.SUM))
     choice = choose(tractor.problem(engine, [], tractor.GAS, objective=(force,)), 1e-3)
@@ -150,8 +150,8 @@ def test_gas_that_the_objective_cannot_see_is_dropped() -> None:
 def test_balanced_objective_of_zero() -> None:
     engine = replace(tractor.engine((0, 120, 240, 240, 120, 0)), mounts=())
     from laufruhe.numerics.mixed_norms import Norm
-    from laufruhe.problem.model import Term
-    from laufruhe.problem.quantity import Quantity, Subject
+    from laufruhe.problem.measure import Quantity, Subject
+    from laufruhe.problem.problem import Term
 
     force = Term(Quantity(Subject.SHAKING_FORCE, Norm.SUM, orders=(1.0, 2.0)))
     choice = choose(tractor.problem(engine, [], objective=(force,)), 1e-3)

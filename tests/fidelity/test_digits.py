@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from fidelity.scenes import random_problem
-from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
+from laufruhe.files.reader import load
+from laufruhe.problem.problem import Problem
 from laufruhe.studies import rigid_digits
 from laufruhe.studies.rigid_digits import rigid_part
 

@@ -13,19 +13,19 @@ import pytest
 from cli import scenes
 from fidelity.scenes import finer, random_elastic_problem
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
+from laufruhe.fidelity.automatic import choose
+from laufruhe.fidelity.error_bounds import error_bound, reference
+from laufruhe.fidelity.mount_needs import needs
+from laufruhe.files.reader import load
 from laufruhe.machine import Engine
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mounting import mounting_of
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
-from laufruhe.problem.automatic import choose
-from laufruhe.problem.error_bounds import error_bound, reference
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED, mounting_in
-from laufruhe.problem.mount_needs import needs
-from laufruhe.problem.reader import load
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from problem_files import written
 

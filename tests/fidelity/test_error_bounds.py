@@ -9,9 +9,9 @@ from dataclasses import replace
 import pytest
 
 from fidelity.scenes import finer, random_problem
+from laufruhe.fidelity.automatic import choose
+from laufruhe.fidelity.error_bounds import error_bound, reference
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.automatic import choose
-from laufruhe.problem.error_bounds import error_bound, reference
 from laufruhe.problem.evaluation import evaluate, objective_value
 
 QUICK, MANY, AUTOMATIC = 150, 10_000, 25

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear, minimize
 
+from laufruhe.files.reader import load
 from laufruhe.physics.modes import sag_for_critical_speed
 from laufruhe.problem.mount_design import MountMeasure, mounting_in
-from laufruhe.problem.reader import load
-from laufruhe.solvers.certificate import Proof
+from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.mount_convex import ConvexDuals, convex_program, dual_bound, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts import solve_mounts
 from laufruhe.solvers.result import Status

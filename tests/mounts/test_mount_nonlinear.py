@@ -11,13 +11,13 @@ import pytest
 from scipy.optimize import check_grad
 
 from cli.scenes import SECOND_ORDER_SHAFTS
+from laufruhe.files.reader import load
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_design import NOTHING_ASKED, mounting_in
 from laufruhe.problem.mount_values import excess, mount_value, whole_objective
-from laufruhe.problem.reader import load
+from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.certificate import Proof
 from laufruhe.solvers.mount_nonlinear import solve_joint
 from laufruhe.solvers.mount_program import JointProgram
 from laufruhe.solvers.mounts import solve_mounts

@@ -9,14 +9,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.phasing import Candidate
+from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.certificate import Proof
 from laufruhe.solvers.mount_program import JointProgram
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.throw_moves import ThrowMoves
 from mounts.files import BLOCK, MOUNTS, SAG, changed, problem_of
 
 ENGINE = """

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError
-from laufruhe.problem.reader import load
-from laufruhe.problem.study_parts import SweepTable
-from laufruhe.problem.study_reader import load_study
-from laufruhe.problem.study_sweeps import axis_of
+from laufruhe.files.reader import load
+from laufruhe.files.study_parts import SweepTable
+from laufruhe.files.study_reader import load_study
+from laufruhe.files.study_sweeps import axis_of
 from laufruhe.solvers import solve, state
 from laufruhe.studies import run
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed

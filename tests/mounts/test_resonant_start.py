@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 from laufruhe.cli import app
 from laufruhe.physics.elastic_mounts import ResonanceError
 from laufruhe.problem.evaluation import evaluate, measured
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.mount_values import whole_objective
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
 

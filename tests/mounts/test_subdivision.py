@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import InputError
+from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, remounted
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_values import excess, whole_objective
-from laufruhe.problem.reader import load
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.subdivision import _Search, divided_bound, divides
 from laufruhe.solvers import solve
-from laufruhe.solvers.subdivision import _Search, divided_bound, divides
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from laufruhe.files.reader import load
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.physics.mounting import mounting_of
 from laufruhe.problem.evaluation import evaluate, remounted
-from laufruhe.problem.model import Term
+from laufruhe.problem.measure import Quantity, Subject
 from laufruhe.problem.mount_design import MountMeasure
 from laufruhe.problem.mount_values import excess, whole_objective
-from laufruhe.problem.quantity import Quantity, Subject
-from laufruhe.problem.reader import load
+from laufruhe.problem.problem import Term
+from laufruhe.prove.transmitted_bound import least_transmitted, softest_of, transmitted_bound
 from laufruhe.solvers.mount_cones import covering
-from laufruhe.solvers.transmitted_bound import least_transmitted, softest_of, transmitted_bound
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

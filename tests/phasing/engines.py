@@ -3,8 +3,8 @@
 from functools import cache
 from pathlib import Path
 
-from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load
+from laufruhe.files.reader import load
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Result, solve
 from problem_files import loaded
 

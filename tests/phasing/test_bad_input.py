@@ -3,7 +3,7 @@
 import pytest
 
 from laufruhe.errors import InputError
-from laufruhe.problem.reader import load
+from laufruhe.files.reader import load
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from phasing import engines

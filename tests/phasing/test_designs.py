@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import InputError, SolverError
+from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.prove.certificate import Multipliers, Proof, lower_bound
 from laufruhe.solvers import solve
-from laufruhe.solvers.certificate import Multipliers, Proof, lower_bound
 from laufruhe.solvers.mixed_conic import solve_program
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.star_cuts import cut_of, owners_of, search_designs, solve_design
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_model import StarModel
 from phasing import engines
 
 TWO_SHAFTS = engines.shaft("against", -1) + engines.shaft("second", 2)

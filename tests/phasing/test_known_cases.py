@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from laufruhe.files.reader import load
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns, firing_lattice
 from laufruhe.machine.layouts import inline
 from laufruhe.physics.crank_stars import score_stars
 from laufruhe.physics.star_space import StarSpace
-from laufruhe.problem.reader import load
+from laufruhe.prove.certificate import Proof
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
-from laufruhe.solvers.certificate import Proof
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm, search_stars
 from phasing import engines

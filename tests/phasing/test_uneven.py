@@ -8,17 +8,17 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from laufruhe.files.reader import load
+from laufruhe.load_models.star_objective import amplitude_objective
+from laufruhe.load_models.uneven_model import Symbols, UnevenModel
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
-from laufruhe.problem.reader import load
+from laufruhe.prove.certificate import Proof
+from laufruhe.prove.uneven_bound import star_bounds, throw_costs, uneven_bound
 from laufruhe.solvers import solve
-from laufruhe.solvers.certificate import Proof
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_objective import amplitude_objective
 from laufruhe.solvers.star_search import search_stars
 from laufruhe.solvers.uneven import local_optimum
-from laufruhe.solvers.uneven_bound import star_bounds, throw_costs, uneven_bound
-from laufruhe.solvers.uneven_model import Symbols, UnevenModel
 from laufruhe.solvers.uneven_program import rides_of
 from phasing import engines
 

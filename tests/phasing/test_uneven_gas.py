@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import InputError
+from laufruhe.files.reader import load
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.load_models.uneven_gas import LEFT_OUT
+from laufruhe.load_models.uneven_model import Symbols, UnevenModel
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
-from laufruhe.problem.reader import load
 from laufruhe.solvers import solve
-from laufruhe.solvers.throw_moves import ThrowMoves
 from laufruhe.solvers.uneven import local_optimum
-from laufruhe.solvers.uneven_gas import LEFT_OUT
-from laufruhe.solvers.uneven_model import Symbols, UnevenModel
 from laufruhe.solvers.uneven_program import rides_of
 from phasing import engines
 

@@ -202,7 +202,7 @@ def test_pictures_need_no_pyplot_and_change_no_settings(tmp_path: Path) -> None:
     path = written(tmp_path, scenes.GIVEN)
     code = (
         "import sys; from pathlib import Path; import matplotlib as mpl; before = dict(mpl.rcParams)\n"
-        "from laufruhe.problem.reader import load; from laufruhe.solvers import state\n"
+        "from laufruhe.files.reader import load; from laufruhe.solvers import state\n"
         "from laufruhe.plots import draw\n"
         "draw(state(load(sys.argv[1])), Path(sys.argv[2]))\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"

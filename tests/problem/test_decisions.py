@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from laufruhe.machine import Role
 from laufruhe.physics.shaking_loads import rotating_loads, rotor_loads
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
 from problem_files import loaded, open_unbalance, shaft
 
 ENGINE = """

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import InputError
+from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.reader import load
 from problem_files import written
 
 SHARED = """

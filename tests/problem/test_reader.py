@@ -10,9 +10,9 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
+from laufruhe.files.reader import load
 from laufruhe.machine import Cycle, PressureTrace, Seiliger
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.reader import load
 from problem_files import FOUR, MOUNTS, changed, open_unbalance, shaft, written
 
 WHOLE = "".join([

@@ -12,8 +12,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from laufruhe.problem import schema
-from laufruhe.problem.reader import load
+from laufruhe.files import schema
+from laufruhe.files.reader import load
 
 FILES = sorted(
     path

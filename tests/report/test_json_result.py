@@ -13,7 +13,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from cli import scenes
-from laufruhe.problem.quantity import MEASURES, Quantity, Subject
+from laufruhe.problem.measure import MEASURES, Quantity, Subject
 from laufruhe.report.json_result import as_json
 from laufruhe.solvers import Result
 from report.result_schema import SCHEMA

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.mixed_norms import Norm, lengths
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.model import Drive, Limit, Problem, Term, UnbalanceDecision
-from laufruhe.problem.quantity import MASSES, Quantity, Subject
-from laufruhe.solvers.affine import AffineModel, AffineProblem
+from laufruhe.problem.measure import MASSES, Quantity, Subject
+from laufruhe.problem.problem import Drive, Limit, Problem, Term, UnbalanceDecision
 from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 
 # travel needs elastic mounts, and is tested with them

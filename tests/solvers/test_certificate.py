@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from laufruhe.load_models.affine import AffineNorm, AffineProblem
+from laufruhe.load_models.domain import Domain, domains_of
 from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.model import UnbalanceDecision
-from laufruhe.solvers.affine import AffineNorm, AffineProblem
-from laufruhe.solvers.certificate import Multipliers, best_bound, kkt_residual, lower_bound
-from laufruhe.solvers.domain import Domain, domains_of
+from laufruhe.problem.problem import UnbalanceDecision
+from laufruhe.prove.certificate import Multipliers, best_bound, kkt_residual, lower_bound
 
 Array = NDArray[np.float64]
 SEEDS = st.integers(0, 2**32 - 1)

@@ -15,10 +15,10 @@ import pytest
 from laufruhe.machine import Cycle, Engine
 from laufruhe.machine.layouts import Mechanism, build, vee
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.model import Drive, Term
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.problem.problem import Drive, Term
+from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.certificate import Proof
 from tractor import LAMBDA, MASS, RADIUS, SPACING, engine, free_unbalance, problem, shaft_rotor, web
 
 HALF = 0.5 * MASS * RADIUS

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from laufruhe import load
+from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.model import Limit, Problem
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.problem.problem import Limit, Problem
+from laufruhe.prove.certificate import lower_bound
 from laufruhe.solvers import solve
-from laufruhe.solvers.affine import AffineModel
-from laufruhe.solvers.certificate import lower_bound
 from laufruhe.solvers.conic import ConicProgram
 from laufruhe.solvers.direct_cones import solve_direct
 

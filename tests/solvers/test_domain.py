@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from laufruhe.problem.model import UnbalanceDecision
-from laufruhe.solvers.domain import Domain, domains_of
+from laufruhe.load_models.domain import Domain, domains_of
+from laufruhe.problem.problem import UnbalanceDecision
 
 Array = NDArray[np.float64]
 OFFSET = 3  # columns of others before this one

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.model import Limit, Problem, Term, UnbalanceDecision
-from laufruhe.problem.quantity import MEAN_MOUNT_FORCE, Quantity, Subject
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Quantity, Subject
+from laufruhe.problem.problem import Limit, Problem, Term, UnbalanceDecision
+from laufruhe.prove.certificate import Proof, best_bound, kkt_residual
 from laufruhe.solvers import Status, solve
-from laufruhe.solvers.affine import AffineModel
-from laufruhe.solvers.certificate import Proof, best_bound, kkt_residual
 from laufruhe.solvers.conic import ConicProgram
 from laufruhe.solvers.direct_cones import TIGHT
 from tractor import GAS, engine, free_unbalance, problem, shaft_rotor, web

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from cli import scenes
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
 from laufruhe.report.wording import explained, headline
 from laufruhe.solvers import Status, solve
-from laufruhe.solvers.certificate import Proof
 from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN, changed, problem_of
 
 YOKES = """

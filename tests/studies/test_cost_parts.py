@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError
-from laufruhe.problem.study_reader import load_study
+from laufruhe.files.study_reader import load_study
 from laufruhe.report.study_kinds import SHOWN
 from laufruhe.studies import run
 from laufruhe.studies.free_forces import printed_agree

@@ -15,8 +15,8 @@ from laufruhe.errors import ModelError, SolverError
 from laufruhe.machine.similarity import equal_power_scale
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.model import Limit, Problem
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.problem.problem import Limit, Problem
 from laufruhe.solvers import solve
 from laufruhe.studies.economics import Build, Claim, Standing, best, compared, front, shafts_of, with_shafts
 from laufruhe.studies.equal_power import at_equal_power, check_comparable

@@ -10,8 +10,8 @@ import pytest
 from laufruhe import load
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.model import Limit
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.problem.problem import Limit
 from laufruhe.solvers import solve
 from laufruhe.studies.speed_sweep import speed_sweep
 

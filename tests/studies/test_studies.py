@@ -22,10 +22,10 @@ import laufruhe.studies.scenes
 from laufruhe.cli import app
 from laufruhe.cli import study as cli_study
 from laufruhe.errors import InputError
-from laufruhe.problem.model import Limit
-from laufruhe.problem.reader import load
-from laufruhe.problem.study_parts import CaseTable
-from laufruhe.problem.study_reader import load_study
+from laufruhe.files.reader import load
+from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_reader import load_study
+from laufruhe.problem.problem import Limit
 from laufruhe.report.study_kinds import SHOWN
 from laufruhe.report.tractor_study import FIGURES, figure_files
 from laufruhe.solvers import solve

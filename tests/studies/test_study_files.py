@@ -9,11 +9,11 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError
-from laufruhe.problem.reader import load
-from laufruhe.problem.study_parts import CaseTable, SweepTable
-from laufruhe.problem.study_paths import field_at
-from laufruhe.problem.study_reader import load_study
-from laufruhe.problem.study_sweeps import axis_of
+from laufruhe.files.reader import load
+from laufruhe.files.study_parts import CaseTable, SweepTable
+from laufruhe.files.study_paths import field_at
+from laufruhe.files.study_reader import load_study
+from laufruhe.files.study_sweeps import axis_of
 from laufruhe.studies import Point, Scenes, run
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

@@ -22,8 +22,8 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError, elastic_mounting
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import gas_torque, reciprocating_loads, shaking_loads
-from laufruhe.problem.model import Term
-from laufruhe.problem.quantity import Quantity, Subject
+from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.problem.problem import Term
 from laufruhe.solvers import solve
 from many_digits import acceleration_orders
 

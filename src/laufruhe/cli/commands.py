@@ -18,7 +18,7 @@ from laufruhe.cli.screen import DONE, FAILED, exit_statuses, hand_out, progress
 from laufruhe.cli.solve import Answer, Request, checked_tolerance, json_file, show_result, solved, written
 
 if TYPE_CHECKING:
-    from laufruhe.problem.model import Problem
+    from laufruhe.problem.problem import Problem
     from laufruhe.solvers.result import Result
 
 app = typer.Typer(
@@ -119,7 +119,7 @@ def check(problem: ProblemArgument, json: JsonOption = None) -> None:
     Says what it leaves open; nothing is solved, and no results folder is made.
     """
     with exit_statuses(problem), ExitStack() as places:
-        from laufruhe.problem.reader import load
+        from laufruhe.files.reader import load
         from laufruhe.report import files
         from laufruhe.report.json_result import as_json
         from laufruhe.solvers import state

@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from laufruhe.errors import Complaint, InputError
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
 
 if TYPE_CHECKING:
-    from laufruhe.problem.automatic import Choice
+    from laufruhe.fidelity.automatic import Choice
 
 
 def explained(path: Path, tolerance: float) -> tuple[str, str]:
     """Text and JSON of what a scene needs."""
-    from laufruhe.problem.automatic import choose
-    from laufruhe.problem.mount_needs import needs
+    from laufruhe.fidelity.automatic import choose
+    from laufruhe.fidelity.mount_needs import needs
     from laufruhe.report import explain
 
     problem = _with_objective(path)
@@ -34,8 +34,8 @@ def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
     """Milliseconds of another design, as chosen and exact over the whole cycle."""
     import numpy as np
 
+    from laufruhe.load_models.batch import prepare
     from laufruhe.physics.fidelity import Fidelity
-    from laufruhe.solvers.batch import prepare
     from laufruhe.studies.trade import seconds
 
     whole = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
@@ -87,7 +87,7 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
 
 
 def _with_objective(path: Path) -> Problem:
-    from laufruhe.problem.reader import load
+    from laufruhe.files.reader import load
 
     problem = load(path)
     if not problem.objective and not problem.mount_design.terms:

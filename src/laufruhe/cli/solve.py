@@ -16,7 +16,7 @@ from laufruhe.cli.screen import complain
 from laufruhe.errors import Complaint, InputError, SolverError
 
 if TYPE_CHECKING:
-    from laufruhe.problem.model import Problem
+    from laufruhe.problem.problem import Problem
     from laufruhe.solvers.result import Result
 
 Answer = Callable[["Problem", Callable[[str], None]], "Result"]
@@ -42,7 +42,7 @@ class Request:
 
 def written(request: Request, answer: Answer, say: Callable[[str], None]) -> tuple[Result, Path]:
     """The result, its files in place, and the folder that they are in."""
-    from laufruhe.problem.reader import load
+    from laufruhe.files.reader import load
     from laufruhe.report import files
     from laufruhe.report.json_result import as_json
     from laufruhe.report.markdown import as_markdown

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from laufruhe.errors import Complaint, InputError
+from laufruhe.files.study_models import StudyFile
+from laufruhe.files.study_reader import load_study
 from laufruhe.numerics.cores import processors
-from laufruhe.problem.study_models import StudyFile
-from laufruhe.problem.study_reader import load_study
 from laufruhe.report import files
 from laufruhe.studies import run
 from laufruhe.studies.kept import NAME

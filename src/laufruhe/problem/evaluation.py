@@ -19,8 +19,8 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
+from laufruhe.problem.measure import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
+from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.evaluation import Evaluation, PointLoads, evaluate
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import mounting_in
 from laufruhe.problem.mount_values import whole_objective
+from laufruhe.problem.problem import Problem
 
 # of the way between the bounds of what is open: places that no two resonances share
 _PLACES = (0.5, 0.38, 0.71, 0.17, 0.93)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import (
     MountLimit,
     MountMeasure,
@@ -22,6 +21,7 @@ from laufruhe.problem.mount_design import (
     torque_roll_residual,
     total_stiffness,
 )
+from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 

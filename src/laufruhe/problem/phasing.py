@@ -15,7 +15,7 @@ from laufruhe.machine.firing import even_orders, star_throws
 from laufruhe.machine.layouts import Layout, even_throws
 
 if TYPE_CHECKING:
-    from laufruhe.problem.model import Problem
+    from laufruhe.problem.problem import Problem
 
 
 SOONEST = 1e-8

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from laufruhe.problem.automatic import Choice
-from laufruhe.problem.model import Problem
+from laufruhe.fidelity.automatic import Choice
+from laufruhe.problem.problem import Problem
 from laufruhe.report.strict_json import strict
 
 

@@ -13,6 +13,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.metrics import CycleMeasures
 from laufruhe.physics.shaking_loads import WRENCH
 from laufruhe.problem.evaluation import measured
+from laufruhe.prove.certificate import Proof
 from laufruhe.report.measures import (
     PRESENT,
     is_met,
@@ -24,7 +25,6 @@ from laufruhe.report.mounting import is_elastic, modes_as_dict
 from laufruhe.report.ranking import phasing_record
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
-from laufruhe.solvers.certificate import Proof
 from laufruhe.solvers.mount_result import objective_of
 from laufruhe.solvers.result import Result
 

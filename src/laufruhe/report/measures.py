@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.metrics import CycleMeasures, order_amplitude
 from laufruhe.problem.evaluation import Evaluation, PointLoads, measured
-from laufruhe.problem.model import Limit, Problem
+from laufruhe.problem.problem import Limit, Problem
 from laufruhe.solvers.mount_result import mount_limits
 from laufruhe.solvers.result import LimitValue, Result
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.problem.study_models import StudyFile
+from laufruhe.files.study_models import StudyFile
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
 from laufruhe.report.tractor_study import figure_files, write_figures

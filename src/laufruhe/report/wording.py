@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.report.measures import breaks_a_limit, changed
-from laufruhe.solvers.certificate import Certificate, Proof
 from laufruhe.solvers.result import DecisionValue, Result, Status
 from laufruhe.units import readable
 

@@ -8,8 +8,8 @@ from functools import partial
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.accuracy import error_of, solve_within
 from laufruhe.solvers.direct_cones import solve_direct
 from laufruhe.solvers.mount_result import objective_of

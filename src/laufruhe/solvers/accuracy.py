@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from laufruhe.problem.automatic import choose
-from laufruhe.problem.error_bounds import error_bound, reference
+from laufruhe.fidelity.automatic import choose
+from laufruhe.fidelity.error_bounds import error_bound, reference
 from laufruhe.problem.evaluation import Evaluation, objective_value
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
 
 _ROUNDS = 4

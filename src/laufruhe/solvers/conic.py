@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
+from laufruhe.load_models.affine import AffineNorm, AffineProblem, reach
+from laufruhe.load_models.domain import Domain
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.solvers.affine import AffineNorm, AffineProblem, reach
-from laufruhe.solvers.certificate import Multipliers
+from laufruhe.prove.certificate import Multipliers
 from laufruhe.solvers.direct_cones import TIGHT, ConicSolution
-from laufruhe.solvers.domain import Domain
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
+from laufruhe.load_models.star_model import StarNorm, StarProblem
 from laufruhe.numerics import mixed_norms
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.solvers.conic import held_norm, membership
-from laufruhe.solvers.star_model import StarNorm, StarProblem
 
 Array = NDArray[np.float64]
 

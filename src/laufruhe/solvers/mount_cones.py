@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
+from laufruhe.prove.transmitted_bound import Quadratic
 from laufruhe.solvers.mount_convex import (
     Compliance,
     ConvexDuals,
@@ -20,7 +21,6 @@ from laufruhe.solvers.mount_convex import (
     Linear,
     Residual,
 )
-from laufruhe.solvers.transmitted_bound import Quadratic
 
 Array = NDArray[np.float64]
 

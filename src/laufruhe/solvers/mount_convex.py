@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import (
     STIFFNESS,
     MountLimit,
@@ -38,7 +37,8 @@ from laufruhe.problem.mount_design import (
 )
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.mount_values import excess, whole_objective
-from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.mount_result import FEASIBLE, infeasible_mounts, mount_result
 from laufruhe.solvers.result import Result
 

@@ -10,15 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
+from laufruhe.load_models.domain import domains_of
+from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Certificate, Proof, gap_unit
+from laufruhe.prove.subdivision import Divided, divided_bound, divides
+from laufruhe.prove.transmitted_bound import transmitted_bound
 from laufruhe.solvers.accuracy import sampling_error
-from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
-from laufruhe.solvers.domain import domains_of
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mount_program import JointProgram
 from laufruhe.solvers.mount_result import (
@@ -31,9 +34,6 @@ from laufruhe.solvers.mount_result import (
 from laufruhe.solvers.mount_starts import columns_of, start_points, unbalances_of
 from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
-from laufruhe.solvers.subdivision import Divided, divided_bound, divides
-from laufruhe.solvers.throw_moves import ThrowMoves
-from laufruhe.solvers.transmitted_bound import transmitted_bound
 from laufruhe.solvers.unbalances import decision_values, solve_unbalances
 
 Array = NDArray[np.float64]

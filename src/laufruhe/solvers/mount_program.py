@@ -23,11 +23,17 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from laufruhe.errors import ModelError
+from laufruhe.load_models.affine import AffineModel
+from laufruhe.load_models.mount_loads import FixedThrows, Loads, MovedThrows
+from laufruhe.load_models.mount_rows import PointResponse, sampled_rows
+from laufruhe.load_models.mount_symbols import elimination, response, symbolic_mounts
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.load_models.uneven_model import UnevenModel
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.rigid_body import moved_wrench
-from laufruhe.problem.model import Problem
+from laufruhe.problem.measure import ON_MOUNTS, Quantity
 from laufruhe.problem.mount_design import (
     MountLimit,
     MountMeasure,
@@ -36,15 +42,9 @@ from laufruhe.problem.mount_design import (
     torque_roll_rows,
 )
 from laufruhe.problem.mount_resonance import objective_size, off_resonance
-from laufruhe.problem.quantity import ON_MOUNTS, Quantity
-from laufruhe.solvers.affine import AffineModel
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.gathered import Gathered
-from laufruhe.solvers.mount_loads import FixedThrows, Loads, MovedThrows
-from laufruhe.solvers.mount_rows import PointResponse, sampled_rows
-from laufruhe.solvers.mount_symbols import elimination, response, symbolic_mounts
 from laufruhe.solvers.nonlinear import NonlinearProgram, softened_lengths
-from laufruhe.solvers.throw_moves import ThrowMoves
-from laufruhe.solvers.uneven_model import UnevenModel
 from laufruhe.solvers.uneven_program import rides_of
 
 Array = NDArray[np.float64]

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_values import excess, limit_value, whole_objective
-from laufruhe.solvers.certificate import Certificate
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible
 
 Array = NDArray[np.float64]

@@ -16,14 +16,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError
+from laufruhe.load_models.star_model import StarModel
+from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.model import Problem, Term
+from laufruhe.problem.measure import MASSES, Quantity, Subject
 from laufruhe.problem.mount_design import NOTHING_ASKED
 from laufruhe.problem.mount_values import whole_objective
 from laufruhe.problem.phasing import Candidate, Method, Phasing
-from laufruhe.problem.quantity import MASSES, Quantity, Subject
-from laufruhe.solvers.certificate import FLOOR, Certificate, Proof
+from laufruhe.problem.problem import Problem, Term
+from laufruhe.prove.certificate import FLOOR, Certificate, Proof
 from laufruhe.solvers.mount_nonlinear import solve_moved
 from laufruhe.solvers.mounts import solve_mounts
 from laufruhe.solvers.phasing_result import names_of, no_result, phase_decisions
@@ -32,8 +34,6 @@ from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.star_answers import MOST_LISTED
 from laufruhe.solvers.star_cuts import search_designs
 from laufruhe.solvers.star_families import Family, families_of
-from laufruhe.solvers.star_model import StarModel
-from laufruhe.solvers.throw_moves import ThrowMoves
 from laufruhe.solvers.uneven import firing_intervals, starts_of
 
 MOST_SEARCHED = 3

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
+from laufruhe.load_models.domain import Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, remounted
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import NOTHING_ASKED
 from laufruhe.problem.mount_resonance import evaluate_start, objective_size, off_resonance
 from laufruhe.problem.mount_values import excess, whole_objective
-from laufruhe.solvers.domain import Domain, domains_of
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.nonlinear import spread_starts
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.unbalances import solve_unbalances

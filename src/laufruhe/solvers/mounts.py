@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from laufruhe.errors import SolverError
 from laufruhe.machine.layouts import Layout
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Phasing
-from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.phasing_result import final_result, names_of, no_design, no_result, phase_decisions, solve_fixed
 from laufruhe.solvers.ranking import ORDERS_LISTED, PhasingResult, RankedOrder, ranked_orders, ranked_star
 from laufruhe.solvers.result import ObjectiveValue, Result, Status

@@ -6,16 +6,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Candidate, Phasing
-from laufruhe.solvers.certificate import FLOOR, Certificate, Proof, gap_unit
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import FLOOR, Certificate, Proof, gap_unit
 from laufruhe.solvers.ranking import PhasingResult, RankedStar, ranked_orders, ranked_star
 from laufruhe.solvers.result import DecisionValue, ObjectiveValue, Result, Status
 from laufruhe.solvers.star_answers import Answer, Decided
 from laufruhe.solvers.star_cuts import owners_of, solve_design
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_model import StarModel
 from laufruhe.solvers.unbalances import solve_unbalances
 
 

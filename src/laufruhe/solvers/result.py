@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.model import Problem
-from laufruhe.solvers.certificate import Certificate
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.ranking import PhasingResult
 
 

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import SolverError
+from laufruhe.load_models.star_model import StarModel
+from laufruhe.load_models.star_objective import amplitude_objective
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import Method, Phasing
-from laufruhe.solvers.certificate import FLOOR
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import FLOOR
 from laufruhe.solvers.star_cuts import CutsFound, owners_of, search_designs, solve_design
 from laufruhe.solvers.star_families import Family
-from laufruhe.solvers.star_model import StarModel
-from laufruhe.solvers.star_objective import amplitude_objective
 from laufruhe.solvers.star_search import StarsFound, enumerate_stars, search_stars
 
 MOST_LISTED = 1_000_000

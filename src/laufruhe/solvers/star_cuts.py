@@ -15,14 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
+from laufruhe.load_models.domain import Domain
+from laufruhe.load_models.star_model import StarModel, StarProblem
 from laufruhe.numerics import mixed_norms
 from laufruhe.physics.crank_stars import Array, Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.phasing import ShaftChoice
-from laufruhe.solvers.affine import FEASIBLE, AffineNorm, AffineProblem
-from laufruhe.solvers.certificate import Multipliers, best_bound
-from laufruhe.solvers.domain import Domain
-from laufruhe.solvers.star_model import StarModel, StarProblem
+from laufruhe.prove.certificate import Multipliers, best_bound
 
 COARSE = 48
 _CHUNK = 1 << 17

@@ -10,15 +10,15 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm, AffineProblem
+from laufruhe.load_models.domain import Domain
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, evaluate, objective_value
-from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import MASSES
+from laufruhe.problem.measure import MASSES
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Bound, Certificate, Proof, best_bound, gap_unit, kkt_residual
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.affine import FEASIBLE, AffineModel, AffineNorm, AffineProblem
-from laufruhe.solvers.certificate import Bound, Certificate, Proof, best_bound, gap_unit, kkt_residual
 from laufruhe.solvers.direct_cones import ConicSolution
-from laufruhe.solvers.domain import Domain
 from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible
 
 Array = NDArray[np.float64]

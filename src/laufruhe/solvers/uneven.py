@@ -16,20 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.load_models.star_objective import amplitude_objective
+from laufruhe.load_models.uneven_model import UnevenModel
 from laufruhe.machine.firing import firing_turns, intervals_of
 from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.model import Problem
 from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, Phasing, bounded_stars
-from laufruhe.solvers.certificate import Certificate, Proof, gap_unit
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Certificate, Proof, gap_unit
+from laufruhe.prove.uneven_bound import steady_bound, uneven_bound
 from laufruhe.solvers.nonlinear import solve_nonlinear
 from laufruhe.solvers.phasing_result import no_result, phase_decisions, solve_fixed
 from laufruhe.solvers.ranking import PhasingResult, RankedStar, TradePoint, ranked_orders, ranked_star
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_objective import amplitude_objective
-from laufruhe.solvers.uneven_bound import steady_bound, uneven_bound
-from laufruhe.solvers.uneven_model import UnevenModel
 from laufruhe.solvers.uneven_program import UnevenProgram, rides_of
 
 Array = NDArray[np.float64]

@@ -10,16 +10,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.load_models.domain import Domain
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.load_models.uneven_model import Symbols, UnevenModel
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.model import Problem
+from laufruhe.problem.measure import Quantity
 from laufruhe.problem.phasing import Candidate, Intervals, Phasing
-from laufruhe.problem.quantity import Quantity
-from laufruhe.solvers.certificate import FLOOR
-from laufruhe.solvers.domain import Domain
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import FLOOR
 from laufruhe.solvers.nonlinear import NonlinearProgram
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.throw_moves import ThrowMoves
-from laufruhe.solvers.uneven_model import Symbols, UnevenModel
 
 Array = NDArray[np.float64]
 

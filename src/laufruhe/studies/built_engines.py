@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, Role, Rotor
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import MEAN_MOUNT_FORCE
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE
+from laufruhe.problem.problem import Problem
 from laufruhe.studies.tolerance import Tolerances
 
 Array = NDArray[np.float64]

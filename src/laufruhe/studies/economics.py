@@ -18,8 +18,8 @@ import xarray as xr
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.machine import Role
 from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.model import Limit, Problem
-from laufruhe.problem.quantity import MASSES, Quantity, Subject
+from laufruhe.problem.measure import MASSES, Quantity, Subject
+from laufruhe.problem.problem import Limit, Problem
 from laufruhe.solvers import solve
 
 MASS_ON_SHAFTS = Quantity(Subject.BALANCER_MASS, Norm.SUM)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
 from laufruhe.machine.similarity import EqualPowerScale, equal_power_scale
-from laufruhe.problem.model import Problem, UnbalanceDecision
+from laufruhe.problem.problem import Problem, UnbalanceDecision
 
 # what a decision's size is multiplied by when the engine is rebuilt, as powers of its unit
 _FRACTION, _MASS, _UNBALANCE = "", "kg", "kg m"

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
+from laufruhe.files.study_parts import SweptPartTable
+from laufruhe.files.study_sweeps import Axis, axis_of
 from laufruhe.problem.evaluation import Evaluation, measured
-from laufruhe.problem.model import Problem
-from laufruhe.problem.study_parts import SweptPartTable
-from laufruhe.problem.study_sweeps import Axis, axis_of
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve, state
 from laufruhe.solvers.result import Result
 from laufruhe.studies.scenes import Point

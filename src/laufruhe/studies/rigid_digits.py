@@ -22,8 +22,8 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.rigid_body import point_motion
 from laufruhe.physics.shaking_loads import gas_torque, plane_wrench
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import COMPONENTS, MASSES, Quantity, Subject
+from laufruhe.problem.measure import COMPONENTS, MASSES, Quantity, Subject
+from laufruhe.problem.problem import Problem
 
 DIGITS = 50
 STEPS, GAS_STEPS = 24, 360

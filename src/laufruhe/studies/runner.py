@@ -7,7 +7,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from laufruhe.problem.study_models import StudyFile
+from laufruhe.files.study_models import StudyFile
 from laufruhe.studies.kept import KeptPoints
 from laufruhe.studies.kinds import kind_of
 from laufruhe.studies.scenes import Scenes

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from laufruhe import __version__
 from laufruhe.errors import Complaint, InputError, ModelError
-from laufruhe.problem.model import Problem
-from laufruhe.problem.reader import load_tables, tables_of
-from laufruhe.problem.study_parts import CaseTable
-from laufruhe.problem.study_reader import scene_tables
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_reader import scene_tables
+from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
 
 if TYPE_CHECKING:

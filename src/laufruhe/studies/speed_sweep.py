@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.problem.model import Problem
-from laufruhe.solvers.affine import AffineModel
-from laufruhe.solvers.certificate import best_bound
+from laufruhe.load_models.affine import AffineModel
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import best_bound
 from laufruhe.solvers.direct_cones import solve_direct
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 

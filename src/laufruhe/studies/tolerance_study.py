@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.studies.built_engines import mean_mount_forces
 from laufruhe.studies.tolerance import CAUSES, Tolerances, nominal_force, random_forces, worst_parts
 from laufruhe.studies.tractor.verdict import NEGLIGIBLE, Verdict

@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
+from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, error_bound, reference
+from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.numerics import mixed_norms
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
-from laufruhe.problem.error_bounds import REFERENCE_SAMPLES, error_bound, reference
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
-from laufruhe.problem.model import Problem
 from laufruhe.problem.mount_design import mounting_in
 from laufruhe.problem.mount_values import whole_objective
-from laufruhe.solvers.affine import AffineModel, AffineNorm
+from laufruhe.problem.problem import Problem
 from laufruhe.studies.rigid_digits import RigidPart, rigid_part
 from laufruhe.studies.trade_ladder import TIME_ORDERS, TIME_SAMPLES, ladder
 from laufruhe.studies.trade_optima import is_open, optimum

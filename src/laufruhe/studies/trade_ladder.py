@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from laufruhe.fidelity.automatic import choose
+from laufruhe.fidelity.error_bounds import reference
+from laufruhe.fidelity.left_out import Scale, has_deficit, has_gas
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.automatic import choose
-from laufruhe.problem.error_bounds import reference
-from laufruhe.problem.left_out import Scale, has_deficit, has_gas
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
 
 AUTO = (1e-2, 1e-3, 1e-4)
 TIME_ORDERS, TIME_SAMPLES = 12, 360

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import Engine
-from laufruhe.problem.model import Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
-from laufruhe.solvers.affine import AffineModel
 from laufruhe.solvers.result import Status
 
 FOUND = (Status.OPTIMAL, Status.FEASIBLE)

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from laufruhe.errors import LaufruheError, SolverError
-from laufruhe.problem.study_parts import PartTable
+from laufruhe.files.study_parts import PartTable
 from laufruhe.studies.kinds import Record, kind_of
 from laufruhe.studies.scenes import Point, Scenes
 

@@ -25,7 +25,7 @@ import numpy as np
 import xarray as xr
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.study_costs import Judgement
+from laufruhe.files.study_costs import Judgement
 from laufruhe.studies.economics import Standing
 from laufruhe.studies.tractor.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 

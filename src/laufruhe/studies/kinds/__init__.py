@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from laufruhe.problem.study_parts import PartTable
+from laufruhe.files.study_parts import PartTable
 from laufruhe.studies.kinds import (
     balancer_sizing,
     counterweight_fraction,

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.problem.model import Problem
-from laufruhe.problem.quantity import MASSES, Quantity, counted_rotors
-from laufruhe.problem.study_models import BalancerSizingTable
+from laufruhe.files.study_models import BalancerSizingTable
+from laufruhe.problem.measure import MASSES, Quantity, counted_rotors
+from laufruhe.problem.problem import Problem
 from laufruhe.studies.economics import shafts_of, with_shafts
 from laufruhe.studies.kinds.kind import Kind
 from laufruhe.studies.kinds.swept import (

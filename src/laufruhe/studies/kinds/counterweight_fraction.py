@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.problem.study_models import CounterweightFractionTable
-from laufruhe.problem.study_paths import at
-from laufruhe.problem.study_sweeps import Axis
+from laufruhe.files.study_models import CounterweightFractionTable
+from laufruhe.files.study_paths import at
+from laufruhe.files.study_sweeps import Axis
 from laufruhe.studies.kinds.kind import Kind
 from laufruhe.studies.kinds.swept import answer, check_moved_by_loads, checked, combinations, refused
 from laufruhe.studies.outcome import axes_of, coordinates, dataset

@@ -8,10 +8,10 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.problem.complaints import nearest
-from laufruhe.problem.model import Problem
-from laufruhe.problem.study_costs import PLAIN, BuildTable, EconomicsTable
-from laufruhe.problem.study_parts import CaseTable
+from laufruhe.files.complaints import nearest
+from laufruhe.files.study_costs import PLAIN, BuildTable, EconomicsTable
+from laufruhe.files.study_parts import CaseTable
+from laufruhe.problem.problem import Problem
 from laufruhe.studies.economics import (
     Build,
     Claim,

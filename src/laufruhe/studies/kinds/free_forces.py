@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.problem.study_costs import FreeForcesTable
+from laufruhe.files.study_costs import FreeForcesTable
 from laufruhe.studies.free_forces import FreeLoad, Layout, compared, layout
 from laufruhe.studies.kinds.kind import Kind
 from laufruhe.studies.scenes import Point, Scenes

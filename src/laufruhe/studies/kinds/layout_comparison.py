@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.problem.study_models import LayoutComparisonTable
+from laufruhe.files.study_models import LayoutComparisonTable
 from laufruhe.studies.kinds.kind import Kind
 from laufruhe.studies.kinds.swept import answer, checked, combinations, refused
 from laufruhe.studies.outcome import axes_of, coordinates, dataset

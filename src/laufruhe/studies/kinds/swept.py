@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from laufruhe.errors import Complaint, InputError
-from laufruhe.problem.model import Problem
+from laufruhe.files.study_parts import CaseTable, SweptPartTable
 from laufruhe.problem.mount_design import MountMeasure
-from laufruhe.problem.study_parts import CaseTable, SweptPartTable
+from laufruhe.problem.problem import Problem
 from laufruhe.studies.outcome import axes_of, solved
 from laufruhe.studies.scenes import Point, Scenes
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.physics.metrics import cycle_measures
 from laufruhe.problem.evaluation import Evaluation, evaluate, mount_samples
-from laufruhe.problem.model import Drive, Problem, Term, UnbalanceDecision
-from laufruhe.problem.quantity import MEAN_MOUNT_FORCE
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE
+from laufruhe.problem.problem import Drive, Problem, Term, UnbalanceDecision
 from laufruhe.solvers import solve
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.shafts import SHAFT_PLACE

@@ -13,7 +13,7 @@ from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import gas_loads, reciprocating_loads, rod_inertia_loads
-from laufruhe.problem.model import Drive, UnbalanceDecision
+from laufruhe.problem.problem import Drive, UnbalanceDecision
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.designs import ASSUMED, given, optimum
 from laufruhe.studies.tractor.verdict import Verdict

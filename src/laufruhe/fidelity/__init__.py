@@ -1,0 +1,1 @@
+"""What of the physics a problem needs, chosen, explained and bounded."""

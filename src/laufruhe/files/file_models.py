@@ -1,0 +1,399 @@
+"""The problem file, key by key: what may stand where (docs/problem-files.md)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from laufruhe.files import fields as f
+from laufruhe.problem.measure import MASSES, MEASURES, Subject
+from laufruhe.problem.mount_design import MOUNT_NAMES
+
+LOAD_NAMES = tuple(f"{measure} {s}" for s in Subject if s not in MASSES for measure in MEASURES)
+MASS_NAMES = tuple(str(s) for s in MASSES)
+QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": [*LOAD_NAMES, *MASS_NAMES, *MOUNT_NAMES]})]
+Count: TypeAlias = Annotated[int, Field(ge=1, le=48)]
+CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
+FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
+Place: TypeAlias = Annotated[list[f.Length], Field(min_length=3, max_length=3)]
+Triple: TypeAlias = Annotated[list[f.NonNegative], Field(min_length=3, max_length=3)]
+Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60)]
+
+
+class Table(BaseModel):
+    """A TOML table that knows its keys and takes no others."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class RodTable(Table):
+    """The connecting rod as a rigid body."""
+
+    mass: f.PositiveMass
+    centre_of_gravity: f.Length = Field(description="Distance from the crank pin, on the line of the pins.")
+    inertia: f.Inertia = Field(description="About the centre of gravity.")
+
+
+class ShaftTable(Table):
+    """A crankshaft of a free list of parts."""
+
+    name: Name
+    ratio: f.Ratio = 1.0
+    position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
+
+
+class SliderCrankTable(Table):
+    """One slider-crank of a free list of parts; what it leaves out it takes from [engine]."""
+
+    x: f.Length
+    bank_angle: f.Angle = Field(default=0.0, description="Of the cylinder axis, from upright towards the left.")
+    throw: f.Angle = 0.0
+    firing_angle: f.Angle | None = Field(default=None, description="Crank angle at which it fires.")
+    shaft: str = "crankshaft"
+    stroke: f.PositiveLength | None = None
+    bore: f.PositiveLength | None = None
+    rod_ratio: f.NonNegative | None = None
+    rod_length: f.PositiveLength | None = None
+    offset: f.Length | None = None
+    reciprocating_mass: f.Mass | None = None
+    rotating_mass: f.Mass | None = None
+    rod_inertia_deficit: f.Inertia | None = None
+
+
+class EngineTable(Table):
+    """What the engine is."""
+
+    layout: Literal["inline", "vee", "boxer", "opposed-piston", "parts"]
+    cycle: Literal["two-stroke", "four-stroke"]
+    cylinders: Count | None = Field(default=None, description="Told by throws or firing order where left out.")
+    bore: f.PositiveLength | None = Field(default=None, description="Needed with gas.")
+    stroke: f.PositiveLength
+    rod_ratio: f.NonNegative | None = Field(
+        default=None, description="Crank radius over rod length; 0 is a Scotch yoke."
+    )
+    rod_length: f.PositiveLength | None = None
+    offset: f.Length = Field(default=0.0, description="Of the pin's path from the crank axis.")
+    reciprocating_mass: f.Mass = Field(description="Per cylinder, with the rod's share unless [engine.rod] is given.")
+    rotating_mass: f.Mass = Field(default=0.0, description="Per throw, at the crank radius.")
+    rod: RodTable | None = None
+    rod_inertia_deficit: f.Inertia = Field(default=0.0, description="True inertia less that of the two masses.")
+    cylinder_spacing: f.PositiveLength | None = Field(
+        default=None, description="Between throws; in a boxer, of a bank."
+    )
+    bank_angle: f.OpenAngle | None = Field(default=None, description="Between the banks of a vee.")
+    split_pin_angle: f.OpenAngle | None = Field(default=None, description="By which the right bank's pin leads.")
+    bank_stagger: f.Length | None = None
+    crank_distance: f.PositiveLength | None = Field(default=None, description="Of the two cranks of opposed pistons.")
+    crank_ratio: Literal[1, -1] | None = Field(
+        default=None, description="Of the second crank of opposed pistons; -1, against the first, where left out."
+    )
+    crank_lead: f.Angle = Field(default=0.0, description="By which the second crank of opposed pistons leads.")
+    throws: f.Throws | None = Field(default=None, description="At phi = 0; even firing where left out.")
+    firing_order: FiringOrder | None = None
+    shafts: list[ShaftTable] = Field(default_factory=list)
+    slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
+
+    @property
+    def given_throws(self) -> list[float] | None:
+        """Throws, where every one is a number."""
+        if self.throws is None or self.throws == "open":
+            return None
+        angles = [angle for angle in self.throws if isinstance(angle, float)]
+        return angles if len(angles) == len(self.throws) else None
+
+    @property
+    def given_order(self) -> list[int] | None:
+        """Firing order, where it is a list."""
+        return None if self.firing_order is None or self.firing_order == "open" else self.firing_order
+
+    @property
+    def given_bank(self) -> float | None:
+        """Bank angle, where it is a number."""
+        return self.bank_angle if isinstance(self.bank_angle, float) else None
+
+    @property
+    def given_split(self) -> float | None:
+        """Angle between split pins, where it is a number."""
+        return self.split_pin_angle if isinstance(self.split_pin_angle, float) else None
+
+
+class IntervalsTable(Table):
+    """Bounds on the crank angle from each firing to the next."""
+
+    min: f.Angle | None = None
+    max: f.Angle | None = None
+    largest_deviation: f.Angle | None = Field(default=None, description="From equal intervals.")
+
+
+class PhasingTable(Table):
+    """How open throws, firing orders and shafts are decided."""
+
+    phases: Annotated[int, Field(ge=1, le=96)] | None = Field(
+        default=None, description="Equal steps of a turn that throws stand on; those of even firing where left out."
+    )
+    intervals: IntervalsTable | None = Field(default=None, description="Even firing where left out.")
+    best: Annotated[int, Field(ge=1, le=200)] = Field(default=10, description="How many stars are ranked.")
+    rank_orders_by: list[Literal["roll moment", "neighbours", "longest gap"]] = Field(
+        default=["neighbours", "longest gap"], min_length=1, description="Of firing orders; the first counts most."
+    )
+    most_shafts: Annotated[int, Field(ge=0, le=48)] | None = Field(
+        default=None, description="Optional balancer shafts that may be built."
+    )
+    most_shaft_mass: f.Mass | None = Field(default=None, description="Of the optional shafts that are built.")
+    time_limit: f.Time = Field(default=600.0, description="Of the search.")
+    method: Literal["auto", "search", "program", "enumeration"] = "auto"
+
+
+class OperatingPointTable(Table):
+    """A speed and a load."""
+
+    name: Name | None = None
+    speed: f.Speed | None = None
+    mean_piston_speed: f.PistonSpeed | None = None
+    imep: f.Pressure | None = Field(default=None, description="In place of that of [gas].")
+    motored: bool = Field(default=False, description="The charge is compressed and gets no heat.")
+    gas: bool = Field(default=True, description="false leaves the gas out altogether.")
+    up_to: f.Speed | None = Field(default=None, description="Last speed of a range that starts at speed.")
+    steps: Annotated[int, Field(ge=2, le=1000)] | None = Field(default=None, description="Speeds in the range.")
+    weight: f.Positive = 1.0
+
+
+class ChargeTable(Table):
+    """What every computed cycle says of the charge and of the gas exchange."""
+
+    compression_ratio: f.Positive | None = None
+    intake_pressure: f.PositivePressure | None = None
+    exhaust_pressure: f.PositivePressure | None = None
+    crankcase_pressure: f.PositivePressure | None = None
+
+
+class SeiligerTable(ChargeTable):
+    """Mixed cycle, its cut-off solved for the indicated mean pressure."""
+
+    model: Literal["seiliger"]
+    peak_pressure: f.PositivePressure
+    imep: f.Pressure
+    compression_exponent: f.Positive | None = None
+    expansion_exponent: f.Positive | None = None
+
+
+class WiebeTable(ChargeTable):
+    """Finite heat release, the heat solved for the indicated mean pressure."""
+
+    model: Literal["wiebe"]
+    imep: f.Pressure
+    start: f.Angle
+    duration: f.Angle
+    shape: f.NonNegative | None = None
+    completeness: f.Positive | None = None
+    heat_ratio: f.Positive | None = None
+
+
+class TraceTable(Table):
+    """A measured trace: a CSV file of crank angle after the firing dead centre and absolute pressure."""
+
+    model: Literal["trace"]
+    file: str
+    pressure_unit: str = "bar"
+    angle_unit: str = "deg"
+    crankcase_pressure: f.PositivePressure | None = None
+
+
+GasTable: TypeAlias = Annotated[SeiligerTable | WiebeTable | TraceTable, Field(discriminator="model")]
+
+
+class BlockTable(Table):
+    """The rigid body that elastic mounts carry."""
+
+    mass: f.PositiveMass = Field(description="Everything that the mounts carry, moving parts included.")
+    centre_of_gravity: Place = Field(default=[0.0, 0.0, 0.0])
+    inertia: Annotated[list[f.Inertia], Field(min_length=3, max_length=3)] = Field(
+        description="About x, y and z through the centre of gravity."
+    )
+    inertia_products: Annotated[list[f.Inertia], Field(min_length=3, max_length=3)] = Field(
+        default=[0.0, 0.0, 0.0], description="Entries xy, xz, yz of the tensor: xy = - integral of x y dm."
+    )
+
+
+class StopTable(Table):
+    """A bump stop along each of the mount's own axes; it acts in run-ups."""
+
+    gap: f.PositiveLength
+    stiffness: f.Stiffness
+
+
+class MountTable(Table):
+    """One mount."""
+
+    name: Name | None = None
+    position: Annotated[list[f.OpenLength], Field(min_length=3, max_length=3)] | None = None
+    relative_stiffness: Triple | None = Field(default=None, description="Along its own x, y, z; 0 carries nothing.")
+    turned: Annotated[list[f.OpenAngle], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="Turns about x, then y, then z that bring the axes of C2 to its own."
+    )
+    stiffness: Annotated[list[f.OpenStiffness], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="Along its own x, y, z."
+    )
+    loss_factor: f.OpenLossFactor | None = Field(
+        default=None, description="Damping work over deformation work over 2 pi."
+    )
+    damping: Annotated[list[f.OpenDamping], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="Viscous, along its own x, y, z."
+    )
+    like: Name | None = Field(default=None, description="Stiffness, loss and damping follow those of this mount.")
+    mirror_of: Name | None = Field(default=None, description="All follows this mount, mirrored in the plane y = 0.")
+    stop: StopTable | None = None
+
+
+class MountsTable(Table):
+    """How the engine is held."""
+
+    kind: Literal["rigid", "elastic"] = "rigid"
+    positions: list[Place] = Field(default_factory=list)
+    names: list[Name] | None = None
+    relative_stiffness: Triple = Field(default=[0.0, 1.0, 1.0], description="Of every rigid mount that gives none.")
+    stiffness: Annotated[list[f.Stiffness], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="Of every elastic mount that gives none."
+    )
+    loss_factor: f.LossFactor = Field(default=0.0, description="Of every elastic mount that gives none.")
+    stop: StopTable | None = None
+    places: list[MountTable] = Field(default_factory=list)
+
+
+class CounterweightTable(Table):
+    """A counterweight on the crankshaft, or one opposite every throw."""
+
+    name: Name
+    balance_fraction: f.Fraction | None = Field(
+        default=None, description="kappa: rotating mass and this share of the reciprocating mass, opposite each throw."
+    )
+    throws: list[CylinderNumber] | None = None
+    x: f.Length | None = None
+    opposite_throw: CylinderNumber | None = Field(default=None, description="Angle and place are counted from it.")
+    unbalance: f.OpenUnbalance | None = None
+    mass: f.OpenMass | None = None
+    radius: f.PositiveLength | None = None
+    angle: f.OpenAngle = 0.0
+
+
+class CoupledTable(Table):
+    """Follows another unbalance."""
+
+    to: str
+    how: Literal["equal", "opposite", "mirrored", "mirrored opposite"] = Field(alias="as")
+
+
+class UnbalanceTable(Table):
+    """One unbalance of a shaft."""
+
+    name: Name | None = None
+    x: f.Length = 0.0
+    unbalance: f.OpenUnbalance | None = None
+    mass: f.OpenMass | None = None
+    radius: f.PositiveLength | None = None
+    angle: f.OpenAngle = 0.0
+    coupled: CoupledTable | None = None
+
+
+class BalancerShaftTable(Table):
+    """A balancer shaft."""
+
+    name: Name
+    ratio: f.Ratio
+    position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
+    unbalances: list[UnbalanceTable] = Field(min_length=1)
+    optional: bool = Field(default=False, description="Whether it is built is decided too.")
+    shaft_mass: f.Mass = Field(default=0.0, description="Of an optional shaft, its unbalances not included.")
+
+
+class QuantityTable(Table):
+    """What part of a quantity counts."""
+
+    mounts: list[str] | None = None
+    operating_points: list[str] | None = None
+    orders: list[f.NonNegative] | None = None
+    direction_weights: Triple | None = None
+    motions: list[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = Field(
+        default=None, description="That are to have a mode of their own."
+    )
+    frequency: f.Frequency | None = Field(default=None, description="Wanted about the torque-roll axis.")
+
+
+class TermTable(QuantityTable):
+    """One part of a weighted objective."""
+
+    quantity: QuantityName
+    weight: f.Positive = 1.0
+
+
+class ObjectiveTable(QuantityTable):
+    """What is to be least: one quantity, or a weighted sum of terms."""
+
+    minimise: QuantityName | None = None
+    terms: list[TermTable] = Field(default_factory=list)
+
+
+class ConstraintTable(QuantityTable):
+    """A limit on a quantity."""
+
+    limit: QuantityName
+    max: f.Side | None = Field(default=None, description="With the unit of the quantity.", examples=["6 kg"])
+    min: f.Side | None = Field(default=None, description="Of natural frequencies, decoupling or sag.")
+    outside: Annotated[list[f.Side], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="A band that holds no natural frequency.", examples=[["12 Hz", "20 Hz"]]
+    )
+    name: Name | None = None
+    of: list[str] | None = Field(default=None, description="Counterweights or balancers whose mass counts.")
+
+
+class FidelityTable(Table):
+    """Speed against accuracy."""
+
+    kinematics: Literal["exact", "two-order", "auto"] = Field(
+        default="exact", description="auto: the cheapest choice that keeps the objective within the tolerance."
+    )
+    tolerance: f.Positive | None = Field(default=None, description="Relative error of the objective, for auto.")
+    samples: int | None = Field(default=None, ge=48, le=100_000, description="Steps over the working cycle.")
+    orders: int | None = Field(default=None, ge=1, description="Last order kept of pistons, rods and gas.")
+    rod: Literal["rigid", "mass-only"] | None = None
+    gas: bool | None = Field(default=None, description="false leaves the working gas out.")
+    gas_samples: int | None = Field(default=None, ge=48, le=100_000, description="Steps for the gas torque.")
+    crank_inertia: f.PositiveInertia | None = Field(
+        default=None, description="Of all that turns with the crank: its speed varies within the cycle."
+    )
+    mounts: Literal["frequency", "rigid", "time"] | None = Field(
+        default=None, description="Elastic mounts order by order, as if they gave no way, or integrated in time."
+    )
+    modes: list[int] | None = Field(default=None, description="Natural modes that answer, 1 the lowest.")
+
+
+class SearchTable(Table):
+    """How many points a search starts from where the problem is not convex."""
+
+    starts: int = Field(default=16, ge=1, le=10_000)
+    seed: int = Field(default=0, ge=0)
+    boxes: int | None = Field(
+        default=None, ge=0, le=1_000_000, description="That bounds of stiffness may be divided into for a proof."
+    )
+
+
+class ProblemFile(Table):
+    """A whole problem file."""
+
+    title: str = Field(min_length=1)
+    source: str = ""
+    assumptions: list[str] = Field(default_factory=list)
+    tolerance: f.Positive = Field(default=1e-4, description="Relative gap at which an optimum counts as proven.")
+    engine: EngineTable
+    phasing: PhasingTable | None = None
+    operating_points: list[OperatingPointTable] = Field(min_length=1)
+    gas: GasTable | None = None
+    mounts: MountsTable | None = None
+    block: BlockTable | None = None
+    counterweights: list[CounterweightTable] = Field(default_factory=list)
+    balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
+    objective: ObjectiveTable | None = None
+    constraints: list[ConstraintTable] = Field(default_factory=list)
+    fidelity: FidelityTable = Field(default_factory=FidelityTable)
+    search: SearchTable = Field(default_factory=SearchTable)

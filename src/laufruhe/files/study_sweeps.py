@@ -1,0 +1,145 @@
+"""What is swept: the values as a problem file has them, and as numbers with a unit for axes and tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe import units
+from laufruhe.files.complaints import Refused, measured
+from laufruhe.files.study_parts import SweepTable, Value
+from laufruhe.files.study_paths import field_at
+
+MOST_POINTS = 100_000
+_DIGITS = 12
+_SIDES = {"max": "at most", "min": "at least"}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One swept quantity.
+
+    Attributes
+    ----------
+    quantity
+        Path in the problem file.
+    values
+        As they are put into the problem file.
+    unit
+        As the study file writes it; "1" of plain numbers, "" of labels.
+    numbers
+        Values in that unit; None where they are labels.
+    """
+
+    quantity: str
+    values: tuple[Value, ...]
+    unit: str
+    numbers: tuple[float, ...] | None
+
+    @property
+    def name(self) -> str:
+        """The end of the path, as a reader says it: a place goes with its list, a side with its limit."""
+        *before, last = self.quantity.replace("_", " ").split(".")
+        if before and last.isdigit():
+            return f"{before[-1]} {last}"
+        if before[:1] == ["constraints"]:
+            of = f"limit {before[1]}" if before[1].isdigit() else before[1]
+            return f"{of}, {_SIDES.get(last, last)}"
+        return last
+
+    def by_value(self) -> dict[Value, float]:
+        """Numbers of the values; none where these are labels."""
+        return dict(zip(self.values, self.numbers, strict=True)) if self.numbers is not None else {}
+
+
+def axis_of(sweep: SweepTable) -> Axis:
+    """The values of a sweep and their unit.
+
+    Raises
+    ------
+    Refused
+        If it is empty, holds one value or one twice, or mixes what does not fit.
+    """
+    spaced = (sweep.first, sweep.last, sweep.points)
+    if sweep.values is None:
+        values, given = _spaced(sweep), "points"
+    elif any(value is not None for value in (*spaced, sweep.spacing)):
+        raise Refused("values", None, "are given beside from, to, points or spacing", "give one or the other")
+    else:
+        values, given = tuple(sweep.values), "values"
+    if len(values) < 2:
+        rule = "holds one value, which is no sweep" if values else "is empty"
+        raise Refused(given, list(values), rule, "give two values or more, or leave the sweep out")
+    unit, numbers = _measured(sweep.quantity, values, given)
+    # 1 and true are equal in Python, and 6 m/s is 6000 mm/s
+    told_apart = numbers if numbers is not None else tuple(str(value) for value in values)
+    if len(set(told_apart)) < len(values):
+        raise Refused(given, list(values), "names a value twice", "name each once")
+    return Axis(sweep.quantity, values, unit, numbers)
+
+
+def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
+    ends = {"from": sweep.first, "to": sweep.last, "points": sweep.points}
+    missing = [key for key, value in ends.items() if value is None]
+    if len(missing) == len(ends):
+        raise Refused("values", None, "is missing", "add values, or from, to and points")
+    if sweep.first is None or sweep.last is None or sweep.points is None:
+        raise Refused(missing[0], None, "is missing", "a spaced sweep needs from, to and points")
+    if sweep.points < 2:
+        raise Refused("points", sweep.points, "makes no sweep", "give two points or more")
+    if sweep.points > MOST_POINTS:
+        raise Refused("points", sweep.points, f"is more than {MOST_POINTS}", "give fewer")
+    unit, (low, high) = _ends(sweep.quantity, sweep.first, sweep.last)
+    if low >= high:
+        rule = "equals to, which is no sweep" if low == high else "lies above to"
+        raise Refused("from", sweep.first, rule, "write the smaller end first")
+    if sweep.spacing == "log":
+        if low <= 0.0:
+            raise Refused("from", sweep.first, "is not above zero, so it has no logarithm", 'leave spacing = "log" out')
+        numbers = np.geomspace(low, high, sweep.points)
+    else:
+        numbers = np.linspace(low, high, sweep.points)
+    texts = [f"{number:.{_DIGITS}g}" for number in numbers]
+    if not isinstance(sweep.first, str) or (unit == "1" and not _is_limit(sweep.quantity)):
+        return tuple(float(text) for text in texts)
+    return tuple(texts) if unit == "1" else tuple(f"{text} {unit}" for text in texts)
+
+
+def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, ...]]:
+    unit, numbers = _measured(quantity, (first, last), "from")
+    if numbers is None:
+        raise Refused("from", first, "is no number", "list the labels under values")
+    return unit, numbers
+
+
+def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str, tuple[float, ...] | None]:
+    """Unit of the first value, and all values in it; no numbers where they are labels."""
+    field = field_at(quantity)
+    if any(isinstance(value, float) and not math.isfinite(value) for value in values):
+        raise Refused(given, list(values), "is not finite", "give numbers")
+    plain = [float(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+    texts = [value for value in values if isinstance(value, str)]
+    wanted = field.unit if field is not None else _limited_unit(quantity, texts)
+    if wanted is None or len(plain) + len(texts) < len(values):
+        return ("1", tuple(plain)) if len(plain) == len(values) else ("", None)
+    if not texts:
+        return "deg" if field is not None and field.plain is not None else "1", tuple(plain)
+    if plain:
+        raise Refused(given, list(values), "mixes numbers with and without a unit", "write all alike")
+    numbers = tuple(measured(text, wanted, given) for text in texts)
+    unit = units.unit_of(texts[0])
+    one = units.parse(f"1 {unit}", wanted)
+    return unit or "1", tuple(float(f"{number / one:.{_DIGITS}g}") for number in numbers)
+
+
+def _is_limit(quantity: str) -> bool:
+    """Whether a path is that of a side of a limit, whose dimension is told by its text alone."""
+    first, *_, last = quantity.split(".")
+    return first == "constraints" and last in _SIDES
+
+
+def _limited_unit(quantity: str, texts: Sequence[str]) -> str | None:
+    return units.dimension_of(texts[0]) if texts and _is_limit(quantity) else None

@@ -1,0 +1,1 @@
+"""From decisions to loads: one protocol, affine and smooth views."""

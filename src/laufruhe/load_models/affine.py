@@ -1,0 +1,264 @@
+"""A problem as norms of rows that are affine in its decisions, with numbers from the exact model (P1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.domain import Domain, domains_of
+from laufruhe.machine import Engine, OperatingPoint, Rotor
+from laufruhe.numerics import mixed_norms
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
+from laufruhe.physics.shaking_loads import added_rotor_loads
+from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.measure import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
+from laufruhe.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+NEEDED = 1e3
+FEASIBLE = 1e-6
+"""Relative excess over a limit that counts as none."""
+
+
+@dataclass(frozen=True, eq=False)
+class AffineNorm:
+    """N(V0 + B x) with weights of its rows.
+
+    Attributes
+    ----------
+    constant
+        V0, shape (k, d).
+    slope
+        B, shape (k, d, n).
+    weights
+        Shape (k,).
+    """
+
+    norm: Norm
+    constant: Array
+    slope: Array
+    weights: Array
+
+    def rows(self, x: Array) -> Array:
+        """V0 + B x, shape (k, d)."""
+        moved = self.slope.reshape(self.constant.size, len(x)) @ x
+        return self.constant + moved.reshape(self.constant.shape)
+
+    def value(self, x: Array) -> float:
+        """The norm at x."""
+        return mixed_norms.value(self.norm, self.weights, self.rows(x))
+
+
+@dataclass(frozen=True, eq=False)
+class AffineProblem:
+    """Least sum of weighted norms, some norms limited, each decision in its own set.
+
+    Attributes
+    ----------
+    terms
+        (weight, norm) pairs.
+    limits
+        (maximum, norm) pairs.
+    domains
+        Of the decisions.
+    samples
+        Steps over the period of the load rows.
+    """
+
+    terms: tuple[tuple[float, AffineNorm], ...]
+    limits: tuple[tuple[float, AffineNorm], ...]
+    domains: tuple[Domain, ...]
+    samples: int
+
+    @property
+    def size(self) -> int:
+        """Length of the decision vector."""
+        return sum(domain.width for domain in self.domains)
+
+    @property
+    def scales(self) -> Array:
+        """Largest size of every column."""
+        return np.concatenate([np.full(d.width, d.scale) for d in self.domains]) if self.domains else np.zeros(0)
+
+    @cached_property
+    def units(self) -> Array:
+        """A size of every column for a solver: its bound, or a thousand times what all loads need if that is less.
+
+        Bounds that are far apart would else leave no digits for the small ones.
+        """
+        norms = [norm for _, norm in (*self.terms, *self.limits)]
+        constants = [float(np.linalg.norm(norm.constant)) for norm in norms]
+        squares = [np.einsum("kdn,kdn->n", norm.slope, norm.slope) for norm in norms]
+        found = []
+        for domain in self.domains:
+            own = [math.sqrt(float(square[domain.columns].sum())) for square in squares]
+            needs = [constant / size for constant, size in zip(constants, own, strict=True) if size > 0.0]
+            needed = NEEDED * max(needs, default=0.0)
+            found.append(np.full(domain.width, min(domain.scale, needed) if needed > 0.0 else domain.scale))
+        return np.concatenate(found) if found else np.zeros(0)
+
+    def objective(self, x: Array) -> float:
+        """Weighted sum of the terms."""
+        return sum(weight * norm.value(x) for weight, norm in self.terms)
+
+    def excess(self, x: Array) -> float:
+        """Largest relative excess over a limit, negative where all have room; zero without limits."""
+        return max(((norm.value(x) - maximum) / (maximum or 1.0) for maximum, norm in self.limits), default=0.0)
+
+
+def reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
+    """A size of these norms that is not zero: at no decisions, or at large ones."""
+    sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
+    sizes += [float(np.abs(norm.slope * problem.units).max(initial=0.0)) for norm in norms]
+    return max(sizes, default=0.0) or 1.0
+
+
+class AffineModel:
+    """Spectra of the design without its decisions, and of each decision alone.
+
+    Rows at any number of samples follow from them without evaluating the engine again.
+
+    Parameters
+    ----------
+    whole_cycle
+        Rows over the whole working cycle, even where the loads repeat within it.
+
+    Attributes
+    ----------
+    bare
+        The design with every decision at zero.
+    """
+
+    def __init__(self, problem: Problem, keep_all: bool = False, whole_cycle: bool = False) -> None:
+        self.problem = problem
+        # components that are zero are dropped, unless models are to be added up
+        self._keep_all = keep_all
+        self.domains = domains_of(problem.decisions)
+        bare = evaluate(problem, problem.design([0.0] * len(problem.decisions)))
+        if problem.fidelity.mounts == "time" and problem.engine.block is not None:
+            raise ModelError(NO_MAP)
+        mounting = mounting_of(problem.engine, problem.fidelity)
+        changes = [_change(problem, k, direction) for k, d in enumerate(self.domains) for direction in d.directions]
+        self.bare, self._changes = bare, changes
+        orders = [as_order(abs(r.shaft.ratio)) for rotors in changes for r in rotors]
+        self._slopes = {
+            subject: [
+                [_slope(rotors, point, problem.engine, mounting, subject, problem.fidelity) for rotors in changes]
+                for point in problem.points
+            ]
+            for subject in self._subjects(mounting)
+        }
+        self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
+
+    def _subjects(self, mounting: Mounting | None) -> tuple[Subject, ...]:
+        travels = self.problem.engine.block is not None
+        return (Subject.SHAKING_FORCE, *((Subject.MOUNT_FORCE,) if mounting else ()),
+                *((Subject.MOUNT_TRAVEL,) if mounting and travels else ()))  # fmt: skip
+
+    def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
+        used = [loads.wrench.reduced(tuple(orders)).base for loads in bare.loads]
+        return common_base(used)
+
+    @property
+    def full_samples(self) -> int:
+        """Steps of the problem's fidelity that fall into one period of the loads."""
+        cycle = self.problem.engine.cycle
+        return max(int(self.problem.fidelity.samples * float(cycle.base_order / self.base)), 24)
+
+    def at(self, samples: int, averaged: bool = False) -> AffineProblem:
+        """The problem with its load rows at `samples` steps over their common period.
+
+        Rows of means may be averaged about their angles: what bounds these, bounds the
+        whole cycle (P7).
+        """
+        problem = self.problem
+        terms = tuple((term.weight, self.norm(term.quantity, samples, averaged)) for term in problem.objective)
+        limits = tuple((limit.maximum, self.norm(limit.quantity, samples, averaged)) for limit in problem.limits)
+        return AffineProblem(terms, limits, self.domains, samples)
+
+    def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
+        """Per operating point the wrench of the bare design, and of one unit of every column."""
+        slopes = self._slopes[Subject.SHAKING_FORCE]
+        return [(loads.wrench, tuple(by)) for loads, by in zip(self.bare.loads, slopes, strict=True)]
+
+    def norm(self, quantity: Quantity, samples: int, averaged: bool = False) -> AffineNorm:
+        """A quantity at `samples` steps over the common period, a mean averaged about them where asked."""
+        if quantity.subject in MASSES:
+            bare = mass_rows(quantity, self.bare.engine.rotors)
+            slopes = [mass_rows(quantity, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]
+            return _stacked(bare, slopes, self._keep_all)
+        subject = quantity.subject if quantity.subject in ON_MOUNTS else Subject.SHAKING_FORCE
+        averaged = averaged and quantity.norm is Norm.SUM
+        bare = self._rows(quantity, [loads.signal(quantity.subject) for loads in self.bare.loads], samples, averaged)
+        by_point = self._slopes[subject]
+        slopes = [
+            self._rows(quantity, [by_point[p][k] for p in range(len(by_point))], samples, averaged).vectors
+            for k in range(len(self._changes))
+        ]
+        return _stacked(bare, slopes, self._keep_all)
+
+    def _rows(self, quantity: Quantity, signals: Sequence[Spectrum], samples: int, averaged: bool) -> Rows:
+        finest = common_base([self.base, *(signal.base for signal in signals)])
+        step = int(self.base / finest)
+        period = [Spectrum(self.base, s.rebased(finest).coefficients[::step]) for s in signals]
+        if averaged:
+            period = [_averaged(signal, samples) for signal in period]
+        names = [mount.name for mount in self.problem.engine.mounts]
+        return load_rows(quantity, self.problem.points, period, names, samples)
+
+
+def _averaged(signal: Spectrum, samples: int) -> Spectrum:
+    """Averages under a triangle that falls to zero one step to either side: sinc^2 times each order (P7)."""
+    c = signal.coefficients
+    share = np.sinc(np.arange(len(c)) / samples) ** 2
+    return Spectrum(signal.base, c * share.reshape(-1, *(1,) * (c.ndim - 1)))
+
+
+def _change(problem: Problem, k: int, direction: complex) -> tuple[Rotor, ...]:
+    """The rotors that one unit of one column makes, others left out."""
+    by_name = {rotor.name: rotor for rotor in problem.engine.rotors}
+    return tuple(
+        replace(by_name[drive.rotor], unbalance=drive.gain * (direction.conjugate() if drive.mirrored else direction))
+        for drive in problem.decisions[k].drives
+    )
+
+
+def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
+    """All rotors of an engine, those not named at zero."""
+    changed = {rotor.name: rotor.unbalance for rotor in rotors}
+    return tuple(replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors)
+
+
+def _slope(
+    rotors: Sequence[Rotor],
+    point: OperatingPoint,
+    engine: Engine,
+    mounting: Mounting | None,
+    subject: Subject,
+    fidelity: Fidelity,
+) -> Spectrum:
+    wrench = added_rotor_loads(rotors, engine, point, fidelity)
+    if subject is Subject.MOUNT_FORCE and mounting is not None:
+        return mounting.forces(wrench, point.speed)
+    travel = travel_of(engine, mounting, wrench, point.speed) if subject is Subject.MOUNT_TRAVEL else None
+    return wrench if travel is None else travel
+
+
+def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
+    slope = np.stack(slopes, axis=-1) if slopes else np.zeros((*bare.vectors.shape, 0))
+    used = np.any(bare.vectors != 0.0, axis=0) | np.any(slope != 0.0, axis=(0, 2))
+    if keep_all or not used.any():
+        used[:] = keep_all
+        used[:1] = True
+    return AffineNorm(bare.norm, bare.vectors[:, used], np.ascontiguousarray(slope[:, used]), bare.weights)

@@ -1,0 +1,128 @@
+"""Many designs of one problem in one call: decisions, and speeds (F12)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.numerics.batch_norms import CACHE_BYTES, BatchNorm
+from laufruhe.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Designs:
+    """A problem prepared for many designs.
+
+    Attributes
+    ----------
+    problem
+        Whose decisions vary.
+    model
+        Loads without the decisions and of each alone, at the problem's fidelity.
+    terms
+        (weight, norm) pairs; features are 1 and the decision vector.
+    """
+
+    problem: Problem
+    model: AffineModel
+    terms: tuple[tuple[float, BatchNorm], ...]
+
+    def objective(self, values: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
+        """Objective of every design.
+
+        Parameters
+        ----------
+        values
+            Decisions u, complex, shape (designs, decisions) (C4).
+        threads, cache_bytes
+            See `BatchNorm.values`.
+
+        Returns
+        -------
+        Shape (designs,) [SI].
+        """
+        features = np.empty((len(values), 1 + self.columns))
+        features[:, 0] = 1.0
+        for k, domain in enumerate(self.model.domains):
+            u = np.asarray(values[:, k])
+            if domain.width == 1:
+                features[:, 1 + domain.start] = (u * domain.directions[0].conjugate()).real
+            else:
+                features[:, 1 + domain.start], features[:, 2 + domain.start] = u.real, u.imag
+        return self.of_columns(features, threads, cache_bytes)
+
+    def of_columns(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
+        """Objective of 1 and the decision vector side by side, shape (designs, 1 + columns)."""
+        total = np.zeros(len(features))
+        for weight, norm in self.terms:
+            total += weight * norm.values(features, threads, cache_bytes)
+        return total
+
+    def one(self, features: Array) -> float:
+        """Objective of a single design, of 1 and the decision vector, shape (1 + columns,)."""
+        return sum(weight * norm.value(features) for weight, norm in self.terms)
+
+    @property
+    def columns(self) -> int:
+        """Length of the decision vector."""
+        return sum(domain.width for domain in self.model.domains)
+
+    @property
+    def operations(self) -> int:
+        """Additions and multiplications of the matrix products of one design."""
+        return sum(norm.operations for _, norm in self.terms)
+
+
+def prepare(problem: Problem, prune: bool = True) -> Designs:
+    """Everything that does not depend on the decisions, once.
+
+    Parameters
+    ----------
+    prune
+        Whether parts of the cycle that repeat and directions that nothing drives are
+        left out; they change nothing but the time.
+    """
+    model = AffineModel(problem)
+    if prune:
+        affine = model.at(model.full_samples)
+    else:
+        whole = AffineModel(problem, whole_cycle=True)
+        affine = whole.at(problem.fidelity.samples)
+    return Designs(problem, model, tuple((weight, _batched(norm, prune)) for weight, norm in affine.terms))
+
+
+def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:
+    rows = np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
+    weights = norm.weights
+    if prune:
+        rows, weights = _merged(rows, weights)
+    return BatchNorm(norm.norm, np.ascontiguousarray(rows), weights)
+
+
+def _merged(rows: Array, weights: Array) -> tuple[Array, Array]:
+    """Rows that are equal to the last bit, or each other's negative, as one row: symmetric mounts."""
+    flat = rows.reshape(-1, rows.shape[2]).T
+    lead = np.take_along_axis(flat, np.argmax(flat != 0.0, axis=1)[:, None], axis=1)
+    _, first, inverse = np.unique(
+        flat * np.where(lead < 0.0, -1.0, 1.0), axis=0, return_index=True, return_inverse=True
+    )
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    total: Array = np.bincount(rank[inverse.ravel()], weights=weights, minlength=len(order)).astype(float)
+    return rows[:, :, first[order]], total
+
+
+def random_decisions(problem: Problem, count: int, seed: int = 0) -> NDArray[np.complex128]:
+    """Decisions spread evenly over their bounds, shape (count, decisions)."""
+    rng = np.random.default_rng(seed)
+    columns: Sequence[NDArray[np.complex128]] = [
+        rng.uniform(d.lower, d.upper, count) * np.exp(1j * rng.uniform(*d.angle, count)) for d in problem.decisions
+    ]
+    return np.stack(columns, axis=1) if columns else np.zeros((count, 0), dtype=complex)

@@ -1,0 +1,68 @@
+"""Forces and travel of mounts at angles of the cycle, as expressions of what is open (E4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.mount_symbols import SymbolicResponse, waves
+from laufruhe.problem.measure import Quantity, Subject
+
+Array = NDArray[np.float64]
+
+LEAST_SAMPLES = 32
+SAMPLES_PER_ORDER = 4
+
+
+@dataclass(frozen=True, eq=False)
+class PointResponse:
+    """Symbolic response at one operating point, and where its orders stand."""
+
+    name: str
+    weight: float
+    base: float
+    orders: Array
+    response: SymbolicResponse
+
+
+def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity: Quantity) -> tuple[Any, Array]:
+    """Vectors at samples and their weights, as `load_rows` has them (P1).
+
+    Parameters
+    ----------
+    names
+        Of the mounts, in the order of the response.
+    quantity
+        Of the forces or of the travel of the mounts.
+
+    Returns
+    -------
+    Expression of shape (k, 3), and weights of shape (k,).
+    """
+    chosen = [p for p in points if quantity.points is None or p.name in quantity.points]
+    mounts = [k for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts]
+    whole = sum(point.weight for point in chosen)
+    blocks: list[Any] = []
+    weights: list[float] = []
+    for point in chosen:
+        signal = point.response.force if quantity.subject is Subject.MOUNT_FORCE else point.response.travel
+        counted = [
+            k for k, order in enumerate(point.orders)
+            if quantity.orders is None or any(abs(order - o) < 5e-4 for o in quantity.orders)
+        ]  # fmt: skip
+        highest = float(point.orders.max(initial=0.0))
+        samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * highest / point.base))
+        cosine, sine = waves(point.orders[counted].tolist(), point.base, samples)
+        values = signal[0][:, counted] @ cosine - signal[1][:, counted] @ sine
+        for k in mounts:
+            rows = values[3 * k : 3 * k + 3, :].T
+            if quantity.direction_weights is not None:
+                rows = rows @ ca.diag(ca.DM(list(quantity.direction_weights)))
+            blocks.append(rows)
+            weights += [point.weight / whole / len(mounts) / samples] * samples
+    return ca.vertcat(*blocks), np.array(weights)

@@ -1,0 +1,213 @@
+"""A problem as norms of rows that are affine in its star and its decisions (S11).
+
+Throws add up: the rows of any star are those of one star, plus what it changes when
+each throw is moved to its step. Gas stays out of it, because even firing of equal
+cylinders gives the same roll moment in whatever order. All numbers come from the exact
+model, one throw moved at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
+from laufruhe.load_models.domain import Domain
+from laufruhe.machine.firing import star_throws
+from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.spectrum import common_base
+from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.phasing import Candidate, Phasing
+from laufruhe.problem.problem import Problem, UnbalanceDecision
+
+Array = NDArray[np.float64]
+
+_SAME_SLOPE = 1e-11
+
+
+@dataclass(frozen=True, eq=False)
+class StarNorm:
+    """N(V0 + sum_k D[k, p_k] + (B + sum_k E[k, p_k]) x) over the steps p_k of the throws.
+
+    Attributes
+    ----------
+    constant, moves
+        V0 and D, shapes (k, d) and (throws, steps, k, d).
+    slope, turns
+        B and E, shapes (k, d, n) and (throws, steps, k, d, n); no E where unbalances act
+        alike in every star.
+    weights
+        Shape (k,).
+    """
+
+    norm: Norm
+    constant: Array
+    moves: Array
+    slope: Array
+    turns: Array | None
+    weights: Array
+
+    def at(self, star: Sequence[int]) -> AffineNorm:
+        """The norm of one star."""
+        chosen = np.arange(len(star)), np.asarray(star, dtype=np.intp)
+        constant = self.constant + self.moves[chosen].sum(axis=0)
+        slope = self.slope if self.turns is None else self.slope + self.turns[chosen].sum(axis=0)
+        return AffineNorm(self.norm, constant, slope, self.weights)
+
+
+@dataclass(frozen=True, eq=False)
+class StarProblem:
+    """Rows of terms and limits of every star at one number of samples."""
+
+    terms: tuple[tuple[float, StarNorm], ...]
+    limits: tuple[tuple[float, StarNorm], ...]
+    domains: tuple[Domain, ...]
+    samples: int
+
+    def at(self, star: Sequence[int]) -> AffineProblem:
+        """The problem of one star."""
+        terms = tuple((weight, norm.at(star)) for weight, norm in self.terms)
+        limits = tuple((maximum, norm.at(star)) for maximum, norm in self.limits)
+        return AffineProblem(terms, limits, self.domains, self.samples)
+
+
+class StarModel:
+    """Spectra of one star and of every single move of a throw.
+
+    Parameters
+    ----------
+    phasing
+        What is open.
+    space
+        Stars allowed.
+    geometry
+        Bank angle and split pin [rad].
+    origin
+        Star that the moves are counted from; the first of the space when left out.
+    """
+
+    def __init__(
+        self,
+        phasing: Phasing,
+        space: StarSpace,
+        geometry: tuple[float | None, float | None],
+        origin: tuple[int, ...] | None = None,
+    ) -> None:
+        self.phasing, self.space, self.geometry = phasing, space, geometry
+        self.layout: Layout = phasing.layout(*geometry)
+        self._origin = space.first if origin is None else origin
+        self.problem = _normalised(phasing.realise(phasing.star(self._origin, space.phases, geometry)))
+        self._whole = AffineModel(self.problem, keep_all=True)
+        self._still = self._motored(self._origin)
+        self._moved = {
+            (k, p): self._motored(tuple(p if j == k else step for j, step in enumerate(self._origin)))
+            for k in range(1, space.throws)
+            for p in range(space.phases)
+            if p != self._origin[k]
+        }
+        models = [self._whole, self._still, *self._moved.values()]
+        self.base = common_base([model.base for model in models])
+        for model in models:
+            model.base = self.base
+        self.domains = self._whole.domains
+        self._cache: dict[int, StarProblem] = {}
+
+    @property
+    def samples(self) -> int:
+        """Steps of the problem's fidelity that fall into one period of the loads."""
+        return self._whole.full_samples
+
+    def _motored(self, star: Sequence[int]) -> AffineModel:
+        throws = star_throws(self.layout, star, self.space.phases)
+        candidate = Candidate(throws, None, *self.geometry, without_gas=True)
+        return AffineModel(_normalised(self.phasing.realise(candidate)), keep_all=True)
+
+    def at(self, samples: int) -> StarProblem:
+        """Rows of every star at `samples` steps over the period of the loads."""
+        if samples not in self._cache:
+            whole, still = self._whole.at(samples), self._still.at(samples)
+            moved = {key: model.at(samples) for key, model in self._moved.items()}
+            self._cache[samples] = StarProblem(
+                self._norms(whole.terms, still.terms, {key: a.terms for key, a in moved.items()}),
+                self._norms(whole.limits, still.limits, {key: a.limits for key, a in moved.items()}),
+                self.domains,
+                samples,
+            )
+        return self._cache[samples]
+
+    def _norms(
+        self,
+        whole: tuple[tuple[float, AffineNorm], ...],
+        still: tuple[tuple[float, AffineNorm], ...],
+        moved: dict[tuple[int, int], tuple[tuple[float, AffineNorm], ...]],
+    ) -> tuple[tuple[float, StarNorm], ...]:
+        shape = (self.space.throws, self.space.phases)
+        out = []
+        for number, ((weight, all_of), (_, rest)) in enumerate(zip(whole, still, strict=True)):
+            moves = np.zeros((*shape, *rest.constant.shape))
+            turns = np.zeros((*shape, *rest.slope.shape))
+            for (k, p), norms in moved.items():
+                moves[k, p] = norms[number][1].constant - rest.constant
+                turns[k, p] = norms[number][1].slope - rest.slope
+            alike = np.abs(turns).max(initial=0.0) <= _SAME_SLOPE * np.abs(rest.slope).max(initial=0.0)
+            norm = StarNorm(
+                all_of.norm, all_of.constant, moves, all_of.slope, None if alike else turns, all_of.weights
+            )  # fmt: skip
+            out.append((weight, _compressed(norm) if norm.norm is Norm.RMS else norm))
+        return tuple(out)
+
+
+def _normalised(problem: Problem) -> Problem:
+    """Unbalances that may take any angle, counted from upright and not from a throw.
+
+    A disc looks the same from every angle, so that they act alike in every star.
+    """
+    return replace(problem, decisions=tuple(_upright(decision) for decision in problem.decisions))
+
+
+def _upright(decision: UnbalanceDecision) -> UnbalanceDecision:
+    gain = decision.drives[0].gain
+    if not decision.free_angle or gain == 0.0:
+        return decision
+    turn = gain / abs(gain)
+    turn = turn.conjugate() if decision.drives[0].mirrored else turn
+    drives = tuple(
+        replace(drive, gain=drive.gain * (turn if drive.mirrored else turn.conjugate())) for drive in decision.drives
+    )
+    return replace(decision, drives=drives, start=decision.start * turn)
+
+
+def _compressed(norm: StarNorm) -> StarNorm:
+    """The same root mean square in as few rows as there are columns: Q of a QR keeps every length (S12)."""
+    k, d = norm.constant.shape
+    throws, steps = norm.moves.shape[:2]
+    columns = norm.slope.shape[-1]
+    scaled = np.sqrt(norm.weights)[:, None]
+    parts = [
+        (norm.constant * scaled).reshape(1, -1),
+        (norm.moves * scaled).reshape(throws * steps, -1),
+        np.moveaxis(norm.slope * scaled[..., None], -1, 0).reshape(columns, k * d),
+    ]
+    if norm.turns is not None:
+        parts.append(np.moveaxis(norm.turns * scaled[..., None], -1, 2).reshape(throws * steps * columns, k * d))
+    matrix = np.concatenate(parts).T
+    if len(matrix) <= matrix.shape[1]:
+        return norm
+    small = np.asarray(np.linalg.qr(matrix, mode="r"))
+    rows = len(small)
+    cut = np.cumsum([len(part) for part in parts])
+    turns = None
+    if norm.turns is not None:
+        turns = np.moveaxis(small[:, cut[2] :].T.reshape(throws, steps, columns, rows, 1), 2, -1)
+    return StarNorm(
+        Norm.RMS,
+        small[:, :1],
+        small[:, 1 : cut[1]].T.reshape(throws, steps, rows, 1),
+        small[:, None, cut[1] : cut[2]],
+        turns,
+        np.ones(rows),
+    )

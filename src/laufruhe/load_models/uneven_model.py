@@ -1,0 +1,290 @@
+"""Loads of throws at any angles as smooth expressions, with coefficients from the exact model (S19).
+
+A slider-crank's wrench of order h is its own coefficient times e^{i h (theta + o - beta)}
+along its axis; a rotor that rides on a throw turns with it, and gas with the firing dead
+centre of its cylinder. Everything that turns the same way whatever the throws do is a
+number from the exact model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.domain import Domain, domains_of
+from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
+from laufruhe.load_models.mount_symbols import waves
+from laufruhe.load_models.uneven_gas import LEFT_OUT, GasMoments
+from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
+from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.spectrum import Spectrum, as_order, base_of
+from laufruhe.physics.mount_forces import RigidMounting
+from laufruhe.physics.mounting import mount_maps, mounting_of, travel_of
+from laufruhe.physics.shaking_loads import inertia_coefficients, rotor_wrench
+from laufruhe.problem.measure import MASSES, ON_MOUNTS, Quantity, Subject, counted_rotors, radius_of
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.nonlinear import softened_lengths
+
+Array = NDArray[np.float64]
+
+LEAST_SAMPLES = 72
+NEGLIGIBLE = 1e-9
+_PARTS = {Subject.SHAKING_FORCE: slice(0, 3), Subject.ROLL_MOMENT: slice(3, 4), Subject.ROCKING_COUPLE: slice(4, 6)}
+
+
+@dataclass(frozen=True, eq=False)
+class Symbols:
+    """Variables of the program.
+
+    Attributes
+    ----------
+    throws
+        Angle of every throw [rad], the first given by cylinder 1's dead centre.
+    bank, split
+        Bank angle and split pin [rad], symbols or numbers.
+    unbalances
+        Columns of the unbalance decisions.
+    """
+
+    throws: Sequence[Any]
+    bank: Any
+    split: Any
+    unbalances: Any
+
+
+class UnevenModel:
+    """Smooth norms of a problem over throws, bank, split pin and unbalances.
+
+    Parameters
+    ----------
+    problem
+        Of the star that the program starts from, with its firing order.
+    layout
+        Of that star.
+    rides
+        Throw that every rotor turns with; rotors left out stand still beside the throws.
+    left_out
+        Share of the gas torque's root mean square that orders left out may hold together.
+    """
+
+    def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int], left_out: float = LEFT_OUT) -> None:
+        self.problem, self.layout, self.rides = problem, layout, rides
+        self.domains: tuple[Domain, ...] = domains_of(problem.decisions)
+        self._mounting = mounting_of(problem.engine, problem.fidelity)
+        self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
+        self._gas = GasMoments(problem, left_out)
+
+    def squares(self, quantity: Quantity, at: Symbols) -> Any:
+        """Squares that must all stay under that of a limit: smooth even where the quantity is zero."""
+        if quantity.subject in MASSES or quantity.norm is Norm.SUM:
+            return None
+        if quantity.norm is Norm.RMS:
+            return self._mean_square(quantity, at)
+        rows = [row for point in self._points(quantity) for row in self._vectors(quantity, point, at)]
+        return ca.vertcat(*(ca.sum2(row * row) for row in rows))
+
+    def _points(self, quantity: Quantity) -> list[OperatingPoint]:
+        return [p for p in self.problem.points if quantity.points is None or p.name in quantity.points]
+
+    def _mean_square(self, quantity: Quantity, at: Symbols) -> Any:
+        """By Parseval: no angles are needed."""
+        chosen = self._points(quantity)
+        whole = sum(point.weight for point in chosen)
+        total = 0.0
+        for point in chosen:
+            for h, mounts in self._signal(quantity, point, at):
+                half = 1.0 if h == 0.0 else 0.5
+                total = total + point.weight / whole * half * sum(ca.sumsqr(c) for c in mounts) / len(mounts)
+        return total
+
+    def norm(self, quantity: Quantity, at: Symbols, softness: Any) -> Any:
+        """A quantity as one smooth expression; `softness` in its own unit (N3)."""
+        if quantity.subject in MASSES:
+            rows = [self._unbalance(r, at) / radius_of(r) for r in counted_rotors(quantity, self.problem.engine.rotors)]
+            return ca.sum1(softened_lengths(ca.vertcat(*(row.T for row in rows)), softness))
+        if quantity.norm is Norm.RMS:
+            return ca.sqrt(self._mean_square(quantity, at) + softness**2) - softness
+        chosen = self._points(quantity)
+        whole = sum(point.weight for point in chosen)
+        parts = [(point.weight / whole, self._vectors(quantity, point, at)) for point in chosen]
+        lengths = [(share, softened_lengths(rows, softness)) for share, vectors in parts for rows in vectors]
+        if quantity.norm is Norm.SUM:
+            return sum(share * ca.sum1(v) / v.numel() for share, v in lengths) / len(parts[0][1])
+        # the largest of many, smooth from above by less than the softness times their logarithm
+        stacked = ca.vertcat(*(v for _, v in lengths))
+        top = ca.mmax(stacked)
+        return top + softness * ca.log(ca.sum1(ca.exp((stacked - top) / softness)))
+
+    def rows(self, quantity: Quantity, at: Symbols) -> tuple[Any, Array]:
+        """Vectors at angles over a period whose norm a load on the block is, and their weights (P1)."""
+        chosen = self._points(quantity)
+        whole = sum(point.weight for point in chosen)
+        blocks = [self._vectors(quantity, p, at)[0] for p in chosen]
+        weights = [np.full(b.shape[0], p.weight / whole / b.shape[0]) for p, b in zip(chosen, blocks, strict=True)]
+        return ca.vertcat(*blocks), np.concatenate(weights)
+
+    def _vectors(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[Any]:
+        """Values at equal steps of a period, shape (samples, d), of each mount or of the block."""
+        if quantity.subject is Subject.MOUNT_FORCE and isinstance(self._mounting, RigidMounting):
+            # one map for all orders: the wrench alone is sampled
+            values = _sampled(self._counted(quantity, point, at))
+            return [values @ ca.DM(m.real).T for m in self._maps(quantity, 0.0, point)]
+        signal = self._signal(quantity, point, at)
+        return [_sampled([(h, parts[m]) for h, parts in signal]) for m in range(len(signal[0][1]))]
+
+    def _signal(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[tuple[float, list[Any]]]:
+        """Per order, the vectors (re, im), shape (d, 2), of each mount or of the block."""
+        counted = self._counted(quantity, point, at)
+        if quantity.subject not in ON_MOUNTS:
+            return [(h, [wrench[_PARTS[quantity.subject], :]]) for h, wrench in counted]
+        out = []
+        for h, wrench in counted:
+            turned = ca.horzcat(-wrench[:, 1], wrench[:, 0])
+            maps = self._maps(quantity, h, point)
+            out.append((h, [ca.DM(m.real) @ wrench + ca.DM(m.imag) @ turned for m in maps]))
+        return out
+
+    def _counted(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[tuple[float, Any]]:
+        """Wrench coefficients of the orders that count."""
+        # a block on soft mounts feels the first orders of its gas alone
+        gain = self._gain(quantity, point) if quantity.subject in ON_MOUNTS else None
+        found = sorted(self.wrench(point, at, gain).items())
+        counted = [(h, wrench) for h, wrench in found if quantity.orders is None or h in quantity.orders]
+        return counted or [(1.0, ca.DM.zeros(6, 2))]
+
+    def _maps(self, quantity: Quantity, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
+        """Force per wrench of every mount that counts, its directions weighted."""
+        weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
+        names = [mount.name for mount in self.problem.engine.mounts]
+        every = self._map(quantity, order, point.speed)
+        return [
+            weights @ every[k] for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts
+        ]
+
+    def _map(self, quantity: Quantity, order: float, speed: float) -> NDArray[np.complex128]:
+        """Forces or travels of all mounts per wrench, shape (mounts, 3, 6)."""
+        if self._mounting is None:
+            raise ValueError("an engine without mounts has no mount forces")
+        if quantity.subject is Subject.MOUNT_FORCE:
+            return mount_maps(self._mounting, order, speed)
+        base = as_order(order)
+        units = np.stack([np.zeros((6, 6)), np.eye(6)]).astype(complex)
+        spectra = [Spectrum(base or Fraction(1), units[:, k] if base else units[1:, k]) for k in range(6)]
+        travels = [travel_of(self.problem.engine, self._mounting, unit, speed) for unit in spectra]
+        return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
+
+    def _gain(self, quantity: Quantity, point: OperatingPoint) -> Callable[[float], float] | None:
+        """How much of a roll moment of an order mounts feel; None where that is the same for all."""
+        if isinstance(self._mounting, RigidMounting):
+            return None
+        return lambda h: float(np.abs(self._map(quantity, h, point.speed)[:, :, 3]).max())
+
+    def wrench(
+        self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float] | None = None
+    ) -> dict[float, Any]:
+        """Wrench coefficients (re, im) by order, shape (6, 2); gas of the orders that a gain leaves to matter."""
+        total: dict[float, Any] = {}
+        parts = self.problem.engine.slider_cranks
+        for k, part in enumerate(parts):
+            for h, wrench in self._cylinder(k, part, point.speed, at):
+                total[h] = total.get(h, 0.0) + wrench
+        stars = [self._star(k, part, at) for k, part in enumerate(parts)]
+        for h, moment in self._gas.at(point, stars, gain):
+            wrench = ca.vertcat(ca.DM.zeros(3, 2), moment, ca.DM.zeros(2, 2))
+            total[h] = total.get(h, 0.0) + wrench
+        for rotor in self.problem.engine.rotors:
+            order = abs(rotor.shaft.ratio)
+            real, imaginary = (rotor_wrench(replace(rotor, unbalance=u), point.speed) for u in (1.0, 1.0j))
+            u = self._unbalance(rotor, at)
+            rows = _columns(real) @ u[0] + _columns(imaginary) @ u[1]
+            total[order] = total.get(order, 0.0) + rows
+        return total
+
+    def _place(self, k: int, part: SliderCrank, at: Symbols) -> tuple[Any, Any]:
+        """Angle of a cylinder's own pin, and of its bank."""
+        side = 0.5 if 2 * k < len(self.layout.pins) else -0.5
+        bank = side * at.bank if at.bank is not None else part.bank
+        offset = -side * at.split if at.split is not None else self.layout.pin_offsets[k]
+        return at.throws[self.layout.pins[k]] + offset, bank
+
+    def _star(self, k: int, part: SliderCrank, at: Symbols) -> Any:
+        """A cylinder's own crank angle when phi = 0 (C5)."""
+        angle, bank = self._place(k, part, at)
+        return angle - bank
+
+    def _cylinder(self, k: int, part: SliderCrank, speed: float, at: Symbols) -> list[tuple[float, Any]]:
+        angle, bank = self._place(k, part, at)
+        axial, roll = inertia_coefficients(part, speed, self.problem.fidelity)
+        star = angle - bank
+        size = np.abs(axial).max() + np.abs(roll).max() / part.crank_radius
+        zero = ca.DM.zeros(1, 2)
+        out = []
+        for h in range(1, len(axial)):
+            if abs(axial[h]) <= NEGLIGIBLE * size and abs(roll[h]) <= NEGLIGIBLE * size * part.crank_radius:
+                continue
+            force, moment = _times(axial[h], h * star), _times(roll[h], h * star)
+            lateral, vertical = force * ca.sin(bank), force * ca.cos(bank)
+            out.append((float(h), ca.vertcat(zero, lateral, vertical, moment, -part.x * vertical, part.x * lateral)))
+        if part.rotating_mass > 0.0:
+            mass = part.rotating_mass * part.crank_radius
+            pair = (rotor_wrench(Rotor("pin", part.x, u * mass, part.shaft), speed) for u in (1.0, 1.0j))
+            real, imaginary = (_columns(wrench) for wrench in pair)
+            out.append((abs(part.shaft.ratio), real * ca.cos(angle) + imaginary * ca.sin(angle)))
+        return out
+
+    def _unbalance(self, rotor: Rotor, at: Symbols) -> Any:
+        """U of a rotor as (re, im), turned with the throw that it rides on."""
+        real: Any = rotor.unbalance.real
+        imaginary: Any = rotor.unbalance.imag
+        for domain in self.domains:
+            for drive in domain.decision.drives:
+                if drive.rotor != rotor.name:
+                    continue
+                columns = at.unbalances[domain.columns]
+                for j, direction in enumerate(domain.directions):
+                    d = drive.gain * (direction.conjugate() if drive.mirrored else direction)
+                    real = real + d.real * columns[j]
+                    imaginary = imaginary + d.imag * columns[j]
+                # the rotor stands at the decision's start in the design as given
+                start = domain.decision.start
+                given = drive.gain * (start.conjugate() if drive.mirrored else start)
+                real, imaginary = real - given.real, imaginary - given.imag
+        if rotor.name not in self.rides:
+            return ca.vertcat(real, imaginary)
+        pin = self.rides[rotor.name]
+        turn = at.throws[pin] - self._start[pin]
+        cosine, sine = ca.cos(turn), ca.sin(turn)
+        return ca.vertcat(cosine * real - sine * imaginary, sine * real + cosine * imaginary)
+
+
+def _throw_of(parts: Sequence[SliderCrank], layout: Layout, pin: int) -> float:
+    k = layout.pins.index(pin)
+    return parts[k].throw - layout.pin_offsets[k]
+
+
+def _times(coefficient: complex, angle: Any) -> Any:
+    """c e^{i angle} as a row (re, im)."""
+    cosine, sine = ca.cos(angle), ca.sin(angle)
+    a, b = float(coefficient.real), float(coefficient.imag)
+    return ca.horzcat(a * cosine - b * sine, a * sine + b * cosine)
+
+
+def _columns(wrench: NDArray[np.complex128]) -> Any:
+    return ca.DM(np.stack([wrench.real, wrench.imag], axis=1))
+
+
+def _sampled(signal: Sequence[tuple[float, Any]]) -> Any:
+    """Values of (order, coefficients of shape (d, 2)) at equal steps of their period, shape (samples, d)."""
+    orders = [h for h, _ in signal]
+    base = float(base_of(orders))
+    samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * max(orders) / base))
+    cosine, sine = waves(orders, base, samples)
+    real, imaginary = (ca.horzcat(*(c[:, side] for _, c in signal)) for side in (0, 1))
+    return (real @ cosine - imaginary @ sine).T

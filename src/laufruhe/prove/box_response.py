@@ -1,0 +1,367 @@
+"""Response of a block over a whole box of mount stiffnesses, with what the box can at most change (E37, E38, E41).
+
+In coordinates in which the mass is one the impedance D(x) = A + i B - W^2 is linear in the stiffnesses x. About the
+centre c of a box, with D_j its slopes and Q = sum_j (x_j - c_j) D(c)^-1 D_j,
+
+    y = y0 - Q y0 + Q^2 y0 - ...,    y0 = D(c)^-1 r                                      (E37)
+
+and what follows the square is at most rho / (1 - rho) |Q^2 y0|, rho = sum_j |x_j - c_j| |D(c)^-1 D_j|. Forces and
+travel of the mounts are linear in x times y, so they are known up to the second order, and the rest is bounded.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.modes import weight_wrench
+from laufruhe.physics.rigid_body import moved_wrench
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.problem.mount_design import mounting_in, total_stiffness
+from laufruhe.problem.problem import Problem
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Indices = NDArray[np.intp]
+
+NOTHING = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Orders of operating points that are answered together.
+
+    Attributes
+    ----------
+    points, places
+        Operating point, and place in its spectrum, shape (n,).
+    orders, omegas
+        Shape (n,); omega [rad/s].
+    loads
+        r in coordinates in which the mass is one, shape (n, 6).
+    """
+
+    points: Indices
+    places: Indices
+    orders: Array
+    omegas: Array
+    loads: ComplexArray
+
+    def kept(self, which: NDArray[np.bool_]) -> Lines:
+        """Some of them."""
+        parts = (self.points[which], self.places[which], self.orders[which], self.omegas[which], self.loads[which])
+        return Lines(*parts)
+
+    def still(self) -> Lines:
+        """The same loads at rest: what the mounts carry if they give no way (E11)."""
+        return Lines(self.points, self.places, self.orders, np.zeros_like(self.omegas), self.loads)
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """Motion over boxes (E37): first and second order in shares of the half widths, shapes (boxes, lines, ...).
+
+    Attributes
+    ----------
+    centres, halves
+        Of the boxes, shape (boxes, n).
+    motion
+        y0, (..., 6).
+    first, second
+        Q_j y0 and Q_i Q_j y0, (..., n, 6) and (..., n, n, 6).
+    size
+        Bound of |Q^2 y0|, (...).
+    rest
+        Bound of what follows the square, (...); infinite where the series need not end.
+    pull
+        |Q_j|, (..., n): what splitting a side would lessen.
+    """
+
+    centres: Array
+    halves: Array
+    motion: ComplexArray
+    first: ComplexArray
+    second: ComplexArray
+    size: Array
+    rest: Array
+    pull: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Forces or travel over boxes: value and slopes at the centre, and a bound of the rest (E37)."""
+
+    value: ComplexArray
+    slopes: ComplexArray
+    rest: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Under:
+    """value + slopes . s - rest is nowhere above a quantity, s from -1 to 1 in each (E38)."""
+
+    value: Array
+    slopes: Array
+    rest: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Matrices of a mounting in coordinates in which the mass is one."""
+
+    stiffness: Array
+    loss: Array
+    damping: Array
+    springs: Array
+    losses: Array
+    dampers: Array
+
+
+class BoxModel:
+    """Matrices of a problem whose open numbers are stiffnesses alone.
+
+    Parameters
+    ----------
+    problem
+        On elastic mounts, with all but stiffness given.
+    evaluation
+        Of any design: its wrenches are those of all.
+    """
+
+    def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
+        self.problem, self._evaluation = problem, evaluation
+        decisions = problem.mount_design.decisions
+        self.lower, self.upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+        base = self.mounting(self.lower)
+        self._root = np.linalg.inv(np.linalg.cholesky(base.block.mass_matrix))
+        self.travels = (base.motions @ self._root.T).reshape(-1, 6)
+        self._base = self._parts(base)
+        ends = [np.where(np.arange(len(decisions)) == j, self.upper, self.lower) for j in range(len(decisions))]
+        moved = [self._parts(self.mounting(end)) for end in ends]
+        self._slopes = {
+            name: np.array(
+                [
+                    (getattr(other, name) - getattr(self._base, name)) / width
+                    for other, width in zip(moved, self.upper - self.lower, strict=True)
+                ]
+            )
+            for name in ("stiffness", "loss", "springs", "losses")
+        }
+        self.highest = float(np.linalg.eigvalsh(self._parts(self.mounting(self.upper)).stiffness)[-1])
+
+    def mounting(self, x: Array) -> ElasticMounting:
+        """At these stiffnesses."""
+        return mounting_in(self.problem.mount_design.applied(self.problem.engine, [float(v) for v in x]))
+
+    def _parts(self, mounting: ElasticMounting) -> _Parts:
+        seen = mounting.motions @ self._root.T
+        totals = (self._root @ mounting.total(each) @ self._root.T for each in self._each(mounting))
+        maps = ((each @ seen).reshape(-1, 6) for each in self._each(mounting))
+        return _Parts(*totals, *maps)
+
+    @staticmethod
+    def _each(mounting: ElasticMounting) -> tuple[Array, Array, Array]:
+        return mounting.springs, mounting.losses, mounting.dampers
+
+    def lines(self, quantity: Quantity | None = None) -> Lines:
+        """Every order with a load; of a quantity, those that it counts."""
+        moved = self._root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
+        found: list[tuple[int, int, float, float, ComplexArray]] = []
+        for p, loads in enumerate(self._evaluation.loads):
+            size = np.abs(loads.wrench.coefficients).max(axis=1, initial=0.0)
+            for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
+                order = float(loads.wrench.orders[k])
+                found.append((p, int(k), order, order * loads.point.speed, moved @ loads.wrench.coefficients[k]))
+        points, places, orders, omegas, loads_ = zip(*found, strict=True) if found else ((), (), (), (), ())
+        lines = Lines(
+            np.array(points, dtype=np.intp), np.array(places, dtype=np.intp), np.array(orders, dtype=float),
+            np.array(omegas, dtype=float), np.array(loads_, dtype=complex).reshape(-1, 6),
+        )  # fmt: skip
+        if quantity is None:
+            return lines
+        keep = np.isin(lines.points, self.counted(quantity.points))
+        if quantity.orders is not None:
+            keep &= np.isin(np.round(1000 * lines.orders), np.round(1000 * np.array(quantity.orders)))
+        return lines.kept(keep)
+
+    def samples_fully(self, lines: Lines) -> bool:
+        """Whether each of these orders has more than two samples, over a period that is that of the loads."""
+        base = self.problem.engine.cycle.base_order
+        steps = [loads.wrench.base / base for loads in self._evaluation.loads]
+        if any(step.denominator != 1 for step in steps):
+            return False
+        places = lines.places * np.array([int(step) for step in steps])[lines.points]
+        return bool(2 * places.max(initial=0) < self._evaluation.samples)
+
+    def counted(self, names: tuple[str, ...] | None) -> list[int]:
+        """Operating points of these names; all when None."""
+        return [k for k, point in enumerate(self.problem.points) if names is None or point.name in names]
+
+    def stiffness(self, x: Array) -> Array:
+        """A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
+        return self._at("stiffness", x)
+
+    def sag(self, x: Array) -> Array:
+        """At many designs, shape (boxes,); infinite where a mode is free (E9)."""
+        weight = weight_wrench(self.mounting(self.lower).block)
+        matrices, pull = self.stiffness(x), self._root @ weight
+        held = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
+        settled = np.linalg.solve(np.where(held[:, None, None], matrices, np.eye(6)), pull)
+        return np.where(held, settled @ pull / -weight[2], math.inf)
+
+    def total_stiffness(self, x: Array) -> Array:
+        """Sum over mounts and axes at many designs, shape (boxes,) [N/m]."""
+        decisions = self.problem.mount_design.decisions
+        gains = np.array([sum(drive.gain for drive in decision.drives) for decision in decisions])
+        lowest = self.problem.mount_design.applied(self.problem.engine, [float(v) for v in self.lower])
+        return np.asarray(total_stiffness(lowest.mounts) + (x - self.lower) @ gains)
+
+    def _at(self, name: str, x: Array) -> Array:
+        base: Array = getattr(self._base, name)
+        return np.asarray(base + np.einsum("bn,nij->bij", x - self.lower, self._slopes[name]))
+
+    def expanded(self, lines: Lines, lower: Array, upper: Array) -> Expansion:
+        """Motion over boxes, shapes (boxes, n) (E37)."""
+        centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
+        moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
+        stiffness, loss = (self._at(name, centres)[:, None] for name in ("stiffness", "loss"))
+        impedance = stiffness + 1j * (moving * loss + omegas * self._base.damping) - omegas**2 * np.eye(6)
+        slopes = self._slopes["stiffness"] + 1j * moving[:, None] * self._slopes["loss"]
+        inverse = _inverse(np.asarray(impedance, dtype=np.complex128))
+        motion = np.einsum("bkij,kj->bki", inverse, lines.loads)
+        pulled = np.einsum("bkij,knjl->bknil", inverse, slopes) * halves[:, None, :, None, None]
+        first = np.einsum("bknij,bkj->bkni", pulled, motion)
+        second = np.einsum("bkmij,bknj->bkmni", pulled, first)
+        pull = np.linalg.norm(pulled, axis=(-2, -1))
+        size = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
+        rho = pull.sum(axis=-1)
+        share = np.where(rho < 1.0, rho / np.where(rho < 1.0, 1.0 - rho, 1.0), np.inf)
+        rest = np.where(size > 0.0, share * np.where(size > 0.0, size, 1.0), np.where(rho < 1.0, 0.0, np.inf))
+        return Expansion(centres, halves, motion, first, second, size, rest, pull)
+
+    def answer(self, lines: Lines, at: Expansion, subject: Subject, rows: Indices, factors: Array) -> Answer:
+        """Forces or travel, the rows of the mounts that count, with factors on them (E37)."""
+        value, slopes = self._maps(lines, at, subject, rows)
+        value, slopes = value * factors[:, None], slopes * factors[:, None]
+        first = np.einsum("bknri,bki->bknr", slopes, at.motion) - np.einsum("bkri,bkni->bknr", value, at.first)
+        second = np.einsum("bkri,bkmni->bkmnr", value, at.second) - np.einsum("bkmri,bkni->bkmnr", slopes, at.first)
+        rest = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
+        turned = np.linalg.norm(slopes, axis=(-2, -1)).sum(axis=-1)
+        rest = rest + np.linalg.norm(value, axis=(-2, -1)) * at.rest + turned * at.size
+        rest = rest + np.where(turned > 0.0, turned * np.where(turned > 0.0, at.rest, 0.0), 0.0)
+        return Answer(np.einsum("bkri,bki->bkr", value, at.motion), first, rest)
+
+    def _maps(self, lines: Lines, at: Expansion, subject: Subject, rows: Indices) -> tuple[ComplexArray, ComplexArray]:
+        """From motion to forces or travel at the centres, (boxes, lines, r, 6), and by side, (..., n, r, 6)."""
+        boxes, count, open_numbers = len(at.centres), len(lines.omegas), len(self.lower)
+        if subject is Subject.MOUNT_TRAVEL:
+            flat = np.broadcast_to(self.travels[rows].astype(complex), (boxes, count, len(rows), 6))
+            return flat, np.zeros((boxes, count, open_numbers, len(rows), 6), dtype=complex)
+        moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
+        springs, losses = (self._at(name, at.centres)[:, None, rows] for name in ("springs", "losses"))
+        value = springs + 1j * (moving * losses + omegas * self._base.dampers[rows])
+        by_side = self._slopes["springs"][:, rows] + 1j * moving[:, None] * self._slopes["losses"][:, rows]
+        return value, by_side * at.halves[:, None, :, None, None]
+
+    def felt_at_most(self, lines: Lines, subject: Subject) -> Array:
+        """What an order above all natural frequencies can do to all mounts anywhere in the bounds, (lines,) (E41)."""
+        room = lines.omegas**2 - self.highest
+        motion = np.linalg.norm(lines.loads, axis=1) / np.where(room > 0.0, room, 1.0)
+        motion = np.where(room > 0.0, motion, np.inf)
+        if subject is Subject.MOUNT_TRAVEL:
+            return motion * float(np.linalg.norm(self.travels))
+        top = self._parts(self.mounting(self.upper))
+        still = float(np.linalg.norm(top.springs + 1j * top.losses))
+        return np.asarray(motion * (still + lines.omegas * float(np.linalg.norm(top.dampers))))
+
+    def under(self, quantity: Quantity, lines: Lines, at: Expansion) -> Under:
+        """A linear function under a mean, maximum or root mean square of forces or travel, for every box (E38)."""
+        names = [mount.name for mount in self.problem.engine.mounts]
+        chosen = [k for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts]
+        rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
+        factors = np.tile(np.array(quantity.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
+        answer = self.answer(lines, at, quantity.subject, rows, factors)
+        counted = self.counted(quantity.points)
+        whole = sum(self.problem.points[k].weight for k in counted)
+        share = np.array([point.weight for point in self.problem.points]) / whole
+        weights = share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen)
+        if quantity.norm is Norm.RMS:
+            return root_under(answer, weights)
+        found = [self._sampled(quantity, answer, lines, p, len(chosen)) for p in counted if np.any(lines.points == p)]
+        if not found:
+            nothing = np.zeros(len(at.centres))
+            return Under(nothing, np.zeros_like(at.centres), nothing)
+        if quantity.norm is Norm.MAXIMUM:
+            best = np.argmax([each.value for each in found], axis=0)
+            pick = np.arange(len(best))
+            value, slopes, rest = (np.array([getattr(e, part) for e in found]) for part in ("value", "slopes", "rest"))
+            return Under(value[best, pick], slopes[best, pick], rest[best, pick])
+        points = [p for p in counted if np.any(lines.points == p)]
+        value, slopes = (
+            sum(share[p] * getattr(each, part) for p, each in zip(points, found, strict=True))
+            for part in ("value", "slopes")
+        )
+        rest = np.sqrt(np.einsum("k,bk->b", weights, answer.rest**2))
+        return Under(np.asarray(value), np.asarray(slopes), rest)
+
+    def _sampled(self, quantity: Quantity, answer: Answer, lines: Lines, p: int, mounts: int) -> Under:
+        """Mean or maximum over the samples of one period at one operating point."""
+        own = np.flatnonzero(lines.points == p)
+        wrench = self._evaluation.loads[p].wrench
+        step = wrench.base / self.problem.engine.cycle.base_order
+        places = lines.places[own] * int(step)
+        samples = self._evaluation.samples
+        apart = int(np.gcd.reduce(places)) or 1
+        apart = apart if samples % apart == 0 else 1
+        places, samples = places // apart, samples // apart
+        value, slopes, rest = answer.value[:, own], answer.slopes[:, own], answer.rest[:, own]
+        # orders beyond half the samples fold: a phase a sample and order takes them all alike
+        turns = np.exp(2j * math.pi / samples * (np.outer(np.arange(samples), places) % samples))
+        rows = np.einsum("tk,bkr->btr", turns, value).real.reshape(len(value), samples, mounts, 3)
+        size = np.linalg.norm(rows, axis=-1)
+        along = rows / np.where(size > 0.0, size, 1.0)[..., None]
+        if quantity.norm is Norm.SUM:
+            share = 1.0 / (samples * mounts)
+            duals = np.einsum("tk,btr->bkr", turns, along.reshape(len(value), samples, -1))
+            slope = share * np.einsum("bkr,bknr->bn", duals, slopes).real
+            return Under(share * size.sum(axis=(1, 2)), slope, rest[:, 0])
+        t, mount = np.divmod(size.reshape(len(value), -1).argmax(axis=1), mounts)
+        box = np.arange(len(value))
+        there = slopes.reshape(*slopes.shape[:3], mounts, 3)[box, :, :, mount]
+        slope = np.einsum("bk,bkna,ba->bn", turns[t], there, along[box, t, mount]).real
+        return Under(size[box, t, mount], slope, rest.sum(axis=1))
+
+
+def root_under(answer: Answer, weights: Array) -> Under:
+    """Under the root of a weighted sum of squares; orders whose series need not end count as nothing."""
+    known = np.isfinite(answer.rest)
+    value = np.where(known[..., None], answer.value, 0.0)
+    size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
+    slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), answer.slopes).real
+    rest = np.sqrt(np.einsum("k,bk->b", weights, np.where(known, answer.rest, 0.0) ** 2))
+    return Under(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest)
+
+
+def _both_ways(second: ComplexArray) -> ComplexArray:
+    """The mean of (i, j) and (j, i): their sum is all that matters."""
+    return np.asarray(0.5 * (second + np.swapaxes(second, 2, 3)))
+
+
+def _inverse(matrices: ComplexArray) -> ComplexArray:
+    """Inverses; not a number where there is none, which leaves a box without a bound."""
+    try:
+        return np.asarray(np.linalg.inv(matrices))
+    except np.linalg.LinAlgError:
+        flat = matrices.reshape(-1, 6, 6)
+        singular = np.abs(np.linalg.det(flat)) == 0.0
+        flat = np.where(singular[:, None, None], np.eye(6), flat)
+        found = np.linalg.inv(flat)
+        found[singular] = np.inf
+        return np.asarray(found.reshape(matrices.shape))

@@ -1,0 +1,205 @@
+"""Proof of how good a design is, computed from the exact model alone (P4-P6).
+
+A norm is at least <Z, V> for every Z in the unit ball of its dual norm. With multipliers
+mu >= 0 on the limits the sum of such inequalities bounds the objective from below by an
+affine function of the decisions, whose least value over their sets is known in closed
+form. Any Z and mu give a valid bound; the solver only proposes good ones.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineNorm, AffineProblem
+from laufruhe.numerics import mixed_norms
+from laufruhe.numerics.mixed_norms import Norm
+
+Array = NDArray[np.float64]
+
+FLOOR = 1e-3
+"""Share of the objective as given beside which a gap is counted: a balanced engine has none of its own."""
+
+
+def gap_unit(value: float, given: float) -> float:
+    """What a gap of an objective is counted in, beside that of the design as given; never zero."""
+    # a design as given that stands on a resonance has no size
+    return max(value, FLOOR * given if math.isfinite(given) else 0.0) or 1.0
+
+
+class Proof(StrEnum):
+    """What has been proven of a design."""
+
+    GLOBAL = "global"
+    WITHIN_GAP = "global within gap"
+    LOCAL = "local"
+    NONE = "none"
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """How good a design is.
+
+    Attributes
+    ----------
+    kind
+        What was proven.
+    lower_bound
+        No design allowed has a smaller objective [SI].
+    gap
+        Objective less lower bound, over the larger of the objective and a thousandth
+        of that of the design as given.
+    kkt_residual
+        Largest violation of stationarity, feasibility and complementarity, each
+        relative to its own scale.
+    method
+        How the bound was found.
+    """
+
+    kind: Proof
+    lower_bound: float
+    gap: float
+    kkt_residual: float
+    method: str
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Dual rows: Z of every term, and mu Z of every limit, shapes (k, d)."""
+
+    terms: tuple[Array, ...]
+    limits: tuple[Array, ...]
+
+    def shadow_prices(self, problem: AffineProblem) -> tuple[float, ...]:
+        """Fall of the objective per unit by which a limit is relaxed (P5)."""
+        return tuple(
+            mixed_norms.dual_norm(norm.norm, norm.weights, z)
+            for (_, norm), z in zip(problem.limits, self.limits, strict=True)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Bound:
+    """An affine lower bound of the objective, constant + gradient . x, for every x allowed."""
+
+    value: float
+    gradient: Array
+    multipliers: Multipliers
+
+
+def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
+    """Least objective that these multipliers leave possible (P4).
+
+    Parameters
+    ----------
+    problem
+        Rows on the grid on which the bound is to hold.
+    multipliers
+        Any dual rows on that grid; terms are scaled into the dual unit ball.
+    """
+    gradient, constant = np.zeros(problem.size), 0.0
+    terms = []
+    for (weight, norm), given in zip(problem.terms, multipliers.terms, strict=True):
+        z = mixed_norms.dual_feasible(norm.norm, norm.weights, given)
+        terms.append(z)
+        constant += weight * float(np.vdot(z, norm.constant))
+        gradient += weight * np.einsum("kd,kdn->n", z, norm.slope)
+    for (maximum, norm), z in zip(problem.limits, multipliers.limits, strict=True):
+        price = mixed_norms.dual_norm(norm.norm, norm.weights, z)
+        constant += float(np.vdot(z, norm.constant)) - price * maximum
+        gradient += np.einsum("kd,kdn->n", z, norm.slope)
+    least = constant + sum(domain.least(gradient) for domain in problem.domains)
+    # every term is a norm, so nothing lies under zero
+    return Bound(max(least, 0.0), gradient, Multipliers(tuple(terms), multipliers.limits))
+
+
+def best_bound(fine: AffineProblem, coarse: AffineProblem, x: Array, found: Multipliers) -> Bound:
+    """The best of the bounds that a solution on a coarser grid suggests (P6).
+
+    One takes the solver's dual rows between the coarse angles; one takes the direction
+    of every row of the design itself, and the solver's only where a row vanishes.
+    """
+    spread = Multipliers(
+        tuple(_spread(norm, coarse.samples, z) for (_, norm), z in zip(fine.terms, found.terms, strict=True)),
+        tuple(_spread(norm, coarse.samples, z) for (_, norm), z in zip(fine.limits, found.limits, strict=True)),
+    )
+    direct = Multipliers(
+        tuple(_along(norm, x, z) for (_, norm), z in zip(fine.terms, spread.terms, strict=True)), spread.limits
+    )
+    return max((lower_bound(fine, m) for m in (spread, direct)), key=lambda bound: bound.value)
+
+
+def _along(norm: AffineNorm, x: Array, z: Array) -> Array:
+    if norm.norm is Norm.MAXIMUM:
+        return z
+    rows = norm.rows(x)
+    own = mixed_norms.subgradient(norm.norm, norm.weights, rows)
+    if norm.norm is Norm.RMS:
+        return own
+    size = mixed_norms.lengths(rows)
+    small = size <= 1e-6 * float(size.max(initial=0.0))
+    return np.where(small[:, None], z, own)
+
+
+def _spread(fine: AffineNorm, samples: int, z: Array) -> Array:
+    """Dual rows at `samples` angles on a finer grid: in between for means, in place for peaks.
+
+    Rows come in groups of one mount at one operating point, as many rows as angles;
+    masses have no angles and stay.
+    """
+    times = len(fine.weights) // len(z) if len(z) else 1
+    if times <= 1:
+        return z
+    blocks = z.reshape(-1, samples, z.shape[-1])
+    groups = len(blocks)
+    if fine.norm is Norm.MAXIMUM:
+        out = np.zeros((groups, blocks.shape[1] * times, z.shape[-1]))
+        out[:, ::times] = blocks
+        return out.reshape(-1, z.shape[-1])
+    share = np.arange(times) / times
+    following = np.roll(blocks, -1, axis=1)
+    mixed = blocks[:, :, None] * (1.0 - share[:, None]) + following[:, :, None] * share[:, None]
+    return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)
+
+
+def kkt_residual(problem: AffineProblem, x: Array, bound: Bound, whole: float | None = None) -> float:
+    """Largest violation of the optimality conditions, each relative to its own scale (P5).
+
+    Parameters
+    ----------
+    whole
+        What parts of the objective are relative to; the objective itself when left out,
+        which a perfectly balanced engine does not have.
+    """
+    scales = problem.scales
+    steps = [0.0]
+    reach = float(np.abs(_gradient_size(problem, bound) * scales).max(initial=0.0)) or 1.0
+    for domain in problem.domains:
+        part = domain.columns
+        # a step against the gradient, projected back, must not move: P_D(x - g) = x
+        step = bound.gradient[part] * scales[part] ** 2 / reach
+        moved = x.copy()
+        moved[part] = x[part] - step
+        steps.append(float(np.abs((domain.project(moved) - x[part]) / scales[part]).max(initial=0.0)))
+    prices = bound.multipliers.shadow_prices(problem)
+    whole = whole or problem.objective(x) or 1.0
+    for (weight, norm), z in zip(problem.terms, bound.multipliers.terms, strict=True):
+        # the dual row of an optimum points along its row: <Z, V> = norm(V)
+        steps.append(weight * (norm.value(x) - float(np.vdot(z, norm.rows(x)))) / whole)
+    for (maximum, norm), price in zip(problem.limits, prices, strict=True):
+        value = norm.value(x)
+        steps.append(max(0.0, value - maximum) / (maximum or 1.0))
+        steps.append(price * abs(maximum - value) / whole)
+    return max(steps)
+
+
+def _gradient_size(problem: AffineProblem, bound: Bound) -> Array:
+    """Sum of the sizes of what adds up to the gradient, shape (n,)."""
+    total = np.zeros(problem.size)
+    for (weight, norm), z in zip(problem.terms, bound.multipliers.terms, strict=True):
+        total += weight * np.einsum("kd,kdn->n", np.abs(z), np.abs(norm.slope))
+    return total

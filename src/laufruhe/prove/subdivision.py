@@ -1,0 +1,291 @@
+"""A lower bound of mount forces, travel and transmissibility by dividing the bounds of stiffness into boxes (E38-E40).
+
+On a box every quantity has a linear function under it that differs from it by the square of the box's size. Boxes
+whose least value is not under the design found, or on which a limit cannot be kept, are dropped, the others halved:
+the least value on what is left bounds the objective of every design allowed.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.problem.measure import ON_MOUNTS, Quantity, Subject
+from laufruhe.problem.mount_design import MountLimit, MountMeasure, MountQuantity
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.box_response import BoxModel, Expansion, Lines, Under, root_under
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# designs count as allowed when they break a limit by less
+SLACK = 3e-5
+# open numbers that are divided without being asked for, and what all boxes may cost together
+MOST_OPEN = 4
+WORK = 4e6
+MOST_BOXES = 20_000
+# numbers held at once
+HELD = 3e6
+HALVINGS = 45
+# of the gap that counts as proven: what small orders may take of it, and what is left for roundings
+LEFT_OUT, NEARLY = 0.05, 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Divided:
+    """What dividing the bounds has proven.
+
+    Attributes
+    ----------
+    bound
+        No design allowed has a smaller objective; zero where nothing is known.
+    boxes
+        That were looked at.
+    """
+
+    bound: float
+    boxes: int
+
+
+def divides(problem: Problem) -> bool:
+    """Whether stiffness alone is open, and some of the objective is known over boxes."""
+    design = problem.mount_design
+    stiffness = all(d.is_stiffness and all(drive.gain > 0.0 for drive in d.drives) for d in design.decisions)
+    if problem.decisions or not design.decisions or not stiffness:
+        return False
+    known = any(term.quantity.subject in ON_MOUNTS for term in problem.objective)
+    return known or any(quantity.measure is MountMeasure.TRANSMISSIBILITY for quantity, _ in design.terms)
+
+
+def divided_bound(problem: Problem, value: float, room: float, floor: float = 0.0) -> Divided:
+    """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
+
+    Parameters
+    ----------
+    problem
+        That `divides`.
+    value
+        Objective of the best design known.
+    room
+        Difference that counts as none [SI].
+    floor
+        A bound that is known already.
+    """
+    search = _Search(problem, LEFT_OUT * room)
+    most = search.most_boxes
+    if not most or not search.is_sampled_fully:
+        return Divided(floor, 0)
+    enough = value - NEARLY * room
+    lower, upper = search.model.lower, search.model.upper
+    bounds, sides = search.bounds(lower[None], upper[None])
+    heap = [(max(float(bounds[0]), floor), 0, lower, upper, int(sides[0]))]
+    seen = 1
+    while heap and heap[0][0] < enough and seen < most:
+        halves: list[tuple[Array, Array, float]] = []
+        while heap and heap[0][0] < enough and len(halves) < search.at_once:
+            known, _, low, high, side = heapq.heappop(heap)
+            here = np.arange(len(low)) == side
+            middle = 0.5 * (low + high)
+            halves.append((low, np.where(here, middle, high), known))
+            halves.append((np.where(here, middle, low), high, known))
+        lows, highs = (np.array([half[k] for half in halves]) for k in (0, 1))
+        bounds, sides = search.bounds(lows, highs)
+        for (low, high, known), bound, side in zip(halves, bounds, sides, strict=True):
+            seen += 1
+            if max(known, float(bound)) < enough:
+                heapq.heappush(heap, (max(known, float(bound)), seen, low, high, int(side)))
+    return Divided(max(min(heap[0][0] if heap else enough, enough), floor), seen)
+
+
+class _Search:
+    """Bounds of boxes."""
+
+    def __init__(self, problem: Problem, left_out: float) -> None:
+        self.problem = problem
+        self.model = BoxModel(problem, evaluate_start(problem))
+        terms = [term for term in problem.objective if term.quantity.subject in ON_MOUNTS]
+        share = left_out / max(sum(term.weight for term in terms), 1e-300)
+        self._terms = [(term.weight, term.quantity, *_felt(self.model, term.quantity, share)) for term in terms]
+        self._limits = [
+            (limit.maximum * (1.0 + SLACK), limit.quantity, *_felt(self.model, limit.quantity, SLACK * limit.maximum))
+            for limit in problem.limits
+            if limit.quantity.subject in ON_MOUNTS
+        ]
+
+    @property
+    def is_sampled_fully(self) -> bool:
+        """Whether sums of squares over orders are those over samples, as the rests suppose."""
+        return all(self.model.samples_fully(lines) for _, _, lines, _ in (*self._terms, *self._limits))
+
+    @property
+    def _cost(self) -> int:
+        """Of one box, in numbers."""
+        design, mounts = self.problem.mount_design, len(self.problem.engine.mounts)
+        lines = sum(len(lines.omegas) for _, _, lines, _ in (*self._terms, *self._limits))
+        ratios = [quantity for quantity, _ in design.terms]
+        lines += sum(2 * len(self._ratio_lines(q).omegas) for q in ratios if _is_ratio(q))
+        return max(lines, 1) * len(design.decisions) ** 2 * max(mounts, 2)
+
+    @property
+    def at_once(self) -> int:
+        """Boxes of one round."""
+        return int(np.clip(HELD / (3.0 * self._cost), 2, 64))
+
+    @property
+    def most_boxes(self) -> int:
+        """As many as asked for, or as a few seconds allow."""
+        asked = self.problem.mount_design.boxes
+        if asked is not None:
+            return asked
+        if len(self.problem.mount_design.decisions) > MOST_OPEN:
+            return 0
+        return int(min(WORK / self._cost, MOST_BOXES))
+
+    def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            return self._bounds(lower, upper)
+
+    def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
+        total, slopes, pull = np.zeros(len(lower)), np.zeros_like(lower), np.zeros_like(lower)
+        for weight, quantity, lines, left_out in self._terms:
+            at = self.model.expanded(lines, lower, upper)
+            under = self.model.under(quantity, lines, at)
+            total += weight * (under.value - under.rest - left_out)
+            slopes += weight * under.slopes
+            pull = np.maximum(pull, _pull(at))
+        found = _known(total - np.abs(slopes).sum(axis=1))
+        for asked, weight in self.problem.mount_design.terms:
+            if _is_ratio(asked):
+                ratio, pulled = self._ratio(asked, lower, upper)
+                found, pull = np.asarray(found + weight * ratio), np.maximum(pull, pulled)
+            else:
+                found = np.asarray(found + weight * _least(self.model, asked, lower, upper))
+        found = np.where(self._cannot(lower, upper), np.inf, found)
+        return found, np.argmax(np.nan_to_num(pull) + 1e-12 * (upper - lower) / upper.max(), axis=1)
+
+    def _cannot(self, lower: Array, upper: Array) -> Mask:
+        """Boxes on which a limit is broken everywhere."""
+        out = np.zeros(len(lower), dtype=bool)
+        for maximum, quantity, lines, left_out in self._limits:
+            at = self.model.expanded(lines, lower, upper)
+            under = self.model.under(quantity, lines, at)
+            out |= _known(under.value - under.rest - left_out - np.abs(under.slopes).sum(axis=1)) > maximum
+        for limit in self.problem.mount_design.limits:
+            if _is_ratio(limit.quantity):
+                out |= self._ratio(limit.quantity, lower, upper)[0] > (limit.maximum or math.inf) * (1.0 + SLACK)
+            else:
+                out |= breaks(self.model, limit, lower, upper)
+        return out
+
+    # transmissibility
+
+    def _ratio_lines(self, quantity: MountQuantity) -> Lines:
+        counted = Quantity(Subject.MOUNT_FORCE, Norm.RMS, points=quantity.points, orders=quantity.orders)
+        lines = self.model.lines(counted)
+        return lines.kept(lines.omegas > 0.0)
+
+    def _ratio(self, quantity: MountQuantity, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Least transmissibility on every box (E40)."""
+        lines = self._ratio_lines(quantity)
+        rows = np.arange(3 * len(self.problem.engine.mounts), dtype=np.intp)
+        at, still = (self.model.expanded(each, lower, upper) for each in (lines, lines.still()))
+        over, under = (
+            self.model.answer(each, expansion, Subject.MOUNT_FORCE, rows, np.ones(len(rows)))
+            for each, expansion in ((lines, at), (lines.still(), still))
+        )
+        best = np.zeros(len(lower))
+        for group in _groups(quantity, lines):
+            weights = group.astype(float)
+            top, bottom = root_under(over, weights), root_under(under, weights)
+            bent = np.einsum("k,bk->b", weights, np.linalg.norm(under.slopes, axis=-1).sum(axis=-1) ** 2)
+            known = np.all(np.isfinite(under.rest[:, group]), axis=1) & (bottom.value > 0.0)
+            bend = bent / (2.0 * np.where(known, bottom.value, 1.0))
+            least = _least_ratio(top, Under(bottom.value, bottom.slopes, bottom.rest + bend))
+            best = np.maximum(best, np.where(known, least, 0.0))
+        return best, _pull(at)
+
+
+def _is_ratio(quantity: MountQuantity) -> bool:
+    return quantity.measure is MountMeasure.TRANSMISSIBILITY
+
+
+def _groups(quantity: MountQuantity, lines: Lines) -> list[Mask]:
+    """Lines that make one ratio: of each operating point every order named, or all together."""
+    out = []
+    for p in np.unique(lines.points):
+        own = lines.points == p
+        orders: Sequence[float | None] = (None,) if quantity.orders is None else quantity.orders
+        out += [own if order is None else own & (np.abs(lines.orders - order) < 5e-4) for order in orders]
+    return [group for group in out if group.any()]
+
+
+def _least_ratio(top: Under, bottom: Under) -> Array:
+    """Largest t with top - t bottom >= 0 all over the box, top from below and bottom from above (E40)."""
+    low = np.zeros(len(top.value))
+    high = top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
+    for _ in range(HALVINGS):
+        t = 0.5 * (low + high)
+        left = top.value - top.rest - t * (bottom.value + bottom.rest)
+        holds = left - np.abs(top.slopes - t[:, None] * bottom.slopes).sum(axis=1) >= 0.0
+        low, high = np.where(holds, t, low), np.where(holds, high, t)
+    return low
+
+
+def _felt(model: BoxModel, quantity: Quantity, budget: float) -> tuple[Lines, float]:
+    """Lines without those that together do less than a budget anywhere, and what they do (E41)."""
+    lines = model.lines(quantity)
+    factor = max(quantity.direction_weights or (1.0,))
+    felt = factor * model.felt_at_most(lines, quantity.subject)
+    order = np.argsort(felt, kind="stable")
+    # the sum is over any root of squares, so it serves every norm
+    together = np.cumsum(felt[order])
+    kept = np.ones(len(felt), dtype=bool)
+    out = order[together <= budget]
+    kept[out] = False
+    return lines.kept(kept), float(felt[out].sum())
+
+
+def _pull(at: Expansion) -> Array:
+    """By how much each side of every box keeps the expansion from ending, shape (boxes, n)."""
+    return np.asarray(np.nan_to_num(at.pull, nan=1.0, posinf=1.0).max(axis=1, initial=0.0))
+
+
+def _known(bound: Array) -> Array:
+    """Zero where an expansion does not end: no norm goes under it."""
+    return np.maximum(np.where(np.isfinite(bound), bound, 0.0), 0.0)
+
+
+def _least(model: BoxModel, quantity: MountQuantity, lower: Array, upper: Array) -> Array:
+    """Least sag or total stiffness on every box: at its stiffest or softest corner; zero for all else."""
+    if quantity.measure is MountMeasure.SAG:
+        return model.sag(upper)
+    if quantity.measure is MountMeasure.TOTAL_STIFFNESS:
+        return model.total_stiffness(lower)
+    return np.zeros(len(lower))
+
+
+def breaks(model: BoxModel, limit: MountLimit, lower: Array, upper: Array) -> Mask:
+    """Whether a limit is broken all over a box; more stiffness lowers sag and raises every frequency (E39)."""
+    least = -math.inf if limit.minimum is None else limit.minimum * (1.0 - SLACK)
+    most = math.inf if limit.maximum is None else limit.maximum * (1.0 + SLACK)
+    measure = limit.quantity.measure
+    if measure is MountMeasure.SAG:
+        return np.asarray((model.sag(upper) > most) | (model.sag(lower) < least))
+    if measure is MountMeasure.TOTAL_STIFFNESS:
+        return np.asarray((model.total_stiffness(lower) > most) | (model.total_stiffness(upper) < least))
+    if measure is not MountMeasure.FREQUENCIES:
+        return np.zeros(len(lower), dtype=bool)
+    low, high = (np.sqrt(np.maximum(np.linalg.eigvalsh(model.stiffness(x)), 0.0)) / math.tau for x in (lower, upper))
+    out = (high[:, 0] < least) | (low[:, -1] > most)
+    if limit.outside is not None:
+        a, b = limit.outside[0] * (1.0 + SLACK), limit.outside[1] * (1.0 - SLACK)
+        out |= np.any((low > a) & (high < b), axis=1)
+    return np.asarray(out)

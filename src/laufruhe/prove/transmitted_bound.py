@@ -1,0 +1,303 @@
+"""What no elastic mounting within the bounds transmits less of (E29-E34).
+
+Coordinates are those in which the mass is one. Of an order with load r the mounts
+carry t = r + W^2 y in all, y being the motion (Newton), and
+
+    y* (A + i B - W^2) y = y* r,    so    y* (L - W^2) y <= Re y* r                     (E30)
+
+for every design whose stiffness A is not under L and whose damping B takes energy. In
+t this is one quadratic inequality, and least mount forces under it are bounded from
+below by duality (E33): the multipliers come from a solver, the bound from them does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineModel
+from laufruhe.load_models.domain import Domain
+from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.numerics.spectrum import common_base
+from laufruhe.physics.modes import weight_wrench
+from laufruhe.physics.rigid_body import carried, moved_wrench, point_motion
+from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.problem.mount_design import (
+    POSITION,
+    STIFFNESS,
+    TURNED,
+    MountMeasure,
+    mounting_in,
+)
+from laufruhe.problem.mount_resonance import off_resonance
+from laufruhe.problem.problem import Problem
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+# designs are taken as feasible when they break a limit by less
+SLACK = 3e-5
+ROUNDS = 2
+# share of a square that is spent on the arms of mounts whose places are open
+STRETCH = 0.2
+ASIDE = 5e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """v' H v + 2 b' v + c."""
+
+    matrix: Array
+    vector: Array
+    constant: float
+
+    def plus(self, other: Quadratic, factor: float) -> Quadratic:
+        """The sum with a multiple of another."""
+        return Quadratic(
+            self.matrix + factor * other.matrix,
+            self.vector + factor * other.vector,
+            self.constant + factor * other.constant,
+        )
+
+    @property
+    def least(self) -> float:
+        """Over all v; minus infinity where it is not strictly convex."""
+        values, vectors = np.linalg.eigh(0.5 * (self.matrix + self.matrix.T))
+        if values[0] <= 1e-12 * abs(values[-1]):
+            return -math.inf
+        return self.constant - float(np.sum((vectors.T @ self.vector) ** 2 / values))
+
+
+@dataclass(frozen=True, eq=False)
+class Softest:
+    """What every design allowed has in common (E31, E32).
+
+    Attributes
+    ----------
+    floors
+        Matrices L that the stiffness A of no design goes under, shape (n, 6, 6).
+    squares
+        Matrices that G' G of no mount goes over, in coordinates in which the mass is one,
+        shape (mounts, 6, 6).
+    load
+        From a wrench about the origin to r, shape (6, 6).
+    """
+
+    floors: Array
+    squares: Array
+    load: Array
+
+    def metric(self, norm: Norm, loads: ComplexArray) -> Array:
+        """P of E32: for squares of forces their sum, for the forces themselves a matrix that covers each."""
+        if norm is not Norm.SUM:
+            return np.asarray(self.squares.sum(axis=0))
+        from laufruhe.solvers.mount_cones import covering
+
+        # tight along the load, for what is transmitted points mostly the same way
+        felt = np.real(np.outer(loads[0], loads[0].conj()))
+        size = float(np.trace(felt))
+        return covering(list(self.squares), felt / size + ASIDE * np.eye(6) if size > 0.0 else np.eye(6))
+
+
+def transmitted_bound(problem: Problem) -> float:
+    """What the objective of no design allowed goes under; zero where nothing is known (E34).
+
+    Means, maxima and root mean squares of mount forces are bounded, all mounts counted;
+    whatever else is minimised counts as zero, which no norm goes under.
+    """
+    bounded = [(term.weight, term.quantity) for term in problem.objective if _is_bounded(term.quantity)]
+    if not bounded or not problem.points:
+        return 0.0
+    softest, model = softest_of(problem), AffineModel(off_resonance(problem))
+    return sum(weight * _of_quantity(problem, quantity, softest, model) for weight, quantity in bounded)
+
+
+def _is_bounded(quantity: Quantity) -> bool:
+    return quantity.subject is Subject.MOUNT_FORCE and quantity.mounts is None
+
+
+def softest_of(problem: Problem) -> Softest:
+    """The least stiffness and the longest arms that the bounds of the decisions leave (E31, E32)."""
+    mounting = mounting_in(problem.engine)
+    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
+    least, most = _ranges(problem)
+    floors, arms = [np.zeros((6, 6))], []
+    for mount, low, high in zip(mounting.mounts, least, most, strict=True):
+        middle = 0.5 * (low[POSITION] + high[POSITION])
+        reach = float(np.linalg.norm(0.5 * (high[POSITION] - low[POSITION])))
+        motion = root_motion = point_motion(NUMBERS, middle - np.array(mounting.block.centre_of_gravity))
+        root_motion = motion @ root.T
+        square = root_motion.T @ root_motion
+        if reach == 0.0:
+            soft = np.maximum(low[STIFFNESS], 0.0)
+            turned = np.any(low[TURNED] < high[TURNED])
+            axes = np.array(mount.orientation)
+            spring = soft.min() * np.eye(3) if turned else axes.T @ np.diag(soft) @ axes
+            floors[0] += carried(root_motion, spring)
+        else:
+            turning = root[:, 3:] @ root[:, 3:].T
+            square = (1.0 + STRETCH) * square + (1.0 + 1.0 / STRETCH) * reach**2 * turning
+        arms.append(square)
+    floors += _limited_floors(problem, root)
+    return Softest(
+        (1.0 - SLACK) * np.array(floors),
+        np.array(arms),
+        root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
+    )
+
+
+def _ranges(problem: Problem) -> tuple[Array, Array]:
+    """Least and largest values of the numbers of every mount, shape (mounts, 13) each."""
+    low = np.array(problem.mount_design.numbers, dtype=float)
+    high = low.copy()
+    for decision in problem.mount_design.decisions:
+        for drive in decision.drives:
+            ends = [drive.gain * (edge - decision.start) for edge in (decision.lower, decision.upper)]
+            low[drive.mount, drive.number] += min(ends)
+            high[drive.mount, drive.number] += max(ends)
+    return low, high
+
+
+def _limited_floors(problem: Problem, root: Array) -> list[Array]:
+    """L from limits: a lowest natural frequency, and the largest sag (E31)."""
+    found = []
+    weight = weight_wrench(mounting_in(problem.engine).block)
+    for limit in problem.mount_design.limits:
+        if limit.quantity.measure is MountMeasure.FREQUENCIES and limit.minimum:
+            found.append((math.tau * limit.minimum) ** 2 * np.eye(6))
+        if limit.quantity.measure is MountMeasure.SAG and limit.maximum:
+            pull = root @ weight
+            found.append(np.outer(pull, pull) / (limit.maximum * -weight[2]))
+    return found
+
+
+def _of_quantity(problem: Problem, quantity: Quantity, softest: Softest, model: AffineModel) -> float:
+    chosen = [
+        (point, spectra)
+        for point, spectra in zip(problem.points, model.wrenches(), strict=True)
+        if quantity.points is None or point.name in quantity.points
+    ]
+    # no direction counts less than the least weight
+    least = min(quantity.direction_weights or (1.0,))
+    whole = sum(point.weight for point, _ in chosen)
+    total, largest = 0.0, 0.0
+    for point, (bare, slopes) in chosen:
+        base = common_base([bare.base, *(slope.base for slope in slopes)])
+        coefficients = [s.rebased(base).coefficients for s in (bare, *slopes)]
+        squares, means = [0.0], [0.0]
+        for k in range(max(len(c) for c in coefficients)):
+            order = k * float(base)
+            if quantity.orders is not None and not any(abs(order - o) < 5e-4 for o in quantity.orders):
+                continue
+            loads = np.array([softest.load @ c[k] if k < len(c) else np.zeros(6) for c in coefficients])
+            half = 0.5 if k else 1.0
+            metric = softest.metric(quantity.norm, loads)
+            least_square = least_transmitted(loads, order * point.speed, metric, softest.floors, model.domains)
+            squares.append(half * least_square / len(softest.squares))
+            means.append(half * math.sqrt(least_square) / len(softest.squares))
+        share = point.weight / whole
+        total += share * (max(means) if quantity.norm is Norm.SUM else sum(squares))
+        largest = max(largest, sum(squares))
+    if quantity.norm is Norm.SUM:
+        return least * total
+    return least * math.sqrt(largest if quantity.norm is Norm.MAXIMUM else total)
+
+
+def least_transmitted(
+    loads: ComplexArray, omega: float, metric: Array, floors: Array, domains: Sequence[Domain] = ()
+) -> float:
+    """What t* metric^-1 t of no design is under (E33).
+
+    Parameters
+    ----------
+    loads
+        r of the bare design and of one unit of every column of the unbalances, in
+        coordinates in which the mass is one, shape (1 + columns, 6).
+    omega
+        Angular frequency [rad/s].
+    metric
+        Shape (6, 6).
+    floors
+        Matrices L, shape (n, 6, 6).
+    domains
+        Of the unbalances.
+    """
+    reach = np.concatenate([np.full(d.width, d.scale) for d in domains] or [np.zeros(0)])
+    size = float(np.linalg.norm(loads, axis=1) @ np.concatenate([[1.0], reach]))
+    if size == 0.0:
+        return 0.0
+    real = np.concatenate([loads.real, loads.imag], axis=1).T
+    given, slopes = real[:, 0], real[:, 1:]
+    inverse = _twice(np.asarray(np.linalg.inv(metric), dtype=np.float64))
+    if omega == 0.0:
+        return _least(_steady(given, slopes, inverse), _disc_limits(domains, 0), reach)
+    objective = Quadratic(np.pad(inverse, (0, len(reach))), np.zeros(12 + len(reach)), 0.0)
+    held = [_energy(_twice(floor) / omega**2, given, slopes) for floor in floors] + _disc_limits(domains, 12)
+    stiffest = np.linalg.eigvalsh(floors.sum(axis=0)).max() / omega**2
+    carried_load, best = size * min(max(stiffest, 1e-8), 1.0), 0.0
+    for _ in range(ROUNDS):
+        found = _least(objective, held, np.concatenate([np.full(12, carried_load), reach]))
+        best = max(best, found)
+        # a solver works best where the answer is of size one
+        carried_load = math.sqrt(best * float(np.linalg.eigvalsh(metric)[-1])) or carried_load
+    return best
+
+
+def _least(objective: Quadratic, held: Sequence[Quadratic], scales: Array) -> float:
+    """A lower bound of a function under others that may not exceed zero; none of them takes it under zero (E33)."""
+    from laufruhe.solvers.mount_cones import best_prices
+
+    if not len(scales):
+        return objective.constant
+    total, unit = _scaled(objective, scales)
+    sized = [_scaled(each, scales)[0] for each in held]
+    for each, price in zip(sized, best_prices(total, sized), strict=True):
+        total = total.plus(each, max(float(price), 0.0))
+    return max(unit * total.least, 0.0)
+
+
+def _twice(matrix: Array) -> Array:
+    """For the real and for the imaginary part."""
+    return np.asarray(np.kron(np.eye(2), matrix), dtype=np.float64)
+
+
+def _steady(given: Array, slopes: Array, inverse: Array) -> Quadratic:
+    """At rest the mounts carry the load itself: t = r."""
+    return Quadratic(slopes.T @ inverse @ slopes, slopes.T @ inverse @ given, float(given @ inverse @ given))
+
+
+def _energy(floor: Array, given: Array, slopes: Array) -> Quadratic:
+    """E30 in t and the columns: (t - r)' (L / W^2 - 1) (t - r) <= (t - r)' r, r = given + slopes x."""
+    one = np.eye(12)
+    across = 0.5 * (one - 2.0 * floor)
+    matrix = np.block([[floor - one, across @ slopes], [slopes.T @ across, slopes.T @ floor @ slopes]])
+    vector = np.concatenate([across @ given, slopes.T @ floor @ given])
+    return Quadratic(matrix, vector, float(given @ floor @ given))
+
+
+def _disc_limits(domains: Sequence[Domain], before: int) -> list[Quadratic]:
+    """Where the unbalances lie: |u| at most its largest size, a real one between its bounds."""
+    size = before + sum(domain.width for domain in domains)
+    found = []
+    for domain in domains:
+        matrix, vector = np.zeros((size, size)), np.zeros(size)
+        own = np.arange(size)[before:][domain.columns]
+        matrix[own, own] = 1.0
+        constant = -(domain.scale**2)
+        if domain.width == 1:
+            low, high = domain.decision.lower, domain.decision.upper
+            vector[own], constant = -0.5 * (low + high), low * high
+        found.append(Quadratic(matrix, vector, constant))
+    return found
+
+
+def _scaled(function: Quadratic, scales: Array) -> tuple[Quadratic, float]:
+    """In variables of size one, and divided by its own size; that size."""
+    matrix, vector = function.matrix * np.outer(scales, scales), function.vector * scales
+    size = max(np.abs(matrix).max(initial=0.0), np.abs(vector).max(initial=0.0), abs(function.constant)) or 1.0
+    return Quadratic(matrix / size, vector / size, function.constant / size), float(size)

@@ -1,0 +1,118 @@
+"""What no slightly uneven star can go under (S22).
+
+As in S4 a direction v bounds the couples by sum_k x_k a_k, but a throw on step p may now
+stand anywhere in a window around it: as far as the intervals before and after it let
+its firing move. The least of x_k a_p over the window is a number for each throw and step,
+so every star is bounded by a sum, and all stars by the least of their bounds.
+
+Gas has a mean torque that no throw changes, and a norm is never less than that of the
+mean over the cycle (S24).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine.firing import firing_lattice
+from laufruhe.physics.crank_stars import Stars
+from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import MASSES
+from laufruhe.problem.phasing import Intervals, Phasing
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.star_search import AmplitudeObjective, directions
+
+Array = NDArray[np.float64]
+
+POINTS = 97
+MOST_STARS = 50_000
+
+
+def uneven_bound(
+    phasing: Phasing, space: StarSpace, objective: AmplitudeObjective, intervals: Intervals
+) -> float:  # fmt: skip
+    """Least objective that any star of in-line cylinders may have with these firing intervals [SI].
+
+    Parameters
+    ----------
+    phasing
+        Of in-line cylinders, throws open.
+    space
+        The even stars.
+    objective
+        Norms of couples.
+    intervals
+        Bounds of every firing interval [rad].
+
+    Returns
+    -------
+    Zero, which always holds, where there are too many stars to look at.
+    """
+    if phasing.bank is not None or space.size > MOST_STARS:
+        return 0.0
+    costs = throw_costs(phasing, space, objective, intervals)
+    whole = StarSpace(space.phases, space.patterns, space.places, mirror=True, reflect=True)
+    least = min(float(star_bounds(costs, block).min()) for block in whole.blocks())
+    return max(least, 0.0)
+
+
+def steady_bound(problem: Problem) -> float:
+    """What the mean of the loads over the cycle leaves of the objective, on mounts as given (S24) [SI]."""
+    given, total = evaluate(problem), 0.0
+    for term in problem.objective:
+        quantity = term.quantity
+        if quantity.subject in MASSES or (quantity.orders is not None and 0.0 not in quantity.orders):
+            continue
+        total += term.weight * given.value(replace(quantity, orders=(0.0,)))
+    return total
+
+
+def star_bounds(costs: Array, stars: Stars) -> Array:
+    """The best bound of every star over all directions, shape (n,)."""
+    total = np.zeros((len(stars), len(costs)))
+    for k in range(stars.shape[1]):
+        total += costs[:, k, stars[:, k]].T
+    return np.asarray(total.max(axis=1))
+
+
+def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjective, intervals: Intervals) -> Array:
+    """Least of x_k a_p over the window of step p, shape (directions, throws, steps)."""
+    lower, upper = windows(phasing, intervals)
+    v = directions(objective)
+    orders = np.array(objective.orders, dtype=float)
+    out = np.empty((len(v), space.throws, space.phases))
+    places = np.array(space.places)
+    for p in range(space.phases):
+        angles = math.tau * p / space.phases + np.linspace(lower[p], upper[p], POINTS)
+        values = (v.conj() @ np.exp(1j * np.outer(orders, angles))).real
+        # between two points a function bends away from its chord by at most a'' step^2 / 8
+        step = (upper[p] - lower[p]) / (POINTS - 1)
+        bend = (np.abs(v) @ orders**2) * step**2 / 8.0
+        low, high = values.min(axis=1) - bend, values.max(axis=1) + bend
+        out[:, :, p] = np.where(places > 0.0, places * low[:, None], places * high[:, None])
+    return out
+
+
+def windows(phasing: Phasing, intervals: Intervals) -> tuple[Array, Array]:
+    """How far a throw of every step may stand from it [rad], cylinder 1 at its dead centre.
+
+    The s-th firing comes between s least and s most intervals after the first, and as
+    many before the next cycle. A throw fires later the less far ahead it stands.
+    """
+    count, cycle, even = phasing.cylinders, phasing.cycle.angle, phasing.even_interval
+    lattice = firing_lattice(phasing.cycle, count)
+    lower, upper = np.full(lattice.steps, math.inf), np.full(lattice.steps, -math.inf)
+    for s, step in enumerate(lattice.slots):
+        most = min(intervals.most, cycle)
+        early = max(s * intervals.least, cycle - (count - s) * most) - s * even
+        late = min(s * most, cycle - (count - s) * intervals.least) - s * even
+        p = -step % lattice.steps
+        lower[p], upper[p] = min(lower[p], -late), max(upper[p], -early)
+    # the first throw stays
+    if phasing.cycle.turns == 1 or count % 2:
+        lower[0] = upper[0] = 0.0
+    return lower, upper
