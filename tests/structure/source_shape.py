@@ -1,0 +1,238 @@
+"""What the source is made of, measured on its syntax: lengths, imports, circles, chains of questions.
+
+Every measure is a set of names of what breaks a rule. `python tests/structure/source_shape.py` prints them, and
+with `--prune` takes out of `exceptions.toml` what no longer breaks its rule (it never adds one).
+"""
+
+import ast
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+SOURCE = Path(__file__).parents[2] / "src"
+EXCEPTIONS = Path(__file__).with_name("exceptions.toml")
+ROOT = "laufruhe"
+FILE_LINES = 350
+FUNCTION_LINES = 45
+# Libraries that cost tens of milliseconds to load may be imported where they are needed; the commands may import
+# anything late, so that `--help` answers at once, and so may the package itself, for `import laufruhe`.
+HEAVY = {"casadi", "clarabel", "cvxpy", "matplotlib", "mpmath", "netCDF4", "pint", "pyscipopt", "scipy", "xarray"}
+LATE_ROOMS = ("", "cli")
+# Kinds that answer for themselves: nobody but their own file asks which one it is.
+KINDS = {"Norm": ("laufruhe.numerics.norms",), "MountMeasure": ("laufruhe.problem.measure",)}
+LAYOUTS = {"inline", "vee", "boxer", "opposed-piston", "parts"}
+LAYOUT_ROOM = "laufruhe.machine"
+
+Trees = dict[str, ast.Module]
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(SOURCE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def room(module: str) -> str:
+    """Second part of a module's name: empty for the package itself."""
+    return module.partition(".")[2].partition(".")[0]
+
+
+def trees() -> Trees:
+    return {module_name(path): ast.parse(path.read_text(encoding="utf-8")) for path in sorted(SOURCE.rglob("*.py"))}
+
+
+def total_lines() -> int:
+    return sum(path.read_text(encoding="utf-8").count("\n") for path in SOURCE.rglob("*.py"))
+
+
+def functions(tree: ast.AST, prefix: str = "") -> Iterator[tuple[str, Function]]:
+    """Every function with its dotted name inside the module, those of classes and of functions too."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, Function | ast.ClassDef):
+            name = f"{prefix}{node.name}"
+            if isinstance(node, Function):
+                yield name, node
+            yield from functions(node, f"{name}.")
+        else:
+            yield from functions(node, prefix)
+
+
+def imported(node: ast.AST, module: str, known: Trees) -> set[str]:
+    """Modules that an import statement names; a name that is no module counts as its package."""
+    if isinstance(node, ast.Import):
+        return {alias.name for alias in node.names}
+    if isinstance(node, ast.ImportFrom):
+        assert node.level == 0, f"{module}: relative import"
+        base = node.module or ""
+        return {f"{base}.{alias.name}" if f"{base}.{alias.name}" in known else base for alias in node.names}
+    return set()
+
+
+def own_imports(known: Trees) -> dict[str, set[str]]:
+    """Modules of the project that each module imports, anywhere in its text."""
+    return {
+        module: {name for node in ast.walk(tree) for name in imported(node, module, known) if name in known} - {module}
+        for module, tree in known.items()
+    }
+
+
+def circles(graph: dict[str, set[str]]) -> list[set[str]]:
+    """Strongly connected sets of more than one module (Kosaraju)."""
+    order: list[str] = []
+    seen: set[str] = set()
+
+    def visit(start: str, edges: dict[str, set[str]], found: list[str]) -> None:
+        stack = [(start, iter(sorted(edges[start])))]
+        seen.add(start)
+        while stack:
+            name, rest = stack[-1]
+            following = next((other for other in rest if other not in seen), None)
+            if following is None:
+                found.append(name)
+                stack.pop()
+            else:
+                seen.add(following)
+                stack.append((following, iter(sorted(edges[following]))))
+
+    for name in sorted(graph):
+        if name not in seen:
+            visit(name, graph, order)
+    backward: dict[str, set[str]] = {name: set() for name in graph}
+    for name, others in graph.items():
+        for other in others:
+            backward[other].add(name)
+    seen.clear()
+    sets: list[set[str]] = []
+    for name in reversed(order):
+        if name not in seen:
+            component: list[str] = []
+            visit(name, backward, component)
+            sets.append(set(component))
+    return [component for component in sets if len(component) > 1]
+
+
+def long_files() -> set[str]:
+    lengths = {path: path.read_text(encoding="utf-8").count("\n") for path in SOURCE.rglob("*.py")}
+    return {module_name(path) for path, lines in lengths.items() if lines > FILE_LINES}
+
+
+def long_functions(known: Trees) -> set[str]:
+    return {
+        f"{module}.{name}"
+        for module, tree in known.items()
+        for name, node in functions(tree)
+        if (node.end_lineno or node.lineno) - node.lineno + 1 > FUNCTION_LINES
+    }
+
+
+def late_imports(known: Trees) -> set[str]:
+    return {
+        f"{module} -> {name}"
+        for module, tree in known.items()
+        if room(module) not in LATE_ROOMS
+        for _, function in functions(tree)
+        for node in ast.walk(function)
+        for name in imported(node, module, known)
+        if name.partition(".")[0] not in HEAVY
+    }
+
+
+def operands(tree: ast.Module) -> Iterator[ast.expr]:
+    """What comparisons, patterns and `isinstance` ask for, tuples taken apart."""
+    for node in ast.walk(tree):
+        asked: list[ast.expr] = []
+        if isinstance(node, ast.Compare):
+            asked = [node.left, *node.comparators]
+        elif isinstance(node, ast.MatchValue):
+            asked = [node.value]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance":
+            asked = node.args[1:]
+        for expression in asked:
+            yield from expression.elts if isinstance(expression, ast.Tuple | ast.Set | ast.List) else (expression,)
+
+
+def norm_classes(known: Trees) -> set[str]:
+    """Names of the classes below `numerics.norms`, once norms are classes."""
+    return {
+        node.name
+        for module, tree in known.items()
+        if module.startswith("laufruhe.numerics.norms")
+        for node in tree.body
+        if isinstance(node, ast.ClassDef) and node.name != "Norm"
+    }
+
+
+def asked_kind(operand: ast.expr, classes: set[str]) -> str:
+    """Kind whose member `operand` is, empty when it is none."""
+    if isinstance(operand, ast.Attribute) and isinstance(operand.value, ast.Name) and operand.value.id in KINDS:
+        return operand.value.id
+    return "Norm" if isinstance(operand, ast.Name) and operand.id in classes else ""
+
+
+def questions_of_kind(known: Trees) -> set[str]:
+    """Modules that ask which norm or measure they hold, with how often they ask."""
+    classes = norm_classes(known)
+    found: dict[str, int] = {}
+    for module, tree in known.items():
+        for operand in operands(tree):
+            kind = asked_kind(operand, classes)
+            if kind and not module.startswith(KINDS[kind]):
+                found[module] = found.get(module, 0) + 1
+    return {f"{module}: {count}" for module, count in found.items()}
+
+
+def questions_of_layout(known: Trees) -> set[str]:
+    found: dict[str, int] = {}
+    for module, tree in known.items():
+        for operand in operands(tree):
+            named = isinstance(operand, ast.Constant) and operand.value in LAYOUTS
+            if named and not module.startswith(LAYOUT_ROOM):
+                found[module] = found.get(module, 0) + 1
+    return {f"{module}: {count}" for module, count in found.items()}
+
+
+def measured() -> dict[str, set[str]]:
+    """What breaks each rule today."""
+    known = trees()
+    return {
+        "long_files": long_files(),
+        "long_functions": long_functions(known),
+        "late_imports": late_imports(known),
+        "circles": {module for circle in circles(own_imports(known)) for module in circle},
+        "questions_of_norm": questions_of_kind(known),
+        "questions_of_layout": questions_of_layout(known),
+    }
+
+
+def exceptions() -> dict[str, set[str]]:
+    return {rule: set(names) for rule, names in tomllib.loads(EXCEPTIONS.read_text(encoding="utf-8")).items()}
+
+
+def written(table: dict[str, set[str]]) -> str:
+    head = "# What still breaks a rule of the structure. Names only go from here, none comes.\n"
+    entries = {rule: "".join(f'    "{name}",\n' for name in sorted(names)) for rule, names in table.items()}
+    return head + "".join(f"\n{rule} = [\n{names}]\n" for rule, names in entries.items())
+
+
+def still_allowed(name: str, allowed: set[str]) -> bool:
+    """Whether an exception covers `name`; a count may only fall."""
+    module, _, count = name.partition(": ")
+    if not count:
+        return name in allowed
+    limits = [int(other.rpartition(": ")[2]) for other in allowed if other.partition(": ")[0] == module]
+    return bool(limits) and int(count) <= limits[0]
+
+
+def main() -> None:
+    found = measured()
+    if "--prune" in sys.argv:
+        allowed = exceptions()
+        kept = {rule: {name for name in names if still_allowed(name, allowed[rule])} for rule, names in found.items()}
+        EXCEPTIONS.write_text(written(kept), encoding="utf-8")
+        return
+    sys.stdout.write(written(found) + f"\n# {total_lines()} lines in all\n")
+
+
+if __name__ == "__main__":
+    main()

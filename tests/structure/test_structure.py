@@ -1,0 +1,48 @@
+"""Files and functions stay short, imports only point down and at the top, kinds answer for themselves.
+
+What breaks a rule today stands in `exceptions.toml`. Whoever mends one takes it out:
+`python tests/structure/source_shape.py --prune`.
+"""
+
+import pytest
+
+from structure import source_shape
+
+RULES = {
+    "long_files": f"files over {source_shape.FILE_LINES} lines",
+    "long_functions": f"functions over {source_shape.FUNCTION_LINES} lines",
+    "late_imports": "imports inside a function, of what is neither a heavy library nor wanted by a command",
+    "circles": "modules in a circle of imports, those inside functions included",
+    "questions_of_norm": "modules that ask which norm or measure they hold, with how often",
+    "questions_of_layout": "modules that ask for a layout by its name, with how often",
+}
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[str, set[str]]:
+    return source_shape.measured()
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_nothing_new_breaks_a_rule_of_the_structure(rule, found):
+    allowed = source_shape.exceptions()[rule]
+    new = {name for name in found[rule] if not source_shape.still_allowed(name, allowed)}
+    assert not new, f"{RULES[rule]}: {sorted(new)} ({source_shape.total_lines()} lines of source in all)"
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_an_exception_that_is_mended_is_taken_out(rule, found):
+    mended = source_shape.exceptions()[rule] - found[rule]
+    assert not mended, (
+        f"no longer {RULES[rule]}: {sorted(mended)}; run `python tests/structure/source_shape.py --prune` "
+        f"({source_shape.total_lines()} lines of source in all)"
+    )
+
+
+def test_the_rules_are_those_that_are_measured(found):
+    assert set(RULES) == set(found) == set(source_shape.exceptions())
+
+
+def test_a_circle_is_found_also_through_a_third_module():
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set(), "e": {"a"}}
+    assert source_shape.circles(graph) == [{"a", "b", "c"}]
