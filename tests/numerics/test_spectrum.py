@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from laufruhe.numerics.spectrum import Spectrum, common_base, spectrum_of
+from laufruhe.numerics.spectrum import Spectrum, common_base, orders_equal, spectrum_of
 
 BASES = st.sampled_from([Fraction(1), Fraction(1, 2), Fraction(2), Fraction(3, 2), Fraction(1, 3)])
 NUMBERS = st.complex_numbers(max_magnitude=10.0, allow_subnormal=False)
@@ -157,3 +157,13 @@ class TestSpectrumOf:
         np.testing.assert_allclose(values.mean(axis=0), s.coefficients[0].real, atol=1e-12)
         power = s.coefficients[0].real ** 2 + 0.5 * (np.abs(s.coefficients[1:]) ** 2).sum(axis=0)
         np.testing.assert_allclose((values**2).mean(axis=0), power, rtol=1e-12, atol=1e-12)
+
+
+def test_orders_are_told_apart_to_a_thousandth() -> None:
+    orders = [0.0, 0.5, 1.0 / 3.0, 1.0, 1.001]
+    assert orders_equal(orders, (0.3333, 1.0)).tolist() == [False, False, True, True, False]
+    signal = Spectrum(Fraction(1, 2), np.arange(1.0, 6.0).astype(complex))
+    assert signal.only((0.5, 2.0004)).coefficients.real.tolist() == [0.0, 2.0, 0.0, 0.0, 5.0]
+    assert signal.at(1.5).real == 4.0
+    assert signal.at(0.7) == 0.0
+    assert len(signal.kept(1.4999999).coefficients) == len(signal.kept(1.5).coefficients) == 4

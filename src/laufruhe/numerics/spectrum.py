@@ -10,9 +10,20 @@ from math import gcd, lcm
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 MAX_ORDER_DENOMINATOR = 1000
+PER_ORDER = 1000
+"""Orders are told apart to a thousandth of crank speed."""
+
+
+def orders_equal(orders: ArrayLike, wanted: ArrayLike) -> NDArray[np.bool_]:
+    """Which orders are one of those wanted, shape of `orders`: the one rule of what the same order is."""
+    return np.isin(_thousandths(orders), _thousandths(wanted))
+
+
+def _thousandths(orders: ArrayLike) -> NDArray[np.float64]:
+    return np.asarray(np.round(np.asarray(orders, dtype=float) * PER_ORDER))
 
 
 def as_order(order: float) -> Fraction:
@@ -42,10 +53,13 @@ class Spectrum:
 
     def at(self, order: float) -> NDArray[np.complex128]:
         """Coefficient of one order; zero where the signal holds none."""
-        index = as_order(order) / self.base
-        if index.denominator == 1 and 0 <= index < len(self.coefficients):
-            return np.asarray(self.coefficients[int(index)])
-        return np.zeros(self.coefficients.shape[1:], dtype=complex)
+        found = np.flatnonzero(orders_equal(self.orders, order))
+        return np.asarray(self.coefficients[found].sum(axis=0))
+
+    def only(self, orders: ArrayLike) -> Self:
+        """The signal with every other order at zero."""
+        counted = orders_equal(self.orders, orders).reshape(-1, *(1,) * (self.coefficients.ndim - 1))
+        return type(self)(self.base, np.where(counted, self.coefficients, 0.0))
 
     def sample(self, samples: int) -> NDArray[np.float64]:
         """Values at `samples` equal steps over one period 2 pi / b, shape (samples, ...).
@@ -103,7 +117,9 @@ class Spectrum:
 
     def kept(self, highest: float) -> Self:
         """The signal without the orders above `highest`."""
-        return type(self)(self.base, self.coefficients[: int(highest / float(self.base) + 1e-9) + 1])
+        return type(self)(
+            self.base, self.coefficients[: int(np.sum(_thousandths(self.orders) <= _thousandths(highest)))]
+        )
 
     def __add__(self, other: Self) -> Self:
         base = _common(self.base, other.base)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import OperatingPoint
-from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.spectrum import Spectrum, orders_equal
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.run_up import RunUp, run_through
 from laufruhe.physics.speed_map import SpeedMap, speed_map, split_loads
@@ -84,7 +84,7 @@ def transmissibility(result: Result) -> Figure:
         if field is None:
             continue
         for k, order in enumerate(facts.orders):
-            column = np.flatnonzero(np.abs(field.orders - order) < 5e-4)
+            column = np.flatnonzero(orders_equal(field.orders, order))
             if len(column):
                 curve = field.transmissibility[:, column[0]]
                 highest = max(highest, float(curve.max(initial=0.0)))
