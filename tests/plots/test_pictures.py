@@ -16,8 +16,8 @@ from matplotlib.text import Text
 from cli import scenes
 from laufruhe.plots import bars, draw, polar, spectrum
 from laufruhe.plots.style import DPI, fitted
+from laufruhe.present.measures import mount_orders
 from laufruhe.problem.evaluation import measured, mount_samples
-from laufruhe.report.measures import mount_orders
 from laufruhe.solvers import Result
 from problem_files import written
 

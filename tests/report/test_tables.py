@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from cli import scenes
+from laufruhe.present.numbers import aligned, number, trimmed, with_unit
 from laufruhe.report.grids import grids_of
 from laufruhe.report.markdown import as_markdown, escaped
 from laufruhe.report.tables import show
-from laufruhe.report.wording import aligned, explained, headline, number, trimmed, with_unit
+from laufruhe.report.wording import explained, headline
 from laufruhe.solvers import Result
 
 

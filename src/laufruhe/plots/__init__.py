@@ -6,7 +6,7 @@ from pathlib import Path
 
 from laufruhe.plots import bars, mounting, polar, spectrum, star
 from laufruhe.plots.style import save
-from laufruhe.report.mounting import is_elastic
+from laufruhe.present.mounting import is_elastic
 from laufruhe.solvers.result import Result
 
 

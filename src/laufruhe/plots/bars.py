@@ -10,9 +10,9 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from laufruhe.plots.style import FAINT, colours_of, fitted, heading, names_of, page, source_line, thin
+from laufruhe.present.measures import hardest_point, load_designs
+from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import Evaluation, measured
-from laufruhe.report.measures import hardest_point, load_designs
-from laufruhe.report.wording import number
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]

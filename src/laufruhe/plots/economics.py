@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from laufruhe.plots.style import BEFORE, BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION, heading, page
-from laufruhe.report.wording import percent
+from laufruhe.present.numbers import percent
 from laufruhe.studies.economics import Standing
 from laufruhe.studies.worth import verdicts, worths
 

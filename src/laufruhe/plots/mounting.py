@@ -22,11 +22,11 @@ from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.run_up import RunUp, run_through
 from laufruhe.physics.speed_map import SpeedMap, speed_map, split_loads
 from laufruhe.plots.style import AFTER, FAINT, INK, VERMILION, colours_of, heading, names_of, page, source_line
+from laufruhe.present.measures import changed, hardest_point, load_designs
+from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of
+from laufruhe.present.numbers import figure, number
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_design import MountMeasure, mounting_in
-from laufruhe.report.measures import changed, hardest_point, load_designs
-from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of
-from laufruhe.report.wording import figure, number
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 

@@ -26,9 +26,9 @@ from laufruhe.plots.style import (
     source_line,
     thin,
 )
+from laufruhe.present.measures import hardest_point, load_designs
+from laufruhe.present.numbers import trimmed
 from laufruhe.problem.evaluation import mount_samples
-from laufruhe.report.measures import hardest_point, load_designs
-from laufruhe.report.wording import trimmed
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from laufruhe.physics.metrics import order_amplitude
 from laufruhe.plots.style import FAINT, colours_of, heading, names_of, page, point_name, source_line
+from laufruhe.present.measures import hardest_point, load_designs, mount_orders, padded
 from laufruhe.problem.evaluation import Evaluation, PointLoads
-from laufruhe.report.measures import hardest_point, load_designs, mount_orders, padded
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 
 from laufruhe.plots.style import AFTER, BEFORE, FAINT, INK, heading, page, source_line
-from laufruhe.report.wording import number
+from laufruhe.present.numbers import number
 from laufruhe.solvers.ranking import PhasingResult, RankedStar
 from laufruhe.solvers.result import Result
 

@@ -17,8 +17,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.plots.style import AFTER, BEFORE, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, credit, heading, page
+from laufruhe.present.numbers import number
 from laufruhe.report.study_tables import readable_metric, settled, swept_names, with_unit
-from laufruhe.report.wording import number
 
 COLOURS = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, "#332288", "#999933")
 PANEL = (6.4, 3.6)

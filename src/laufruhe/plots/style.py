@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from laufruhe.report.measures import changed, load_designs
+from laufruhe.present.measures import changed, load_designs
 from laufruhe.solvers.result import Result
 
 if TYPE_CHECKING:

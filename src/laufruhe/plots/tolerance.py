@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter
 
 from laufruhe.physics.modes import GRAVITY
 from laufruhe.plots.style import AFTER, FAINT, INK, PALE, credit, heading, page
-from laufruhe.report.wording import percent
+from laufruhe.present.numbers import percent
 from laufruhe.studies.tolerance_study import rise_of
 
 LEAST = 0.1

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import xarray as xr
 
 from laufruhe.physics.modes import GRAVITY
+from laufruhe.present.numbers import percent
 from laufruhe.report.study_tables import NOTHING, number, table
-from laufruhe.report.wording import percent
 from laufruhe.studies.economics import Standing
 from laufruhe.studies.free_forces import printed_agree
 from laufruhe.studies.tolerance import CAUSES

@@ -7,8 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.report.grid import Grid
-from laufruhe.report.measures import (
+from laufruhe.present.measures import (
     changed,
     hardest_point,
     is_met,
@@ -19,8 +18,10 @@ from laufruhe.report.measures import (
     padded,
     shaking_orders,
 )
+from laufruhe.present.numbers import DASH, aligned, number, percent, trimmed, with_unit
+from laufruhe.report.grid import Grid
 from laufruhe.report.mode_grids import mode_grids
-from laufruhe.report.wording import DASH, aligned, is_nothing, number, percent, trimmed, with_unit
+from laufruhe.report.ranking import phasing_grids
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
 from laufruhe.units import readable
 
@@ -33,9 +34,6 @@ ORDER_SHARE = 0.005
 def grids_of(result: Result) -> list[Grid]:
     """Every table that this result fills."""
     candidates = [_decisions(result), _limits(result), _mounts(result), *mode_grids(result), _orders(result)]
-    # an import above would be circular: the ranking makes grids too
-    from laufruhe.report.ranking import phasing_grids
-
     return [grid for grid in [*phasing_grids(result), *candidates] if grid.rows]
 
 
@@ -158,3 +156,8 @@ def _order_columns(result: Result, k: int) -> tuple[list[Array], list[str]]:
     if len(columns[0]) > len(names):
         names.insert(0, "mount force [N]")
     return [design[c] for c in range(len(names)) for design in columns], names
+
+
+def is_nothing(decision: DecisionValue) -> bool:
+    """Whether a decided size is none, so that its angle means nothing."""
+    return abs(decision.value) <= 1e-5 * max(abs(decision.lower), abs(decision.upper))

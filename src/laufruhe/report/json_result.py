@@ -12,16 +12,16 @@ from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.metrics import CycleMeasures
 from laufruhe.physics.shaking_loads import WRENCH
-from laufruhe.problem.evaluation import measured
-from laufruhe.prove.certificate import Proof
-from laufruhe.report.measures import (
+from laufruhe.present.measures import (
     PRESENT,
     is_met,
     limits_of,
     mount_orders,
     shaking_orders,
 )
-from laufruhe.report.mounting import is_elastic, modes_as_dict
+from laufruhe.present.mounting import is_elastic, modes_as_dict
+from laufruhe.problem.evaluation import measured
+from laufruhe.prove.certificate import Proof
 from laufruhe.report.ranking import phasing_record
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from laufruhe.physics.modes import MOTIONS
+from laufruhe.present.measures import changed
+from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
+from laufruhe.present.numbers import DASH, figure, number, trimmed
 from laufruhe.report.grid import Grid
-from laufruhe.report.measures import changed
-from laufruhe.report.mounting import MountingFacts, critical_speed, facts_of, is_elastic
-from laufruhe.report.wording import DASH, figure, number, trimmed
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 

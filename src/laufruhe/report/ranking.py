@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from laufruhe.present.numbers import DASH, number, percent, trimmed
 from laufruhe.report.grid import Grid
-from laufruhe.report.wording import DASH, number, percent, trimmed
 from laufruhe.solvers.ranking import PhasingResult, RankedOrder, RankedStar
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.report.wording import percent
+from laufruhe.present.numbers import percent
 from laufruhe.units import readable
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from laufruhe.plots.style import BLUE, FAINT, GREY, ORANGE, page
 from laufruhe.plots.tractor.sheet import bar_legend, entitled, mount_bars
-from laufruhe.report.wording import with_unit
+from laufruhe.present.numbers import with_unit
 from laufruhe.studies.tractor.engines import KILOPOND
 
 

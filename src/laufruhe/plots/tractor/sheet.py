@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from laufruhe.plots.style import BLUE, FAINT, GREEN, GREY, ORANGE, SKY, VERMILION, heading
-from laufruhe.report.wording import number
+from laufruhe.present.numbers import number
 from laufruhe.studies.tractor.engines import KILOPOND
 
 SERIES = (GREY, SKY, ORANGE, BLUE, VERMILION, GREEN)

@@ -1,0 +1,60 @@
+"""Numbers and units as an engineer reads them."""
+
+from __future__ import annotations
+
+import math
+
+from laufruhe.units import readable
+
+DASH = "-"
+NOTHING = 1e-9
+
+
+def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
+    """To `digits` figures, without an exponent where it can be read without.
+
+    Parameters
+    ----------
+    scale
+        Size beside which the number is read: what is a rounding of it is shown as 0.
+    """
+    if not math.isfinite(value):
+        return DASH
+    if value == 0.0 or abs(value) <= NOTHING * scale:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if not -4 <= size <= 6:
+        return f"{value:.{digits - 1}e}"
+    # rounding may add a figure: 999.96 becomes 1000
+    size = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    return f"{value:.{max(digits - 1 - size, 0)}f}"
+
+
+def aligned(value: float, largest: float, digits: int = 5) -> str:
+    """As many decimals as the largest number of its column needs for `digits` figures."""
+    if value == 0.0 or largest <= 0.0 or not math.isfinite(largest) or not -4 <= math.log10(largest) < digits:
+        return number(value, scale=largest)
+    return f"{value:.{digits - 1 - math.floor(math.log10(largest))}f}"
+
+
+def trimmed(value: float, digits: int = 4) -> str:
+    """As `number`, without zeros that say nothing: bounds and limits as they were typed."""
+    text = number(value, digits)
+    return text.rstrip("0").rstrip(".") if "." in text and "e" not in text else text
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A value in readable units: 90 deg, 2500 rpm, 1.25 kg."""
+    name, factor = readable(unit)
+    return f"{trimmed(value * factor)} {name}".rstrip()
+
+
+def figure(value: float, unit: str, digits: int = 4, scale: float = 0.0) -> str:
+    """As `number`, in readable units and with the unit's name."""
+    name, factor = readable(unit)
+    return f"{number(value * factor, digits, scale * factor)} {name}".rstrip()
+
+
+def percent(share: float) -> str:
+    """A change as a reader expects it: with its sign."""
+    return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH
