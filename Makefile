@@ -6,13 +6,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test bench lint format clean distclean
+.PHONY: help solve study test bench pictures lint format clean distclean
 
 help:
 	@echo "make solve   design the balance of PROBLEM ($(PROBLEM))"
 	@echo "make study   sweeps and comparisons that STUDY describes ($(STUDY))"
 	@echo "make test    all tests"
-	@echo "make bench   benchmarks, which write under results/"
+	@echo "make bench   benchmarks, which write under results/benchmarks/; an hour"
+	@echo "make pictures   the pictures of README.md again, under docs/pictures/"
 	@echo "make lint    style, types and the direction of imports"
 	@echo "make format  put the source into the project's style"
 	@echo "make clean   remove caches; make distclean removes $(VENV) as well"
@@ -34,9 +35,12 @@ study: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest
 
-# Scripts that write under results/.
+# Scripts that write under results/benchmarks/.
 bench: $(STAMP)
 	@set -e; for script in tests/benchmarks/bench_*.py; do echo "$$script"; $(BIN)/python "$$script"; done
+
+pictures: $(STAMP)
+	$(BIN)/python tests/benchmarks/make_pictures.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

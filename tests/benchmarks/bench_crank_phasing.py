@@ -1,6 +1,6 @@
 """Crank stars: proven search beside plain enumeration of the same objective, in one run on one core.
 
-Writes results/crank-phasing/benchmark.md, growth.png, and rankings.md with the ranked stars of
+Writes results/benchmarks/crank-phasing.md, crank-phasing.png, and rankings.md with the ranked stars of
 the ready problems. Ratios are what counts; the times are this machine's.
 """
 
@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from pages import RESULTS, ROOT, publish, spent
+from pages import PAGES, ROOT, publish, spent
 
 from laufruhe.files.reader import load
 from laufruhe.load_models.star_model import StarModel
@@ -38,7 +38,7 @@ from laufruhe.solvers.star_cuts import owners_of, search_designs, solve_design
 from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm, enumerate_stars, search_stars
 
-OUT = RESULTS / "crank-phasing"
+OUT = PAGES / "crank-phasing.md"
 RANKED = (
     "two-stroke-four-open", "vee-six-open", "vee-eight-open", "inline-five-open", "inline-seven-uneven",
     "two-stroke-eight-uneven", "inline-nine-uneven", "vee-twenty-open",
@@ -243,7 +243,7 @@ def growth(found: list[Row]) -> None:
         axes.spines[side].set_visible(False)
     axes.legend(frameon=False)
     axes.set_title("Least couple of two orders: time against the number of throws", loc="left", size=11, weight="bold")
-    figure.savefig(OUT / "growth.png")
+    figure.savefig(OUT.with_suffix(".png"))
 
 
 def grid_text(grid: Grid) -> str:
@@ -284,7 +284,7 @@ def on_one_core() -> None:
 def main() -> None:
     """Measure and write."""
     on_one_core()
-    publish(OUT / "rankings.md", rankings())
+    publish(PAGES / "rankings.md", rankings())
     found = rows()
     growth(found)
     body = [
@@ -307,7 +307,7 @@ def main() -> None:
         "enumeration and search count images once. Search: branch and bound, which ends with a proof. Enumeration "
         "scores every star in vectorised blocks.",
         table(head, body),
-        "![Time against size](growth.png)",
+        "![Time against size](crank-phasing.png)",
         "## Mean mount force, two counterweights free",
         "Cuts: cone programs of as many stars as the bounds leave in doubt. Every star: the same cone programs without "
         "bounds.",
@@ -320,7 +320,7 @@ def main() -> None:
         "## Memory of an enumeration",
         table(("throws", "stars", "largest MiB"), memory()),
     ]
-    publish(OUT / "benchmark.md", "\n\n".join(text) + "\n")
+    publish(OUT, "\n\n".join(text) + "\n")
 
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
-"""Writes results/extremes/README.md: numbers at the extremes, and what is guaranteed of each."""
+"""Writes results/benchmarks/extremes.md: numbers at the extremes, and what is guaranteed of each."""
 
 from __future__ import annotations
 
 import importlib
 import sys
 
-from pages import RESULTS, ROOT, publish
+from pages import PAGES, ROOT, publish
 
-OUT = RESULTS / "extremes" / "README.md"
+OUT = PAGES / "extremes.md"
 
 
 def main() -> None:

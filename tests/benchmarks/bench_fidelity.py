@@ -20,7 +20,7 @@ from dataclasses import replace  # noqa: E402
 from pathlib import Path  # noqa: E402
 
 import numpy as np  # noqa: E402
-from pages import RESULTS, ROOT, publish, spent  # noqa: E402
+from pages import PAGES, ROOT, publish, spent  # noqa: E402
 
 from laufruhe import load  # noqa: E402
 from laufruhe.fidelity.automatic import automatic, choose  # noqa: E402
@@ -35,7 +35,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
 from laufruhe.problem.measure import Quantity, Subject  # noqa: E402
 from laufruhe.problem.problem import Problem, Term  # noqa: E402
 
-OUT = RESULTS / "benchmarks" / "fidelity.md"
+OUT = PAGES / "fidelity.md"
 DESIGNS = 100_000
 
 

@@ -1,4 +1,4 @@
-"""Ready problems on elastic mounts from ten seeds each. Writes results/mounts/seeds.md."""
+"""Ready problems on elastic mounts from ten seeds each. Writes results/benchmarks/mount-seeds.md."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 import time
 from dataclasses import replace
 
-from pages import RESULTS, ROOT, publish
+from pages import PAGES, ROOT, publish
 
 from laufruhe.files.reader import load
 from laufruhe.problem.problem import Problem
@@ -55,7 +55,7 @@ def main() -> None:
         "| --- | --- | ---: | ---: | ---: | ---: |",
         *(row_of(problem) for problem in elastic_problems()),
     ]
-    publish(RESULTS / "mounts" / "seeds.md", "\n".join(lines) + "\n")
+    publish(PAGES / "mount-seeds.md", "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Speed of elastic mounts: frequency domain, map of speeds, joint solve. Writes results/mounts/benchmark.md."""
+"""Speed of elastic mounts: frequency domain, map of speeds, joint solve. Writes results/benchmarks/mounts.md."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from pages import RESULTS, ROOT, publish, spent
+from pages import PAGES, ROOT, publish, spent
 from scipy.optimize import minimize
 
 sys.path.insert(0, str(ROOT / "tests"))
@@ -201,7 +201,7 @@ def main() -> None:
     for part in (one_speed, many_speeds, joint):
         lines += part(problem)
         print("\n".join(lines[-16:]), flush=True)
-    publish(RESULTS / "mounts" / "benchmark.md", "\n".join(lines).rstrip() + "\n")
+    publish(PAGES / "mounts.md", "\n".join(lines).rstrip() + "\n")
 
 
 if __name__ == "__main__":

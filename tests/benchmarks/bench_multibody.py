@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pages import RESULTS, ROOT, publish, spent
+from pages import PAGES, ROOT, publish, spent
 
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
@@ -26,7 +26,7 @@ from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.problem.measure import Quantity, Subject
 from laufruhe.problem.problem import Drive, Problem, Term, UnbalanceDecision
 
-OUT = RESULTS / "benchmarks" / "multibody.md"
+OUT = PAGES / "multibody.md"
 
 FloatArray = NDArray[np.float64]
 

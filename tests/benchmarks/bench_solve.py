@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from pages import RESULTS, ROOT, publish
+from pages import PAGES, ROOT, publish
 
 from laufruhe import load
 from laufruhe.load_models.affine import AffineModel, AffineProblem
@@ -23,7 +23,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conic import ConicProgram
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester.toml"
-OUT = RESULTS / "benchmarks" / "solve.md"
+OUT = PAGES / "solve.md"
 
 Row = tuple[str, float, str, float]
 

@@ -19,7 +19,7 @@ from dataclasses import replace  # noqa: E402
 from pathlib import Path  # noqa: E402
 
 import numpy as np  # noqa: E402
-from pages import RESULTS, ROOT, publish  # noqa: E402
+from pages import PAGES, ROOT, publish  # noqa: E402
 from scipy.optimize import NonlinearConstraint, differential_evolution, minimize  # noqa: E402
 
 from laufruhe import load  # noqa: E402
@@ -30,7 +30,7 @@ from laufruhe.studies import run  # noqa: E402
 from laufruhe.studies.speed_sweep import speed_sweep  # noqa: E402
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester-and-moment.toml"
-OUT = RESULTS / "benchmarks" / "sweep.md"
+OUT = PAGES / "sweep.md"
 SAMPLES, POINTS, EVOLVED = 360, 13, 3
 STUDIED, STUDY_POINTS = ("tractor-single", "tractor-four-lanchester-and-moment", "tractor-four-front-force"), 25
 

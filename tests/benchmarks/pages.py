@@ -7,7 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-RESULTS = ROOT / "results"
+# The rest of results/ is what the commands write, and not committed.
+PAGES = ROOT / "results" / "benchmarks"
 
 
 def spent(work: Callable[[], object]) -> float:

@@ -1,4 +1,4 @@
-"""Every entry of results/extremes keeps its guarantee."""
+"""Every entry of results/benchmarks/extremes.md keeps its guarantee."""
 
 from __future__ import annotations
 
