@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from laufruhe.cli import app
-from laufruhe.plots import star
+from laufruhe.plots.results import firings, star, trade
 from laufruhe.solvers import solve
 from phasing import engines
 
@@ -32,7 +32,7 @@ def test_pins_stand_where_the_throws_do(uneven):
 
 
 def test_firings_fill_the_cycle(uneven):
-    axes = star.firings(uneven).axes[0]
+    axes = firings.figure(uneven).axes[0]
     first = [bar for bar in axes.patches if bar.get_y() + 0.5 * bar.get_height() == pytest.approx(0.0)]
     assert sum(bar.get_width() for bar in first) == pytest.approx(720.0)
     intervals = np.degrees(uneven.phasing.ranking[0].firing_orders[0].intervals)
@@ -40,7 +40,7 @@ def test_firings_fill_the_cycle(uneven):
 
 
 def test_the_trade_lies_above_its_bound(uneven):
-    design, dots, bound = star.trade(uneven).axes[0].lines[:3]
+    design, dots, bound = trade.figure(uneven).axes[0].lines[:3]
     del dots
     assert np.all(np.diff(design.get_ydata()) <= 0.0)
     assert bound.get_ydata()[0] <= design.get_ydata()[0]

@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from cli import scenes
-from laufruhe.plots import bars, draw, polar, spectrum
+from laufruhe.plots import draw
+from laufruhe.plots.results import bars, polar, spectrum
 from laufruhe.plots.style import DPI, fitted
 from laufruhe.present.measures import mount_orders
 from laufruhe.problem.evaluation import measured, mount_samples

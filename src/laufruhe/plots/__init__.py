@@ -1,12 +1,12 @@
-"""Pictures of a result, as PNG files; they read results and never call a solver."""
+"""Pictures, as PNG files; they read results and datasets, and never call a solver."""
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
-from laufruhe.plots import bars, mounting, polar, spectrum, star
 from laufruhe.plots.style import save
-from laufruhe.present.mounting import is_elastic
+from laufruhe.present.pictures import PICTURES
 from laufruhe.solvers.result import Result
 
 
@@ -17,14 +17,10 @@ def draw(result: Result, folder: Path) -> tuple[str, ...]:
     -------
     File names in `folder`.
     """
-    makers = {"polar.png": polar.figure, "bars.png": bars.figure} if result.problem.engine.mounts else {}
-    makers["spectrum.png"] = spectrum.figure
-    if is_elastic(result.final):
-        makers |= mounting.FIGURES
-    if result.phasing is not None and result.phasing.ranking:
-        makers = {"star.png": star.figure, "firings.png": star.firings, **makers}
-        if len(result.phasing.trade) > 1:
-            makers["trade.png"] = star.trade
-    for name, figure in makers.items():
-        save(figure(result), folder / name)
-    return tuple(makers)
+    drawn = []
+    for name in PICTURES:
+        picture = import_module(f"{__name__}.results.{name}")
+        if picture.applies(result):
+            drawn.append(f"{name}.png")
+            save(picture.figure(result), folder / drawn[-1])
+    return tuple(drawn)

@@ -17,8 +17,10 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from laufruhe.present.measures import changed, load_designs
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
 
 if TYPE_CHECKING:
@@ -34,27 +36,14 @@ LEFT, RIGHT, TOP, BOTTOM = 0.85, 0.3, 1.2, 0.85
 GAP = 0.42
 NARROWEST = 6.4
 
+# names and titles are the user's: a dollar sign in them starts no formula
 _SETTINGS: Any = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9.0,
-    "axes.titlesize": 10.0,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.7,
-    "text.color": INK,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "path.simplify": True,
-    # names and titles are the user's: a dollar sign in them starts no formula
+    "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 9.0, "axes.titlesize": 10.0,
+    "axes.edgecolor": FAINT, "axes.labelcolor": INK, "axes.linewidth": 0.8, "axes.spines.top": False,
+    "axes.spines.right": False, "axes.axisbelow": True, "axes.grid": True, "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.7, "text.color": INK, "xtick.color": FAINT, "ytick.color": FAINT, "path.simplify": True,
     "text.parse_math": False,
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -99,19 +88,11 @@ def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], so
     left = 0.3 / wide
     figure.text(left, 1 - 0.2 / high, fitted(title, wide, 13), size=13, weight="bold", va="top", color=INK)
     figure.text(left, 1 - 0.49 / high, fitted(lines, wide, 9), size=9, va="top", color=FAINT)
+    columns = _legend_columns([str(artist.get_label()) for artist in legend], wide)
     figure.legend(
-        handles=list(legend),
-        loc="upper left",
-        bbox_to_anchor=(left, 1 - 0.65 / high),
-        ncols=_legend_columns([str(artist.get_label()) for artist in legend], wide),
-        frameon=False,
-        fontsize=9,
-        borderpad=0.2,
-        borderaxespad=0.0,
-        handlelength=1.6,
-        columnspacing=1.6,
-        labelcolor=INK,
-    )
+        handles=list(legend), loc="upper left", bbox_to_anchor=(left, 1 - 0.65 / high), ncols=columns, frameon=False,
+        fontsize=9, borderpad=0.2, borderaxespad=0.0, handlelength=1.6, columnspacing=1.6, labelcolor=INK,
+    )  # fmt: skip
     figure.text(left, 0.14 / high, fitted(source, wide, 7), size=7, va="bottom", color=FAINT)
 
 
@@ -149,16 +130,35 @@ def point_name(result: Result, k: int) -> str:
     return points[k].name if len(points) == 1 else f"{points[k].name} (largest loads of {len(points)} points)"
 
 
-def names_of(result: Result, loads: bool = False) -> tuple[str, ...]:
-    """What the series are called: one where nothing was decided, or where it is loads that only one design has."""
+@dataclass(frozen=True)
+class Series:
+    """One design of a result as pictures show it."""
+
+    design: Evaluation
+    colour: str
+    name: str
+
+    def entry(self, text: str = "", **look: Any) -> Artist:
+        """Of a legend."""
+        return entry(f"{self.name}{text}", color=self.colour, **({"linewidth": 2.0} | look))
+
+
+def series_of(result: Result, loads: bool = False) -> list[Series]:
+    """As given and as decided; one where nothing was decided, or where it is loads that only one design has."""
     if not changed(result):
-        return ("as given",)
-    return ("as given", "as decided")[-len(load_designs(result)) :] if loads else ("as given", "as decided")
+        return [Series(result.final, AFTER, "as given")]
+    both = [Series(result.initial, BEFORE, "as given"), Series(result.final, AFTER, "as decided")]
+    return both[-len(load_designs(result)) :] if loads else both
 
 
-def colours_of(result: Result, loads: bool = False) -> tuple[str, ...]:
-    """One colour for each of `names_of`."""
-    return (BEFORE, AFTER)[-len(names_of(result, loads)) :]
+def entry(label: str, **look: Any) -> Line2D:
+    """A line or a dot of a legend."""
+    return Line2D([], [], label=label, **look)
+
+
+def entry_of_dots(label: str, **look: Any) -> Line2D:
+    """Dots without a line."""
+    return entry(label, **({"marker": "o", "linestyle": "none"} | look))
 
 
 def save(figure: Figure, path: Path) -> None:

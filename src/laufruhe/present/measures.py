@@ -12,6 +12,7 @@ from laufruhe.physics.metrics import CycleMeasures, order_amplitude
 from laufruhe.problem.evaluation import Evaluation, PointLoads, measured
 from laufruhe.problem.problem import Limit, Problem
 from laufruhe.solvers.mount_result import mount_limits
+from laufruhe.solvers.ranking import PhasingResult
 from laufruhe.solvers.result import LimitValue, Result
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ class MountMeasures:
 
 def mount_measures(result: Result) -> list[MountMeasures]:
     """Of every operating point and mount, in the order of the problem."""
-    if not result.problem.engine.mounts:
+    if not has_mounts(result):
         return []
     names = result.initial.mount_names
     return [
@@ -87,6 +88,23 @@ def is_met(limit: LimitValue) -> bool:
     """Whether the design keeps a limit, up to the rounding of a solver."""
     sign = 1.0 if limit.side == "at most" else -1.0
     return sign * (limit.value - limit.limit) <= abs(limit.limit) * 1e-6 + 1e-12
+
+
+def has_mounts(result: Result) -> bool:
+    """Whether there are mounts, rigid or elastic."""
+    return bool(result.problem.engine.mounts)
+
+
+def has_ranking(result: Result) -> bool:
+    """Whether stars and firing orders were open, and some were found."""
+    return result.phasing is not None and bool(result.phasing.ranking)
+
+
+def ranking_of(result: Result) -> PhasingResult:
+    """Stars and firing orders of a result that has them."""
+    if result.phasing is None:
+        raise ValueError("a result without phasing has no star")
+    return result.phasing
 
 
 def changed(result: Result) -> bool:

@@ -17,8 +17,10 @@ from laufruhe.physics.modes import (
     torque_roll_coupling,
     weight_wrench,
 )
+from laufruhe.present.measures import has_mounts
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_design import mounting_in, sag_of
+from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
 
@@ -60,9 +62,9 @@ class MountingFacts:
     torque_roll_coupling: float
 
 
-def is_elastic(evaluation: Evaluation) -> bool:
-    """Whether a design has a block on elastic mounts."""
-    return evaluation.engine.block is not None and bool(evaluation.engine.mounts)
+def is_elastic(result: Result) -> bool:
+    """Whether the design has a block on elastic mounts."""
+    return result.final.engine.block is not None and has_mounts(result)
 
 
 def facts_of(evaluation: Evaluation) -> MountingFacts:

@@ -10,14 +10,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from laufruhe.errors import Complaint, InputError
+from laufruhe.present.pictures import CAPTIONS
 
 RESULT = "result.json"
 REPORT = "report.md"
-PICTURES = (
-    "polar.png", "bars.png", "spectrum.png", "transmissibility.png", "campbell.png", "modes.png", "run_up.png",
-    "star.png", "firings.png", "trade.png",
-)  # fmt: skip
-RESULT_FILES = (RESULT, REPORT, *PICTURES)
+RESULT_FILES = (RESULT, REPORT, *CAPTIONS)
 
 
 @contextmanager

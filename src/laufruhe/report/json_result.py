@@ -55,7 +55,7 @@ def as_dict(result: Result) -> dict[str, Any]:
         "mounts": _all_points(result, [point["mounts"] for point in points]),
         "shaking": _largest([point["shaking"] for point in points]),
         "points": [{key: point[key] for key in own} for point in points],
-        **({"modes": modes_as_dict(result.final)} if is_elastic(result.final) else {}),
+        **({"modes": modes_as_dict(result.final)} if is_elastic(result) else {}),
         "firing_intervals": list(engine.firing_intervals),
         **phasing_record(result),
         "fidelity": {

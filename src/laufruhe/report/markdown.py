@@ -5,24 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
+from laufruhe.present.pictures import CAPTIONS
 from laufruhe.report.grid import Grid
 from laufruhe.report.grids import grids_of
 from laufruhe.report.versions import versions
 from laufruhe.report.wording import explained, headline
 from laufruhe.solvers.result import Result
-
-_CAPTIONS = {
-    "polar.png": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",
-    "bars.png": "Mean and maximum of each mount's force over one cycle.",
-    "spectrum.png": "What orders of crank speed the loads are made of.",
-    "transmissibility.png": "Force on the elastic mounts over that on the same mounts if they gave no way.",
-    "campbell.png": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
-    "modes.png": "Share of each motion in the kinetic energy of each natural mode.",
-    "run_up.png": "Largest force and travel on any mount while the engine runs up and is shut down.",
-    "star.png": "The best crank stars, from the front and from the side.",
-    "firings.png": "Firing orders of the best stars over one working cycle.",
-    "trade.png": "What slightly uneven firing buys.",
-}
 
 
 def as_markdown(result: Result, pictures: Sequence[str], command: str) -> str:
@@ -40,7 +28,7 @@ def as_markdown(result: Result, pictures: Sequence[str], command: str) -> str:
         _facts(result),
         "## Result",
         escaped(headline(result)),
-        *(f"![{_CAPTIONS[name]}]({name})\n\n*{_CAPTIONS[name]}*" for name in pictures),
+        *(f"![{CAPTIONS[name]}]({name})\n\n*{CAPTIONS[name]}*" for name in pictures),
         *(_table(grid) for grid in grids_of(result)),
         "## Proof",
         escaped(explained(result)),

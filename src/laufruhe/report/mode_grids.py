@@ -13,7 +13,7 @@ from laufruhe.units import readable
 
 def mode_grids(result: Result) -> list[Grid]:
     """Modes before and after, and the mounts as they are now; none for rigid mounts."""
-    if not is_elastic(result.final):
+    if not is_elastic(result):
         return []
     before = facts_of(result.initial)
     if not changed(result):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
@@ -17,16 +17,17 @@ from laufruhe.plots.style import (
     FAINT,
     INK,
     Page,
-    colours_of,
+    Series,
+    entry_of_dots,
     fitted,
     heading,
-    names_of,
     page,
     point_name,
+    series_of,
     source_line,
     thin,
-)
-from laufruhe.present.measures import hardest_point, load_designs
+)  # fmt: skip
+from laufruhe.present.measures import hardest_point, has_mounts
 from laufruhe.present.numbers import trimmed
 from laufruhe.problem.evaluation import mount_samples
 from laufruhe.solvers.result import Result
@@ -35,13 +36,13 @@ Array = NDArray[np.float64]
 
 MOST_PANELS = 12
 PANEL = 2.9
+applies = has_mounts
 
 
 def figure(result: Result) -> Figure:
     """One panel for each mount, all to one scale."""
-    k = hardest_point(result)
-    designs = load_designs(result)
-    paths = [_closed(mount_samples(design, k)) for design in designs]
+    k, series = hardest_point(result), series_of(result, loads=True)
+    paths = [_closed(mount_samples(one.design, k)) for one in series]
     mounts = result.problem.engine.mounts[:MOST_PANELS]
     lateral, vertical = _reach(paths, len(mounts))
     columns = _columns(len(mounts), lateral < 0.7 * vertical)
@@ -50,17 +51,13 @@ def figure(result: Result) -> Figure:
     drawn = page(math.ceil(len(mounts) / columns), columns, panel, len(mounts), gap=0.5, lead=0.3)
     quarters = (len(paths[0]) - 1) // (4 * result.problem.engine.cycle.turns)
     for m, (axes, mount) in enumerate(zip(drawn.panels, mounts, strict=True)):
-        for path, colour, name in zip(paths, colours_of(result, loads=True), names_of(result, loads=True), strict=True):
-            _path(axes, path[:, m], colour, name, quarters)
+        for path, one in zip(paths, series, strict=True):
+            _path(axes, path[:, m], one, quarters)
         _frame(axes, mount, result.final.engine.mounts[m], lateral, vertical)
     _label(drawn, columns)
-    heading(
-        drawn.figure,
-        "Mount forces over one working cycle",
-        f"Force on each mount at {point_name(result, k)}, seen from the front.",
-        _legend(result),
-        source_line(result, _left_out(paths)),
-    )
+    lines = f"Force on each mount at {point_name(result, k)}, seen from the front."
+    source = source_line(result, _left_out(paths))
+    heading(drawn.figure, "Mount forces over one working cycle", lines, _legend(series), source)
     return drawn.figure
 
 
@@ -81,12 +78,13 @@ def _closed(samples: Array) -> Array:
     return np.concatenate([samples, samples[:1]])
 
 
-def _path(axes: Axes, path: Array, colour: str, name: str, quarters: int) -> None:
-    axes.plot(path[:, 1], path[:, 2], color=colour, linewidth=1.6, label=name, solid_joinstyle="round")
+def _path(axes: Axes, path: Array, one: Series, quarters: int) -> None:
+    axes.plot(path[:, 1], path[:, 2], color=one.colour, linewidth=1.6, label=one.name, solid_joinstyle="round")
     if quarters:
         dots = path[:-1:quarters]
-        axes.plot(dots[:, 1], dots[:, 2], "o", color=colour, markersize=3.6, markeredgewidth=0)
-        axes.plot(*dots[0, 1:], "o", markersize=7, markerfacecolor="none", markeredgecolor=colour, markeredgewidth=1.3)
+        axes.plot(dots[:, 1], dots[:, 2], "o", color=one.colour, markersize=3.6, markeredgewidth=0)
+        ring: Any = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": one.colour, "markeredgewidth": 1.3}
+        axes.plot(*dots[0, 1:], "o", **ring)
 
 
 def _frame(axes: Axes, mount: Mount, moved: Mount, lateral: float, vertical: float) -> None:
@@ -109,10 +107,7 @@ def _label(drawn: Page, columns: int) -> None:
     for k, axes in enumerate(drawn.panels):
         below = k + columns < len(drawn.panels)
         axes.tick_params(labelbottom=not below, labelleft=k % columns == 0, length=2)
-        if not below:
-            axes.set_xlabel("lateral force [N]")
-        if k % columns == 0:
-            axes.set_ylabel("vertical force [N]")
+        axes.set(xlabel="" if below else "lateral force [N]", ylabel="" if k % columns else "vertical force [N]")
 
 
 def _left_out(paths: list[Array]) -> str:
@@ -123,13 +118,7 @@ def _left_out(paths: list[Array]) -> str:
     return forces + (f"The first {MOST_PANELS} of {count} mounts. " if count > MOST_PANELS else "")
 
 
-def _legend(result: Result) -> list[Artist]:
-    lines: list[Artist] = [
-        Line2D([], [], color=colour, linewidth=2.0, label=name)
-        for colour, name in zip(colours_of(result, loads=True), names_of(result, loads=True), strict=True)
-    ]
-    dot = Line2D([], [], color=INK, marker="o", linestyle="none", markersize=3.6, label="every 90° of the crank")
-    ring = Line2D(
-        [], [], color=INK, marker="o", linestyle="none", markersize=7, markerfacecolor="none", label="cylinder 1 fires"
-    )
-    return [*lines, dot, ring]
+def _legend(series: list[Series]) -> list[Artist]:
+    dot = entry_of_dots("every 90° of the crank", color=INK, markersize=3.6)
+    ring = entry_of_dots("cylinder 1 fires", color=INK, markersize=7, markerfacecolor="none")
+    return [*(one.entry() for one in series), dot, ring]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -13,9 +12,9 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from laufruhe.physics.metrics import order_amplitude
-from laufruhe.plots.style import FAINT, colours_of, heading, names_of, page, point_name, source_line
-from laufruhe.present.measures import hardest_point, load_designs, mount_orders, padded
-from laufruhe.problem.evaluation import Evaluation, PointLoads
+from laufruhe.plots.style import FAINT, heading, page, point_name, series_of, source_line
+from laufruhe.present.measures import hardest_point, main_load, mount_orders, padded
+from laufruhe.problem.evaluation import PointLoads
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -27,34 +26,37 @@ SHORTEST = 6.0
 NOTHING = 1e-9
 
 
+def applies(result: Result) -> bool:
+    """Every result has loads."""
+    return bool(result.problem.points)
+
+
 def figure(result: Result) -> Figure:
     """Mount forces by order; of an engine without mounts, the shaking force and its couples."""
-    k = hardest_point(result)
-    designs = load_designs(result)
+    k, series = hardest_point(result), series_of(result, loads=True)
     with_mounts = bool(result.problem.engine.mounts)
     panels = _mount_panels(result) if with_mounts else _shaking_panels()
-    base = _base(designs[0], k, with_mounts)
-    amplitudes = [_seen([measure(design.loads[k]) for design in designs], base) for _, measure in panels]
-    last = base * max(len(series[0]) - 1 for series in amplitudes)
+    base = float(main_load(series[0].design.loads[k]).base)
+    amplitudes = [_seen([measure(one.design.loads[k]) for one in series], base) for _, measure in panels]
+    last = base * max(len(values[0]) - 1 for values in amplitudes)
     drawn = page(len(panels), 1, (6.4, 3.4 if len(panels) == 1 else 1.75))
-    for axes, (label, _), series in zip(drawn.panels, panels, amplitudes, strict=True):
-        _bars(axes, series, base, colours_of(result, loads=True))
-        _frame(axes, label, series, last)
+    for axes, (label, _), values in zip(drawn.panels, panels, amplitudes, strict=True):
+        _bars(axes, values, base, [one.colour for one in series])
+        _frame(axes, label, values, last)
         axes.tick_params(labelbottom=axes is drawn.panels[-1])
     drawn.panels[-1].set_xlabel("order, multiples of crank speed")
     title = "Mount forces by order" if with_mounts else "Shaking force and couples by order"
-    heading(drawn.figure, title, _subtitle(result, k, with_mounts), _legend(result), source_line(result))
+    what = "Amplitude of the force on a mount" if with_mounts else "Amplitude of the load on the block"
+    lines = f"{what} at {point_name(result, k)}; order 0 is the steady part."
+    legend = [Patch(facecolor=one.colour, label=one.name) for one in series]
+    heading(drawn.figure, title, lines, legend, source_line(result))
     return drawn.figure
 
 
 def _mount_panels(result: Result) -> list[Panel]:
     count = len(result.problem.engine.mounts)
-
-    def mean(loads: PointLoads) -> Array:
-        forces = loads.mount_forces
-        return np.zeros(1) if forces is None else mount_orders(forces).mean(axis=1)
-
-    return [("amplitude [N]" if count == 1 else f"amplitude, mean of {count} mounts [N]", mean)]
+    label = "amplitude [N]" if count == 1 else f"amplitude, mean of {count} mounts [N]"
+    return [(label, lambda loads: mount_orders(main_load(loads)).mean(axis=1))]
 
 
 def _shaking_panels() -> list[Panel]:
@@ -68,11 +70,6 @@ def _shaking_panels() -> list[Panel]:
     ]
 
 
-def _base(design: Evaluation, k: int, with_mounts: bool) -> float:
-    loads = design.loads[k]
-    return float(loads.mount_forces.base if with_mounts and loads.mount_forces is not None else loads.wrench.base)
-
-
 def _seen(series: list[Array], base: float) -> list[Array]:
     """Amplitudes up to the last order that can be seen beside the largest, all of one length."""
     length = max(len(values) for values in series)
@@ -82,7 +79,7 @@ def _seen(series: list[Array], base: float) -> list[Array]:
     return list(table[:, : last + 1])
 
 
-def _bars(axes: Axes, series: list[Array], base: float, colours: tuple[str, ...]) -> None:
+def _bars(axes: Axes, series: list[Array], base: float, colours: list[str]) -> None:
     table = np.stack(series)
     drawn = np.flatnonzero(table.max(axis=0) > NOTHING * float(table.max(initial=0.0)))
     apart = float(np.diff(drawn).min(initial=2)) * base
@@ -102,15 +99,3 @@ def _frame(axes: Axes, label: str, series: list[Array], last: float) -> None:
     if top <= 0.0:
         axes.set_yticks([])
         axes.text(0.5, 0.5, "none: balanced", transform=axes.transAxes, ha="center", va="center", color=FAINT)
-
-
-def _subtitle(result: Result, k: int, with_mounts: bool) -> str:
-    what = "Amplitude of the force on a mount" if with_mounts else "Amplitude of the load on the block"
-    return f"{what} at {point_name(result, k)}; order 0 is the steady part."
-
-
-def _legend(result: Result) -> list[Artist]:
-    return [
-        Patch(facecolor=colour, label=name)
-        for colour, name in zip(colours_of(result, loads=True), names_of(result, loads=True), strict=True)
-    ]

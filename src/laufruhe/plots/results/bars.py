@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from laufruhe.plots.style import FAINT, colours_of, fitted, heading, names_of, page, source_line, thin
-from laufruhe.present.measures import hardest_point, load_designs
+from laufruhe.plots.style import FAINT, Series, fitted, heading, page, series_of, source_line, thin
+from laufruhe.present.measures import hardest_point, has_mounts
 from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.solvers.result import Result
@@ -19,6 +18,7 @@ Array = NDArray[np.float64]
 
 MOST_POINTS = 4
 WIDTH = 0.36
+applies = has_mounts
 
 
 def figure(result: Result) -> Figure:
@@ -28,17 +28,21 @@ def figure(result: Result) -> Figure:
     names = [*result.initial.mount_names, "all mounts"]
     wide = min(max(6.4, 1.15 * len(names)), 24.0)
     drawn = page(len(shown), 1, (wide, 3.4 if len(shown) == 1 else 2.3))
-    designs = load_designs(result)
+    series = series_of(result, loads=True)
     for axes, k in zip(drawn.panels, shown, strict=True):
-        values = [_measures(design, k) for design in designs]
-        _groups(axes, values, colours_of(result, loads=True))
+        values = [_measures(one.design, k) for one in series]
+        _groups(axes, values, series)
         _frame(axes, names, values, wide)
         axes.tick_params(labelbottom=k == shown[-1])
         if len(several) > 1:
             axes.set_title(f"at {result.problem.points[k].name}", loc="left", size=10, parse_math=False)
     at = f" at {result.problem.points[shown[0]].name}" if len(shown) == 1 else ""
     lines = f"Magnitude of each mount's force{at}: mean over the working cycle, and its largest value."
-    heading(drawn.figure, "Mean and maximum mount forces", lines, _legend(result), source_line(result))
+    legend = [patch for one in series for patch in (
+        Patch(facecolor=one.colour, edgecolor=one.colour, label=f"{one.name}: mean"),
+        Patch(facecolor="none", edgecolor=one.colour, linewidth=1.4, label="maximum"),
+    )]  # fmt: skip
+    heading(drawn.figure, "Mean and maximum mount forces", lines, legend, source_line(result))
     return drawn.figure
 
 
@@ -56,14 +60,13 @@ def _places(count: int) -> Array:
     return places
 
 
-def _groups(axes: Axes, values: list[Array], colours: tuple[str, ...]) -> None:
+def _groups(axes: Axes, values: list[Array], series: list[Series]) -> None:
     top = thin(float(v.max(initial=0.0)) for v in values)
     places = _places(values[0].shape[1])
-    for k, (measures, colour) in enumerate(zip(values, colours, strict=True)):
+    for k, ((mean, most), one) in enumerate(zip(values, series, strict=True)):
         at = places + (k - 0.5 * (len(values) - 1)) * (WIDTH + 0.04)
-        mean, most = measures
-        axes.bar(at, mean, WIDTH, color=colour, linewidth=0, label="mean")
-        axes.bar(at, most, WIDTH, facecolor="none", edgecolor=colour, linewidth=1.4, label="maximum")
+        axes.bar(at, mean, WIDTH, color=one.colour, linewidth=0, label="mean")
+        axes.bar(at, most, WIDTH, facecolor="none", edgecolor=one.colour, linewidth=1.4, label="maximum")
         for x, low, high in zip(at, mean, most, strict=True):
             axes.text(x, high + 0.015 * top, number(high, 3, top), ha="center", va="bottom", size=7.5, color=FAINT)
             if low > 0.07 * top:
@@ -76,16 +79,5 @@ def _frame(axes: Axes, names: list[str], values: list[Array], wide: float) -> No
     axes.tick_params(axis="x", length=0)
     axes.grid(axis="x", visible=False)
     axes.axvline(0.5 * (places[-1] + places[-2]), color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)))
-    axes.set(
-        xlim=(-0.6, places[-1] + 0.6),
-        ylim=(0.0, 1.12 * thin(float(v.max(initial=0.0)) for v in values)),
-        ylabel="force on the mount [N]",
-    )
-
-
-def _legend(result: Result) -> list[Artist]:
-    handles: list[Artist] = []
-    for colour, name in zip(colours_of(result, loads=True), names_of(result, loads=True), strict=True):
-        handles.append(Patch(facecolor=colour, edgecolor=colour, label=f"{name}: mean"))
-        handles.append(Patch(facecolor="none", edgecolor=colour, linewidth=1.4, label="maximum"))
-    return handles
+    top = 1.12 * thin(float(v.max(initial=0.0)) for v in values)
+    axes.set(xlim=(-0.6, places[-1] + 0.6), ylim=(0.0, top), ylabel="force on the mount [N]")

@@ -1,0 +1,77 @@
+"""Orders of crank speed against natural frequencies (Campbell)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, fastest, limits_on, mark_points, order_entries
+from laufruhe.plots.style import AFTER, FAINT, INK, entry, entry_of_dots, heading, page, source_line
+from laufruhe.present.measures import changed
+from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
+from laufruhe.present.numbers import number
+from laufruhe.problem.mount_design import MountMeasure
+from laufruhe.solvers.result import Result
+
+# room for the names of the modes [inch]
+NAMES = 1.5
+applies = is_elastic
+
+
+def figure(result: Result) -> Figure:
+    """Where an order meets a natural frequency, speed is critical."""
+    facts, top = facts_of(result.final), fastest(result)
+    drawn = page(1, 1, (6.2, 4.2))
+    axes = drawn.panels[0]
+    bands = [limit.outside for limit in limits_on(result, MountMeasure.FREQUENCIES) if limit.outside is not None]
+    limits = limits_on(result, MountMeasure.FREQUENCIES)
+    edges = [edge for limit in limits for edge in (limit.minimum, limit.maximum) if edge is not None]
+    known = [*facts.modes.frequencies, *edges, *(edge for band in bands for edge in band), 1e-9]
+    reach = 1.1 * float(max(known))
+    legend = _marked(axes, edges, bands)
+    for k, order in enumerate(facts.orders):
+        axes.plot([0.0, top * RPM], [0.0, order * top / math.tau], color=AFTER, linestyle=STYLES[k], linewidth=1.4)
+    _modes(axes, facts, reach)
+    mark_points(axes, result, 0.02)
+    axes.set(xlim=(0.0, top * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
+    wide, high = drawn.figure.get_size_inches()
+    drawn.figure.set_size_inches(wide + NAMES, high)
+    box, shrunk = axes.get_position(), wide / (wide + NAMES)
+    axes.set_position((box.x0 * shrunk, box.y0, box.width * shrunk, box.height))
+    critical = entry_of_dots("critical speed", color=AFTER, markersize=4.5)
+    which = "of the design as decided" if changed(result) else "as given"
+    lines = f"Natural frequencies {which}, and the orders that load it most."
+    legend = [*order_entries(facts, AFTER), critical, *legend]
+    heading(drawn.figure, "Critical speeds", lines, legend, source_line(result))
+    return drawn.figure
+
+
+def _modes(axes: Axes, facts: MountingFacts, reach: float) -> None:
+    """Natural frequencies with their names, and the speeds at which the excited ones are critical."""
+    height = -math.inf
+    for j, (name, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies, strict=True)):
+        excited = j in facts.excited
+        look: Any = {"color": INK, "linewidth": 1.3} if excited else {"color": FAINT, "linewidth": 0.7, "alpha": 0.6}
+        axes.axhline(frequency, **look)
+        # no name covers another
+        height = max(frequency, height + 0.038 * reach)
+        text = f"{name}, {number(frequency, 3)} Hz" + ("" if excited else " (not excited)")
+        axes.text(1.01, height / reach, text, size=7.5, color=INK, va="center", transform=axes.transAxes)
+        for order in facts.orders if excited else ():
+            axes.plot(critical_speed(frequency, order) * RPM, frequency, "o", color=AFTER, markersize=4.5, zorder=5)
+
+
+def _marked(axes: Axes, edges: list[float], bands: list[tuple[float, float]]) -> list[Artist]:
+    """Bands that are to hold no natural frequency, and ends that none may pass; of these the legend."""
+    for band in bands:
+        axes.axhspan(*band, color=LIMIT, alpha=0.13, linewidth=0)
+    for edge in edges:
+        axes.axhline(edge, color=LIMIT, linewidth=2.4, alpha=0.5, zorder=4)
+    ends = [entry("limit", color=LIMIT, alpha=0.5, linewidth=2.4)]
+    forbidden = [Patch(facecolor=LIMIT, alpha=0.13, label="no natural frequency")]
+    return [*(ends if edges else []), *(forbidden if bands else [])]

@@ -1,0 +1,51 @@
+"""Objective against the largest deviation from even firing (Pareto)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from laufruhe.plots.style import AFTER, BEFORE, FAINT, entry, heading, page, source_line
+from laufruhe.present.measures import has_ranking, ranking_of
+from laufruhe.present.numbers import number
+from laufruhe.solvers.result import Result
+
+_BOUND: Any = {"color": BEFORE, "linestyle": (0, (4, 2))}
+
+
+def applies(result: Result) -> bool:
+    """Where freedom was traded against balance."""
+    return has_ranking(result) and len(ranking_of(result).trade) > 1
+
+
+def figure(result: Result) -> Figure:
+    """What uneven firing buys, and what no design with that freedom goes under."""
+    trade = ranking_of(result).trade
+    drawn = page(1, 1, (6.4, 3.4))
+    axes = drawn.panels[0]
+    # more freedom that buys nothing is no new design
+    points = [p for before, p in zip((None, *trade), trade, strict=False) if before is None or p.value < before.value]
+    x = [math.degrees(p.deviation) for p in points]
+    y = [p.value for p in points]
+    axes.plot(x, y, color=AFTER, linewidth=1.6, zorder=2)
+    axes.plot(x, y, "o", color=AFTER, markersize=5, zorder=3)
+    shown = [number(value, 3, max(y)) for value in y]
+    for k, place in enumerate(zip(x, y, strict=True)):
+        if k == 0 or shown[k] != shown[k - 1]:
+            axes.annotate(shown[k], place, xytext=(5, 6), textcoords="offset points", size=7.5, color=FAINT)
+    # what holds with more freedom holds with less: a step reaches back to the point before
+    freedom = [math.degrees(p.allowed) for p in trade]
+    axes.plot(freedom, [p.lower_bound for p in trade], linewidth=1.2, drawstyle="steps-pre", zorder=1, **_BOUND)
+    name, unit = (result.objective.name, result.objective.unit) if result.objective else ("", "")
+    top = max(*y, 1e-300)
+    axes.set(
+        xlim=(-0.03 * freedom[-1], 1.08 * freedom[-1]), ylim=(-0.03 * top, 1.15 * top),
+        xlabel="largest deviation of a firing interval from even [deg]",
+        ylabel=f"{name} [{unit}]" if len(name) < 42 else f"objective [{unit}]",
+    )  # fmt: skip
+    legend = [entry("best local optimum found", color=AFTER, marker="o"), entry("proven: no design below", **_BOUND)]
+    lines = "What slightly uneven crank angles buy; each point is a design, evaluated by the exact model."
+    heading(drawn.figure, "Balance against even firing", lines, legend, source_line(result))
+    return drawn.figure

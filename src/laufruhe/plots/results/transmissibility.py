@@ -1,0 +1,80 @@
+"""Transmissibility of elastic mounts over speed (Hasselgruber, Fig. 31)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.spectrum import orders_equal
+from laufruhe.physics.speed_map import speed_map, split_loads
+from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, fastest, limits_on, mark_points, order_entries
+from laufruhe.plots.style import FAINT, INK, entry, heading, page, series_of, source_line
+from laufruhe.present.measures import hardest_point
+from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.mount_design import MountMeasure, mounting_in
+from laufruhe.solvers.result import Result
+
+Array = NDArray[np.float64]
+
+SPEEDS = 400
+applies = is_elastic
+
+
+def figure(result: Result) -> Figure:
+    """Foundation over exciting force by order and speed, with limits and operating points."""
+    facts, series = facts_of(result.final), series_of(result, loads=True)
+    point, top = result.problem.points[hardest_point(result)], fastest(result)
+    speeds = np.linspace(top / SPEEDS, top, SPEEDS)
+    drawn = page(1, 1, (6.8, 4.0))
+    axes = drawn.panels[0]
+    highest = 1.0
+    for one in series:
+        for k, curve in _curves(one.design, point, speeds, facts.orders):
+            highest = max(highest, float(curve.max(initial=0.0)))
+            axes.plot(speeds * RPM, curve, color=one.colour, linestyle=STYLES[k], linewidth=1.6)
+    legend = [*(one.entry() for one in series), *order_entries(facts, INK), *_limits(axes, result, top * RPM)]
+    axes.axhline(1.0, color=FAINT, linewidth=0.8)
+    mark_points(axes, result, 0.98)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(10.0, (1.0, 2.0, 5.0), numticks=12))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.minorticks_off()
+    axes.set(xlim=(0.0, top * RPM), ylim=(1e-2, 1.6 * highest), xlabel="crank speed [rpm]", ylabel="transmissibility")
+    lines = f"Force on the mounts over that on mounts that give no way; loads of {point.name}."
+    heading(drawn.figure, "Transmissibility over speed", lines, legend, source_line(result))
+    return drawn.figure
+
+
+def _curves(
+    design: Evaluation, point: OperatingPoint, speeds: Array, orders: tuple[float, ...]
+) -> Iterator[tuple[int, Array]]:
+    try:
+        field = speed_map(mounting_in(design.engine), *split_loads(design.engine, point, design.fidelity), speeds)
+    except ModelError:
+        # an undamped resonance has no height to draw
+        return
+    for k, order in enumerate(orders):
+        for column in np.flatnonzero(orders_equal(field.orders, order))[:1]:
+            yield k, field.transmissibility[:, column]
+
+
+def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:
+    """Limits of the problem, over the speeds that they hold at [rpm]."""
+    limits = limits_on(result, MountMeasure.TRANSMISSIBILITY)
+    most = [(limit.maximum, limit.quantity.points) for limit in limits if limit.maximum is not None]
+    for maximum, named in most:
+        speeds = [point.speed * RPM for point in result.problem.points if named is None or point.name in named]
+        low, high = min(speeds), max(speeds)
+        if high - low < 0.02 * top:
+            low, high = low - 0.02 * top, high + 0.02 * top
+        axes.plot([low, high], [maximum] * 2, color=LIMIT, linewidth=2.4, solid_capstyle="butt", zorder=4)
+    return [entry("limit", color=LIMIT, linewidth=2.4)] if most else []

@@ -1,0 +1,59 @@
+"""What pictures over crank speed share: the end of the axis, orders, operating points and limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+
+from laufruhe.plots.style import FAINT, VERMILION, entry
+from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of
+from laufruhe.problem.mount_design import MountLimit, MountMeasure
+from laufruhe.solvers.result import Result
+from laufruhe.units import readable
+
+RPM = readable("rad/s")[1]
+REACH = 1.25
+LIMIT = VERMILION
+# styles tell orders apart in print as well
+STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
+
+
+def driven(facts: MountingFacts) -> list[float]:
+    """Natural frequencies that the engine excites; the highest where it excites none [Hz]."""
+    return [facts.modes.frequencies[j] for j in facts.excited] or [facts.modes.frequencies[-1]]
+
+
+def main_order(facts: MountingFacts) -> float:
+    """The order that loads the mounts most."""
+    return facts.orders[0] if facts.orders else 1.0
+
+
+def fastest(result: Result) -> float:
+    """End of the axis: past the highest operating point and the isolation of the strongest order [rad/s]."""
+    facts = facts_of(result.final)
+    highest = max(point.speed for point in result.problem.points)
+    return REACH * max(highest, 2.0 * critical_speed(max(driven(facts)), main_order(facts)))
+
+
+def order_entries(facts: MountingFacts, colour: str) -> list[Artist]:
+    """Of a legend."""
+    return [entry(f"order {o:g}", color=colour, linestyle=STYLES[k]) for k, o in enumerate(facts.orders)]
+
+
+def limits_on(result: Result, measure: MountMeasure) -> list[MountLimit]:
+    """Limits of the problem on one measure of the mounts."""
+    return [limit for limit in result.problem.mount_design.limits if limit.quantity.measure is measure]
+
+
+def mark_points(axes: Axes, result: Result, share: float) -> None:
+    """Operating points as thin lines; names where they do not crowd, at a share of the height."""
+    points = result.problem.points
+    words: Any = {"size": 7.5, "color": FAINT, "ha": "right", "rotation": 90, "zorder": 4}
+    words |= {"va": "top" if share > 0.5 else "bottom", "transform": axes.get_xaxis_transform()}
+    for k, point in enumerate(points):
+        axes.axvline(point.speed * RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)
+        if len(points) <= 5 or k in (0, len(points) - 1):
+            box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.5}
+            axes.text(point.speed * RPM, share, point.name, bbox=box, **words)

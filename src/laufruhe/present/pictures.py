@@ -1,0 +1,15 @@
+"""Pictures of a result in the order of a report, a line each: `plots.results` has a file of that name to draw it."""
+
+PICTURES = {
+    "star": "The best crank stars, from the front and from the side.",
+    "firings": "Firing orders of the best stars over one working cycle.",
+    "polar": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",
+    "bars": "Mean and maximum of each mount's force over one cycle.",
+    "spectrum": "What orders of crank speed the loads are made of.",
+    "transmissibility": "Force on the elastic mounts over that on the same mounts if they gave no way.",
+    "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
+    "modes": "Share of each motion in the kinetic energy of each natural mode.",
+    "run_up": "Largest force and travel on any mount while the engine runs up and is shut down.",
+    "trade": "What slightly uneven firing buys.",
+}
+CAPTIONS = {f"{name}.png": caption for name, caption in PICTURES.items()}
