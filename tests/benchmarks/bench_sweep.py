@@ -23,10 +23,10 @@ from pages import PAGES, ROOT, publish  # noqa: E402
 from scipy.optimize import NonlinearConstraint, differential_evolution, minimize  # noqa: E402
 
 from laufruhe import load  # noqa: E402
-from laufruhe.files.study_reader import load_study  # noqa: E402
 from laufruhe.load_models.affine import AffineModel, AffineProblem  # noqa: E402
 from laufruhe.solvers.conic import ConicProgram  # noqa: E402
 from laufruhe.studies import run  # noqa: E402
+from laufruhe.studies.reader import load_study  # noqa: E402
 from laufruhe.studies.speed_sweep import speed_sweep  # noqa: E402
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester-and-moment.toml"

@@ -13,10 +13,10 @@ from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.files.study_parts import SweepTable
-from laufruhe.files.study_reader import load_study
 from laufruhe.files.study_sweeps import axis_of
 from laufruhe.solvers import solve, state
 from laufruhe.studies import run
+from laufruhe.studies.reader import load_study
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed
 
 LIMIT = "constraints.1.max"

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from laufruhe.plots import study
+from laufruhe.plots.picture import draw
+from laufruhe.studies.kinds import KINDS
 
 
 def part(objective: list[float], proof: list[str], **coords: list[object]) -> xr.Dataset:
@@ -29,7 +30,7 @@ def part(objective: list[float], proof: list[str], **coords: list[object]) -> xr
 
 
 def test_a_case_without_a_design_says_so_in_its_place() -> None:
-    figure = study.layout_comparison(part([21050.7, np.nan], ["global", "none"]))
+    figure = draw(KINDS["layout comparison"].picture(part([21050.7, np.nan], ["global", "none"])))
     axes = figure.axes[0]
     shown = {text.get_text(): text.get_position()[0] for text in axes.texts}
     low, high = axes.get_xlim()
@@ -45,7 +46,7 @@ def test_a_case_without_a_design_says_so_in_its_place() -> None:
 def test_values_that_grow_by_a_factor_stand_on_a_logarithmic_axis(speeds: list[float], scale: str) -> None:
     data = part([1.0 + speed for speed in speeds], ["as given"] * len(speeds), speed=list(speeds))
     data = data.assign_coords(case=("point", ["one"] * len(speeds)))
-    axes = study.layout_comparison(data).axes[0]
+    axes = draw(KINDS["layout comparison"].picture(data)).axes[0]
     assert axes.get_xscale() == scale
     ticks = [float(label.get_text().replace("−", "-")) for label in axes.get_xticklabels() if label.get_text()]
     assert sum(speeds[0] <= tick <= speeds[-1] for tick in ticks) >= 2

@@ -12,10 +12,12 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError
-from laufruhe.files.study_reader import load_study
-from laufruhe.report.study_kinds import SHOWN
+from laufruhe.plots.picture import draw
+from laufruhe.report.study_report import markdown
 from laufruhe.studies import run
 from laufruhe.studies.free_forces import printed_agree
+from laufruhe.studies.kinds import KINDS
+from laufruhe.studies.reader import load_study
 from laufruhe.studies.tolerance_study import verdicts
 from laufruhe.studies.worth import worths
 from problem_files import written
@@ -80,6 +82,10 @@ def part_of(folder: Path, text: str) -> xr.Dataset:
     return next(iter(datasets.values()))
 
 
+def told(kind: str, data: xr.Dataset) -> str:
+    return "\n".join(line for text in KINDS[kind].table(data) for line in markdown(text))
+
+
 def test_economics_by_its_command(tmp_path: Path) -> None:
     """Files, proofs, the worth of the shaft, and the engine with more cylinders rebuilt at equal power."""
     path, out = written(tmp_path, ECONOMICS, "study"), tmp_path / "out"
@@ -111,19 +117,19 @@ def test_tolerances_keep_to_the_file(tmp_path: Path) -> None:
     four, six = verdicts(data)
     assert four.agrees
     assert not six.agrees
-    table = "\n".join(SHOWN["tolerance"].table(data))
+    table = told("tolerance", data)
     assert "| finer balancing, six | matters |" in table
-    SHOWN["tolerance"].picture(data)
+    draw(KINDS["tolerance"].picture(data))
 
 
 def test_free_forces_count_what_agrees(tmp_path: Path) -> None:
     data = part_of(tmp_path, LAYOUTS)
     assert printed_agree(data) == (2, 3)
     assert np.isnan(float(data["force_printed"].sel(case="five", order=1)))
-    table = "\n".join(SHOWN["free forces"].table(data))
+    table = told("free forces", data)
     assert "| five | 144 | 0 | 0.4490 (0.449) | 0 (0.001) | 4.9798 (4.9798) |" in table
     assert "2 of 3 printed values" in table
-    SHOWN["free forces"].picture(data)
+    draw(KINDS["free forces"].picture(data))
 
 
 BAD_ECONOMICS = [

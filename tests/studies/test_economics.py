@@ -18,8 +18,9 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Quantity, Subject
 from laufruhe.problem.problem import Limit, Problem
 from laufruhe.solvers import solve
-from laufruhe.studies.economics import Build, Claim, Standing, best, compared, front, shafts_of, with_shafts
+from laufruhe.studies.economics import Build, Claim, Standing, best, compared, front
 from laufruhe.studies.equal_power import at_equal_power, check_comparable
+from laufruhe.studies.shafts import shafts_of, with_shafts
 from laufruhe.studies.worth import JUDGEMENTS, verdicts, worths
 
 PROBLEMS = Path(__file__).resolve().parents[2] / "problems"

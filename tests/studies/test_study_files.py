@@ -12,9 +12,9 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.files.study_parts import CaseTable, SweepTable
 from laufruhe.files.study_paths import field_at
-from laufruhe.files.study_reader import load_study
 from laufruhe.files.study_sweeps import axis_of
 from laufruhe.studies import Point, Scenes, run
+from laufruhe.studies.reader import load_study
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPEED = "operating_points.1.mean_piston_speed"

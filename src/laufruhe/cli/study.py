@@ -8,12 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from laufruhe.errors import Complaint, InputError
-from laufruhe.files.study_models import StudyFile
-from laufruhe.files.study_reader import load_study
 from laufruhe.numerics.cores import processors
 from laufruhe.report import files
 from laufruhe.studies import run
 from laufruhe.studies.kept import NAME
+from laufruhe.studies.reader import StudyFile, load_study
 
 SAID_EVERY = 0.2
 

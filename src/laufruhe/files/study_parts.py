@@ -1,12 +1,12 @@
-"""What every part of a study file is made of: cases, swept values, and words about it."""
+"""What the parts of a study file are made of: cases and swept values."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from laufruhe.files.file_models import Name, QuantityName, Table
+from laufruhe.files.file_models import Name, Table
 
 Value: TypeAlias = bool | int | float | str
 
@@ -34,23 +34,3 @@ class CaseTable(Table):
     equal_power_to: Annotated[int, Field(ge=1, le=48)] | None = Field(
         default=None, description="Rebuilt to the power that this many of its cylinders have."
     )
-
-
-class PartTable(Table):
-    """What the parts of every kind have: one dataset of the study, its cases, and words about it."""
-
-    name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]*$", max_length=60)]
-    title: Annotated[str, Field(min_length=1)]
-    source: str = ""
-    cases: list[CaseTable] = Field(min_length=1)
-
-    def settings(self) -> dict[str, Any]:
-        """What is asked of every point: all but words, cases, and what is swept."""
-        return self.model_dump(exclude={"name", "title", "source", "cases", "sweep"})
-
-
-class SweptPartTable(PartTable):
-    """Cases at every combination of the swept values."""
-
-    metric: QuantityName | None = Field(default=None, description="In place of the objective of the problem files.")
-    sweep: list[SweepTable] = Field(default_factory=list, max_length=2)

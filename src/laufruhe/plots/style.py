@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.artist import Artist
@@ -22,9 +22,6 @@ from matplotlib.lines import Line2D
 from laufruhe.present.measures import changed, load_designs
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Okabe and Ito: told apart by every eye, and by their lightness in print
 GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
@@ -109,12 +106,6 @@ def source_line(result: Result, note: str = "") -> str:
     problem = result.problem
     described = f"Engine: {problem.source}. " if problem.source else ""
     return f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
-
-
-def credit(data: xr.Dataset, note: str = "") -> str:
-    """Source line of a study's dataset."""
-    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
-    return f"{source}{note}Computed with Laufruhe."
 
 
 def fitted(text: str, inches: float, points: float) -> str:

@@ -6,10 +6,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.files.study_models import StudyFile
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
 from laufruhe.report.tractor_study import figure_files, write_figures
+from laufruhe.studies.part import Part
+from laufruhe.studies.reader import StudyFile
+from laufruhe.studies.text import Rows, Text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +48,7 @@ def write_study(
         lines += write_figures(folder, say)
     for part in study.study.parts:
         say(f"writing {part.name}")
-        lines += _part(part.name, datasets[part.name], folder)
+        lines += _part(part, datasets[part.name], folder)
     if datasets:
         spent = [f"| {name} | {duration:.1f} |" for name, duration in seconds.items()]
         lines += ["## Where the time went", "", "Seconds on one core.", "", "| part | s |", "| --- | ---: |", *spent,
@@ -54,18 +56,29 @@ def write_study(
     files.write(folder / files.REPORT, "\n".join(lines))
 
 
-def _part(name: str, data: xr.Dataset, folder: Path) -> list[str]:
+def _part(part: Part, data: xr.Dataset, folder: Path) -> list[str]:
+    from laufruhe.plots.picture import draw
     from laufruhe.plots.style import save
-    from laufruhe.report.study_kinds import SHOWN
 
-    shown, title, source = SHOWN[data.attrs["kind"]], data.attrs["title"], data.attrs["source"]
+    name, title, source = part.name, data.attrs["title"], data.attrs["source"]
     # a name with a space cannot be marked as a coordinate there
     spaced = {str(coord): str(coord).replace(" ", "_") for coord in data.coords if " " in str(coord)}
     data.rename(spaced).to_netcdf(folder / f"{name}.nc")
     _flat(data).to_csv(folder / f"{name}.csv")
-    save(shown.picture(data), folder / f"{name}.png")
+    save(draw(part.picture(data)), folder / f"{name}.png")
     words = data.attrs["kind"].capitalize() + "." + (f" Source: {source}" if source else "")
-    return [f"## {title}", "", words, "", *shown.table(data), "", f"![{title}]({name}.png)", ""]
+    told = [line for text in part.table(data) for line in (*markdown(text), "")]
+    return [f"## {title}", "", words, "", *told, f"![{title}]({name}.png)", ""]
+
+
+def markdown(text: Text) -> list[str]:
+    """Lines of a paragraph or a table; how many rows stand in the CSV file only."""
+    if not isinstance(text, Rows):
+        return [text]
+    head, rows = text.head, text.rows
+    lines = ["| " + " | ".join(cells) + " |" for cells in (head, ["---"] * len(head), *rows)]
+    rest = text.whole - len(rows)
+    return [*lines, "", f"{rest} more rows are in the CSV file."] if rest > 0 else lines
 
 
 def _flat(data: xr.Dataset) -> Any:

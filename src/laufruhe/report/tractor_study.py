@@ -10,7 +10,7 @@ from pathlib import Path
 import xarray as xr
 
 from laufruhe.studies.tractor import COMPUTE, VERDICTS, Verdict
-from laufruhe.studies.tractor.verdict import UNSTATED
+from laufruhe.studies.verdict import UNSTATED
 
 __all__ = ["FIGURES", "Figure", "Verdict", "figure_files", "verdict_table", "write_figures"]
 

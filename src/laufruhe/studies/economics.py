@@ -16,13 +16,15 @@ import numpy as np
 import xarray as xr
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.machine import Role
 from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.problem.measure import MASSES, Quantity, Subject
 from laufruhe.problem.problem import Limit, Problem
 from laufruhe.solvers import solve
+from laufruhe.studies.shafts import shafts_of
 
 MASS_ON_SHAFTS = Quantity(Subject.BALANCER_MASS, Norm.SUM)
+PLAIN = "plain"
+"""Name of the engine without any of the shafts."""
 LIMIT_NAME = "mass on shafts"
 SAME = 1e-4
 """Relative difference of forces below which proofs cannot tell designs apart."""
@@ -94,23 +96,6 @@ class FrontPoint:
     def gap(self) -> float:
         """Relative distance of the design from its bound."""
         return (self.force - self.lower_bound) / self.force if self.force else 0.0
-
-
-def shafts_of(problem: Problem) -> tuple[str, ...]:
-    """Names of the balancer shafts, in the order of the engine."""
-    return tuple(dict.fromkeys(r.shaft.name for r in problem.engine.rotors if r.role is Role.BALANCER))
-
-
-def with_shafts(problem: Problem, kept: Sequence[str]) -> Problem:
-    """The problem without the balancer shafts that are not named."""
-    unknown = set(kept) - set(shafts_of(problem))
-    if unknown:
-        raise ModelError(f"'{min(unknown)}' is no balancer shaft of this engine; name one that is")
-    rotors = tuple(r for r in problem.engine.rotors if r.role is not Role.BALANCER or r.shaft.name in kept)
-    names = {rotor.name for rotor in rotors}
-    shortened = (replace(d, drives=tuple(v for v in d.drives if v.rotor in names)) for d in problem.decisions)
-    decisions = tuple(d for d in shortened if d.drives)
-    return replace(problem, engine=replace(problem.engine, rotors=rotors), decisions=decisions)
 
 
 def best(problem: Problem, mass_limit: float = np.inf) -> FrontPoint:

@@ -7,9 +7,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from laufruhe.files.study_models import StudyFile
 from laufruhe.studies.kept import KeptPoints
-from laufruhe.studies.kinds import kind_of
+from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.scenes import Scenes
 from laufruhe.studies.work import Task, answers
 
@@ -43,7 +42,7 @@ def run(
         If a scene of the study is bad.
     """
     parts, scenes = study.study.parts, Scenes(folder)
-    points = {part.name: kind_of(part).points(part, scenes) for part in parts}
+    points = {part.name: part.points(scenes) for part in parts}
     marks = {part.name: [scenes.fingerprint(point, part.settings()) for point in points[part.name]] for part in parts}
     with KeptPoints(kept) as store:
         # a scene that stands in two parts of one kind is solved once
@@ -60,8 +59,7 @@ def run(
                 store.keep(names[answer.task], answer.seconds, answer.record)
                 say(whole - len(todo) + count, whole)
         datasets = {
-            part.name: kind_of(part).dataset(part, points[part.name], [store.records[m] for m in marks[part.name]])
-            for part in parts
+            part.name: part.dataset(points[part.name], [store.records[m] for m in marks[part.name]]) for part in parts
         }
         seconds = {part.name: sum(store.seconds[mark] for mark in set(marks[part.name])) for part in parts}
     return datasets, seconds

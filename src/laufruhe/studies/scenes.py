@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from laufruhe import __version__
 from laufruhe.errors import Complaint, InputError, ModelError
+from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.files.study_parts import CaseTable
-from laufruhe.files.study_reader import scene_tables
+from laufruhe.files.study_paths import changed
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
 
@@ -61,11 +62,34 @@ class Scenes:
         self._files: dict[Path, dict[str, Any]] = {}
 
     def tables(self, point: Point) -> dict[str, Any]:
-        """Tables of the problem of a point; not to be changed."""
-        path = self.folder / point.case.problem
+        """Tables of the problem of a point; not to be changed.
+
+        Raises
+        ------
+        InputError
+            If the problem file has no such table or quantity.
+        """
+        path, case = self.folder / point.case.problem, point.case
         if path not in self._files:
             self._files[path] = tables_of(path)
-        return scene_tables(self._files[path], point.case, point.changes, path, point.metric)
+        tables = dict(self._files[path])
+        for name in case.without:
+            if name not in tables:
+                rule = "is left out by the study and is not there"
+                raise self.refused(case, name, rule, nearest(name, list(tables)))
+            del tables[name]
+        try:
+            for where, value in {**case.set, **point.changes}.items():
+                tables = changed(tables, where, value)
+        except Refused as refused:
+            raise InputError(str(path), (refused.complaint,)) from None
+        if point.metric is not None:
+            tables["objective"] = {"minimise": point.metric}
+        return tables
+
+    def refused(self, case: CaseTable, where: str, rule: str, remedy: str) -> InputError:
+        """One line about the scene of a case."""
+        return InputError(str(self.folder / case.problem), (Complaint(where, "", rule, remedy),))
 
     def problem(self, point: Point) -> Problem:
         """The problem of a point at the power that its case asks for, with all of its shafts.

@@ -13,7 +13,7 @@ from laufruhe.errors import ModelError
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.built_engines import mean_mount_forces
 from laufruhe.studies.tolerance import CAUSES, Tolerances, nominal_force, random_forces, worst_parts
-from laufruhe.studies.tractor.verdict import NEGLIGIBLE, Verdict
+from laufruhe.studies.verdict import NEGLIGIBLE, Verdict
 
 SHARES = np.arange(201) / 200.0
 MOUNTED = 200

@@ -19,8 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from laufruhe.errors import LaufruheError, SolverError
-from laufruhe.files.study_parts import PartTable
-from laufruhe.studies.kinds import Record, kind_of
+from laufruhe.studies.part import Part, Record
 from laufruhe.studies.scenes import Point, Scenes
 
 # a worker imports everything anew: two seconds, so a pool has to save more
@@ -33,7 +32,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class Task:
     """A point of a part."""
 
-    part: PartTable
+    part: Part
     point: Point
 
 
@@ -67,7 +66,7 @@ def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Answe
 
 def _answer(k: int, task: Task, scenes: Scenes) -> Answer:
     started = time.perf_counter()
-    record = kind_of(task.part).answer(task.part, task.point, scenes)
+    record = task.part.answer(task.point, scenes)
     return Answer(k, record, time.perf_counter() - started)
 
 

@@ -19,16 +19,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 import xarray as xr
 
 from laufruhe.errors import ModelError
-from laufruhe.files.study_costs import Judgement
 from laufruhe.studies.economics import Standing
-from laufruhe.studies.tractor.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
+from laufruhe.studies.text import percent
+from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 
+Judgement = Literal["negligible", "noticeable", "better", "worth building", "not worth building"]
 JUDGEMENTS: tuple[Judgement, ...] = get_args(Judgement)
 
 
@@ -72,16 +73,16 @@ def _worth(data: xr.Dataset, build: str) -> Worth:
     following = _named(data, Standing.NEXT)[0]
     further, beside = 1.0 - own / fewer, own / _optimum(data, following)
     if further < 0.0:
-        why = f"fewer shafts do better: {_percent(-further)} beside the best of them"
+        why = f"fewer shafts do better: {percent(-further)} beside the best of them"
     elif further < NOTICEABLE:
         size = "negligible" if further < NEGLIGIBLE else "slight"
-        why = f"{size}: {_percent(-further)} beside the best with fewer shafts"
+        why = f"{size}: {percent(-further)} beside the best with fewer shafts"
     elif beside > 1.0 + NEGLIGIBLE:
-        why = f"{following} without shafts run smoother: {_percent(1.0 / beside - 1.0)}"
+        why = f"{following} without shafts run smoother: {percent(1.0 / beside - 1.0)}"
     elif beside >= 1.0 - NEGLIGIBLE:
-        why = f"{following} without shafts run as smoothly: {_percent(1.0 / beside - 1.0)}"
+        why = f"{following} without shafts run as smoothly: {percent(1.0 / beside - 1.0)}"
     else:
-        why = f"{_percent(-further)}, and {_percent(beside - 1.0)} beside {following} without shafts"
+        why = f"{percent(-further)}, and {percent(beside - 1.0)} beside {following} without shafts"
     worth = further >= NOTICEABLE and beside < 1.0 - NEGLIGIBLE
     return Worth(build, 1.0 - own / plain, further, beside, worth, why)
 
@@ -182,7 +183,3 @@ def _bound(data: xr.Dataset, build: str) -> float:
 
 def _fall(data: xr.Dataset, build: str, against: str) -> float:
     return 1.0 - _optimum(data, build) / _optimum(data, against)
-
-
-def _percent(change: float) -> str:
-    return f"{100.0 * change:+.1f} %"

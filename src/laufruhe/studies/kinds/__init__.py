@@ -1,32 +1,21 @@
-"""The kinds of study parts: one module each, one line each in this table."""
+"""The kinds of study parts: a module each, found by being here."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import get_args
 
-from laufruhe.files.study_parts import PartTable
-from laufruhe.studies.kinds import (
-    balancer_sizing,
-    counterweight_fraction,
-    economics,
-    free_forces,
-    layout_comparison,
-    tolerance,
-)
-from laufruhe.studies.kinds.kind import Kind, Record
-
-__all__ = ["KINDS", "Kind", "Record", "kind_of"]
-
-KINDS: Mapping[str, Kind] = {
-    "counterweight fraction": counterweight_fraction.KIND,
-    "balancer sizing": balancer_sizing.KIND,
-    "layout comparison": layout_comparison.KIND,
-    "economics": economics.KIND,
-    "tolerance": tolerance.KIND,
-    "free forces": free_forces.KIND,
-}
+from laufruhe.studies.part import Part
 
 
-def kind_of(part: PartTable) -> Kind:
-    """How a part is computed."""
-    return KINDS[part.settings()["kind"]]
+def _found() -> dict[str, type[Part]]:
+    """Every subclass of `Part` in these modules that has a kind, by its name."""
+    modules = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
+    classes = [one for module in modules for one in vars(module).values() if isinstance(one, type)]
+    kinds = [one for one in classes if issubclass(one, Part) and "kind" in one.model_fields]
+    return {get_args(one.model_fields["kind"].annotation)[0]: one for one in kinds}
+
+
+KINDS: Mapping[str, type[Part]] = _found()

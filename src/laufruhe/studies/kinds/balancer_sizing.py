@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any, Literal
 
-from laufruhe.files.study_models import BalancerSizingTable
+import numpy as np
+
 from laufruhe.problem.measure import MASSES, Quantity, counted_rotors
 from laufruhe.problem.problem import Problem
-from laufruhe.studies.economics import shafts_of, with_shafts
-from laufruhe.studies.kinds.kind import Kind
-from laufruhe.studies.kinds.swept import (
-    check_moved_by_loads,
-    checked,
-    combinations,
-    refuse_open_phasing,
-    refused,
-)
-from laufruhe.studies.outcome import axes_of, coordinates, dataset, solved
+from laufruhe.studies.outcome import solved
+from laufruhe.studies.part import Record
+from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.shafts import refuse_open_phasing, shafts_of, with_shafts
+from laufruhe.studies.swept import SweptPart
+from laufruhe.studies.swept_shown import bars, by_point, over_sweep, swept_names
+from laufruhe.studies.text import Text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,29 +39,61 @@ def shaft_groups(problem: Problem) -> list[tuple[str, ...]]:
     return sorted((tuple(sorted(group, key=order.__getitem__)) for group in groups), key=lambda g: order[g[0]])
 
 
-def _points(part: BalancerSizingTable, scenes: Scenes) -> list[Point]:
-    """For every scene all sets of its groups of shafts, the plain engine first."""
-    points = []
-    problems = checked(part, scenes)
-    check_moved_by_loads(problems, part, scenes, "shaft")
-    for case, problem in zip(part.cases, problems, strict=True):
-        groups = shaft_groups(problem)
-        if not groups:
-            raise refused(scenes, case, "balancer_shafts", "is missing, so there is nothing to size", "add a shaft")
-        refuse_open_phasing(problem, case, scenes)
-        if len(groups) > MOST_GROUPS:
-            rule = f"makes {len(groups)} independent shafts, {2 ** len(groups)} sets of them"
-            raise refused(scenes, case, "balancer_shafts", rule, f"study {MOST_GROUPS} or fewer")
-        sets = [chosen for k in range(len(groups) + 1) for chosen in itertools.combinations(groups, k)]
-        for changes in combinations(part):
-            points += [Point(case, changes, part.metric, tuple(itertools.chain(*chosen))) for chosen in sets]
-    return points
+class BalancerSizing(SweptPart):
+    """Engines with and without each of their balancer shafts, each at its proven optimum."""
 
+    kind: Literal["balancer sizing"]
 
-def _answer(_part: BalancerSizingTable, point: Point, scenes: Scenes) -> dict[str, Any]:
-    with scenes.blamed(point):
-        problem = _counting(with_shafts(scenes.problem(point), point.shafts or ()))
-        return solved(problem).as_dict()
+    def points(self, scenes: Scenes) -> list[Point]:
+        """For every scene all sets of its groups of shafts, the plain engine first."""
+        points = []
+        problems = self.checked(scenes)
+        self.check_moved_by_loads(problems, scenes, "shaft")
+        for case, problem in zip(self.cases, problems, strict=True):
+            groups = shaft_groups(problem)
+            if not groups:
+                raise scenes.refused(case, "balancer_shafts", "is missing, so there is nothing to size", "add a shaft")
+            refuse_open_phasing(problem, case, scenes)
+            if len(groups) > MOST_GROUPS:
+                rule = f"makes {len(groups)} independent shafts, {2 ** len(groups)} sets of them"
+                raise scenes.refused(case, "balancer_shafts", rule, f"study {MOST_GROUPS} or fewer")
+            sets = [chosen for k in range(len(groups) + 1) for chosen in itertools.combinations(groups, k)]
+            for changes in self.combinations():
+                points += [Point(case, changes, self.metric, tuple(itertools.chain(*chosen))) for chosen in sets]
+        return points
+
+    def answer(self, point: Point, scenes: Scenes) -> Record:
+        """The proven optimum of one set of shafts."""
+        with scenes.blamed(point):
+            return asdict(solved(_counting(with_shafts(scenes.problem(point), point.shafts or ()))))
+
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+        """As of every sweep, with the shafts of every point."""
+        sets = [" + ".join(point.shafts or ()) or "none" for point in points]
+        return super().dataset(points, records).assign_coords(shafts=("point", sets))
+
+    @staticmethod
+    def table(data: xr.Dataset) -> list[Text]:
+        """A row a point, with its shafts."""
+        return by_point(data, "shafts")
+
+    @staticmethod
+    def picture(data: xr.Dataset) -> Picture:
+        """Bars of every set of shafts, the plain engine drawn once; lines where something is swept."""
+        words = "Every set of shafts at its own optimum."
+        if swept_names(data):
+            return over_sweep(data, ["shafts"], words)
+        plain = data["shafts"].values == "none"
+        # cases that differ in their shafts alone have one plain engine
+        shared = bool(np.ptp(data["objective"].values[plain]) == 0.0)
+        if shared:
+            data = data.isel(point=np.concatenate([np.flatnonzero(plain)[:1], np.flatnonzero(~plain)]))
+        alone = len(set(data["case"].values.tolist())) == 1
+        labels = [
+            _wrapped(shafts) if alone or (shared and shafts == "none") else f"{case}\n{_wrapped(shafts)}"
+            for case, shafts in zip(data["case"].values.tolist(), data["shafts"].values.tolist(), strict=True)
+        ]
+        return bars(data, labels, words, data["shafts"].values == "none")
 
 
 def _counting(problem: Problem) -> Problem:
@@ -87,10 +117,8 @@ def _counting(problem: Problem) -> Problem:
     return replace(problem, objective=terms_left, limits=limits_left)
 
 
-def _dataset(part: BalancerSizingTable, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-    extra = coordinates(axes_of(part), points)
-    extra["shafts"] = ("point", [" + ".join(point.shafts or ()) or "none" for point in points])
-    return dataset(part, points, records, extra)
-
-
-KIND = Kind(_points, _answer, _dataset)
+def _wrapped(shafts: str) -> str:
+    """Names of shafts, two a line."""
+    names = shafts.split(" + ")
+    lines = [" + ".join(names[k : k + 2]) for k in range(0, len(names), 2)]
+    return "no shafts" if shafts == "none" else "\n".join(lines)

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from laufruhe.files.study_models import CounterweightFractionTable
+import numpy as np
+
 from laufruhe.files.study_paths import at
 from laufruhe.files.study_sweeps import Axis
-from laufruhe.studies.kinds.kind import Kind
-from laufruhe.studies.kinds.swept import answer, check_moved_by_loads, checked, combinations, refused
-from laufruhe.studies.outcome import axes_of, coordinates, dataset
+from laufruhe.studies import picture as p
 from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.swept import SweptPart, coordinates, dataset
+from laufruhe.studies.swept_shown import (
+    bars,
+    claimed,
+    groups,
+    lines,
+    metric_axis,
+    readable_metric,
+    spread,
+    swept_axis,
+    swept_names,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,24 +31,73 @@ if TYPE_CHECKING:
 _FRACTION = "balance_fraction"
 
 
-def _points(part: CounterweightFractionTable, scenes: Scenes) -> list[Point]:
-    """Every fraction swept, and last for each speed the fraction left open."""
-    problems = checked(part, scenes)
-    check_moved_by_loads(problems, part, scenes, "counterweight")
-    fraction = _fraction(part)
-    if fraction is None:
-        for case, problem in zip(part.cases, problems, strict=True):
-            if not any(decision.name.endswith(_FRACTION) for decision in problem.decisions):
-                rule = "leaves no balance fraction open and the part sweeps none"
-                raise refused(scenes, case, "counterweights", rule, "sweep counterweights.NAME.balance_fraction")
-        return [Point(case, changes, part.metric) for case in part.cases for changes in combinations(part)]
-    points = []
-    for case in part.cases:
-        left_open = _left_open(Point(case), fraction, scenes)
-        for speed in combinations(part, without=fraction.quantity):
-            points += [Point(case, {**speed, fraction.quantity: value}, part.metric) for value in fraction.values]
-            points.append(Point(case, {**speed, fraction.quantity: left_open}, part.metric))
-    return points
+class CounterweightFraction(SweptPart):
+    """A metric over the balance fraction, its proven optimum marked."""
+
+    kind: Literal["counterweight fraction"]
+
+    def points(self, scenes: Scenes) -> list[Point]:
+        """Every fraction swept, and last for each speed the fraction left open."""
+        problems = self.checked(scenes)
+        self.check_moved_by_loads(problems, scenes, "counterweight")
+        fraction = self._swept_fraction()
+        if fraction is None:
+            for case, problem in zip(self.cases, problems, strict=True):
+                if not any(decision.name.endswith(_FRACTION) for decision in problem.decisions):
+                    rule = "leaves no balance fraction open and the part sweeps none"
+                    raise scenes.refused(case, "counterweights", rule, "sweep counterweights.NAME.balance_fraction")
+            return [Point(case, changes, self.metric) for case in self.cases for changes in self.combinations()]
+        points = []
+        for case in self.cases:
+            left_open = _left_open(Point(case), fraction, scenes)
+            for speed in self.combinations(without=fraction.quantity):
+                tried = ({**speed, fraction.quantity: value} for value in (*fraction.values, left_open))
+                points += [Point(case, changes, self.metric) for changes in tried]
+        return points
+
+    def _swept_fraction(self) -> Axis | None:
+        return next((axis for axis in self.axes() if axis.quantity.endswith(_FRACTION)), None)
+
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+        """As of every sweep, with the rows marked whose fraction was left open."""
+        fraction = self._swept_fraction()
+        if fraction is None:
+            return super().dataset(points, records)
+        path, number = fraction.quantity, fraction.by_value()
+        optimum = np.array([isinstance(point.changes[path], dict) for point in points])
+        values = [
+            _decided(record, path) if best else number[point.changes[path]]
+            for point, record, best in zip(points, records, optimum, strict=True)
+        ]
+        others = [axis for axis in self.axes() if axis.quantity != path]
+        extra = {
+            **coordinates(others, points),
+            path: ("point", values, {"units": "1", "long_name": "balance fraction", "swept": 1}),
+            "optimum": ("point", optimum, {"long_name": "whether the fraction was left open, and decided"}),
+        }
+        return dataset(points, records, extra, self.about())
+
+    @staticmethod
+    def picture(data: xr.Dataset) -> p.Picture:
+        """The metric over the fraction, the proven optimum of every line marked; or the best fraction over speed."""
+        data = readable_metric(data)
+        if "optimum" not in data.coords:
+            return _best_fraction(data)
+        names = swept_names(data)
+        along = next(name for name in names if name.endswith(_FRACTION))
+        best, marks, legend = data["optimum"].values, [], []
+        x, y = data[along].values, data["objective"].values
+        for label, chosen, colour in groups(data, [name for name in names if name != along]):
+            # the optimum is a point of its line too
+            order = np.flatnonzero(chosen)[np.argsort(x[chosen])]
+            marks += [
+                p.Line(x[order], y[order], colour),
+                p.Line(x[chosen & best], y[chosen & best], colour, width=0.0, marker="o"),
+            ]
+            legend.append(p.Line(colour=colour, marker="o", label=label))
+        panel = p.Panel(marks, p.Axis("balance fraction"), metric_axis(data))
+        words = f"Dot: {claimed(data)}, the fraction left open."
+        return p.Picture(data.attrs["title"], words, [panel], p.credit(data), legend=legend)
 
 
 def _left_open(point: Point, fraction: Axis, scenes: Scenes) -> dict[str, Any]:
@@ -47,39 +107,6 @@ def _left_open(point: Point, fraction: Axis, scenes: Scenes) -> dict[str, Any]:
     return given if isinstance(given, dict) else {"between": [min(numbers), max(numbers)]}
 
 
-def _fraction(part: CounterweightFractionTable) -> Axis | None:
-    """The swept balance fraction."""
-    return next((axis for axis in axes_of(part) if axis.quantity.endswith(_FRACTION)), None)
-
-
-def _dataset(
-    part: CounterweightFractionTable, points: Sequence[Point], records: Sequence[Mapping[str, Any]]
-) -> xr.Dataset:
-    import numpy as np
-
-    fraction = _fraction(part)
-    if fraction is None:
-        return dataset(part, points, records, coordinates(axes_of(part), points))
-    others = [axis for axis in axes_of(part) if axis is not fraction and axis.quantity != fraction.quantity]
-    optimum = np.array([isinstance(point.changes[fraction.quantity], dict) for point in points])
-    number = fraction.by_value()
-    values = [
-        _decided(record, fraction.quantity) if best else number[point.changes[fraction.quantity]]
-        for point, record, best in zip(points, records, optimum, strict=True)
-    ]
-    swept = {"units": "1", "long_name": "balance fraction", "swept": 1}
-    return dataset(
-        part,
-        points,
-        records,
-        {
-            **coordinates(others, points),
-            fraction.quantity: ("point", values, swept),
-            "optimum": ("point", optimum, {"long_name": "whether the fraction was left open, and decided"}),
-        },
-    )
-
-
 def _decided(record: Mapping[str, Any], quantity: str) -> float:
     """The fraction decided for the counterweight of this path, which may count it instead of naming it."""
     decided = {name: value for name, value in record["decisions"].items() if name.endswith(_FRACTION)}
@@ -87,4 +114,18 @@ def _decided(record: Mapping[str, Any], quantity: str) -> float:
     return float(decided.get(quantity.split(".", 1)[-1], only))
 
 
-KIND = Kind(_points, answer, _dataset)
+def _best_fraction(data: xr.Dataset) -> p.Picture:
+    names = swept_names(data)
+    if not names:
+        return bars(data, data["case"].values, "The balance fraction is decided.")
+    axis, place = swept_axis(data, names[-1]), spread(data, names[-1])
+    fractions = [k for k, name in enumerate(data["decision"].values) if str(name).endswith(_FRACTION)]
+    lower = [
+        p.Line(place[chosen], data["decided"].values[chosen, k], colour)
+        for _, chosen, colour in groups(data, names[:-1])
+        for k in fractions
+    ]
+    upper = p.Panel(lines(data, names), swept_axis(data, names[-1], named=False), metric_axis(data))
+    words = f"Every point: {claimed(data)}."
+    panels = [upper, p.Panel(lower, axis, p.Axis("best balance fraction"))]
+    return p.Picture(data.attrs["title"], words, panels, p.credit(data), size=(p.WIDE, 2.4))

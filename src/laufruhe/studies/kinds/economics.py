@@ -5,65 +5,203 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.files import fields as f
 from laufruhe.files.complaints import nearest
-from laufruhe.files.study_costs import PLAIN, BuildTable, EconomicsTable
+from laufruhe.files.file_models import Name, Table
 from laufruhe.files.study_parts import CaseTable
 from laufruhe.problem.problem import Problem
-from laufruhe.studies.economics import (
-    Build,
-    Claim,
-    Front,
-    FrontPoint,
-    Standing,
-    compared,
-    front,
-    shafts_of,
-    with_shafts,
-)
+from laufruhe.studies import picture as p
+from laufruhe.studies.economics import PLAIN, Build, Claim, Front, FrontPoint, Standing, compared, front
 from laufruhe.studies.equal_power import check_comparable
-from laufruhe.studies.kinds.kind import Kind
-from laufruhe.studies.kinds.swept import refuse_open_phasing, refused
+from laufruhe.studies.part import Part, Record
 from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.shafts import refuse_open_phasing, shafts_of, with_shafts
+from laufruhe.studies.text import NOTHING, Rows, Text, number, percent, said
+from laufruhe.studies.worth import Judgement, verdicts, worths
 
 if TYPE_CHECKING:
     import xarray as xr
 
-
-def _points(part: EconomicsTable, scenes: Scenes) -> list[Point]:
-    """The plain engine, every build, and every engine with more cylinders rebuilt at equal power."""
-    base = part.cases[0]
-    whole = scenes.problem(Point(base))
-    if not shafts_of(whole):
-        raise refused(scenes, base, "balancer_shafts", "is missing, so no shafts can be weighed", "add them")
-    points = [Point(base, shafts=())]
-    points += [_build(part, build, scenes) for build in part.builds]
-    points += [_more_cylinders(case, whole, scenes) for case in part.more_cylinders]
-    _check_objectives(points, scenes)
-    return points
+LINE = 0.052
+"""Height of a line of text over that of its panel."""
 
 
-def _build(part: EconomicsTable, build: BuildTable, scenes: Scenes) -> Point:
-    case = next((case for case in part.cases if case.name == build.case), part.cases[0])
-    own = shafts_of(scenes.problem(Point(case)))
-    for shaft in build.shafts:
-        if shaft not in own:
-            rule = f"has no shaft '{shaft}', which '{build.name}' builds"
-            raise refused(scenes, case, "balancer_shafts", rule, nearest(shaft, own))
-    return Point(case, shafts=tuple(build.shafts))
+class ClaimTable(Table):
+    """What the source says of a set of shafts; it is confirmed or not."""
+
+    says: Judgement | None = None
+    falls_by: Annotated[float, Field(gt=0.0, lt=1.0)] | None = Field(
+        default=None, description="Share by which the force is said to fall."
+    )
+    against: Name = Field(default=PLAIN, description="Build that it is compared with.")
+    where: str = Field(default="", description="Figure or passage.")
+
+    @model_validator(mode="after")
+    def _says_something(self) -> ClaimTable:
+        if self.says is None and self.falls_by is None:
+            raise f.refusal("claims nothing; give says, falls_by, or both")
+        return self
 
 
-def _more_cylinders(case: CaseTable, whole: Problem, scenes: Scenes) -> Point:
+class BuildTable(Table):
+    """One set of shafts."""
+
+    name: Name
+    case: Name | None = Field(default=None, description="Case that has them; the first where left out.")
+    shafts: list[Name] = Field(
+        default_factory=list, description="Balancer shafts that are built; none makes the plain engine of another case."
+    )
+    claim: ClaimTable | None = None
+
+    @model_validator(mode="after")
+    def _is_not_plain(self) -> BuildTable:
+        if not self.shafts and self.case is None:
+            raise f.refusal("has no shafts, so it is the plain engine, which is always there; name its shafts")
+        if len(set(self.shafts)) < len(self.shafts):
+            raise f.refusal("names a shaft twice; name each once")
+        return self
+
+
+class Economics(Part):
+    """Least force against number and mass of shafts, beside the engine with one more cylinder at equal power."""
+
+    kind: Literal["economics"]
+    mass_limits: list[f.Mass] = Field(description="Masses allowed on the shafts, ascending.")
+    builds: list[BuildTable] = Field(min_length=1)
+    more_cylinders: list[CaseTable] = Field(
+        min_length=1, description="Plain engines, rebuilt at equal power; the first decides what is worth building."
+    )
+
+    @field_validator("mass_limits")
+    @classmethod
+    def _ascend(cls, limits: list[float]) -> list[float]:
+        if len(limits) < 2:
+            raise f.refusal("is no front; give two masses or more")
+        if any(b <= a for a, b in pairwise(limits)):
+            raise f.refusal("must ascend; order the masses and name each once")
+        return limits
+
+    @model_validator(mode="after")
+    def _names_fit(self) -> Economics:
+        built = [PLAIN, *(build.name for build in self.builds)]
+        names = [*built, *(case.name for case in self.more_cylinders)]
+        twice = [name for name in names if names.count(name) > 1]
+        if twice:
+            raise f.refusal(f"has two engines called '{twice[0]}'; give each its own name ('{PLAIN}' is taken)")
+        cases = [case.name for case in self.cases]
+        for build in self.builds:
+            if build.claim is not None and build.claim.against not in built:
+                raise f.refusal(f"compares '{build.name}' with '{build.claim.against}'; use one of: {', '.join(built)}")
+            if build.case is not None and build.case not in cases:
+                raise f.refusal(f"builds '{build.name}' on case '{build.case}'; use one of: {', '.join(cases)}")
+        for case in (*self.cases, *self.more_cylinders):
+            if case.equal_power_to is not None:
+                raise f.refusal(f"rebuilds '{case.name}' by itself; leave equal_power_to out of its cases")
+        return self
+
+    def settings(self) -> dict[str, Any]:
+        """Of a front, the masses alone: names and claims change nothing in it."""
+        return {"kind": self.kind, "mass_limits": self.mass_limits}
+
+    def points(self, scenes: Scenes) -> list[Point]:
+        """The plain engine, every build, and every engine with more cylinders rebuilt at equal power."""
+        base = self.cases[0]
+        whole = scenes.problem(Point(base))
+        if not shafts_of(whole):
+            raise scenes.refused(base, "balancer_shafts", "is missing, so no shafts can be weighed", "add them")
+        points = [Point(base, shafts=())]
+        points += [self._build(build, scenes) for build in self.builds]
+        points += [_rebuilt(case, whole, scenes) for case in self.more_cylinders]
+        _check_objectives(points, scenes)
+        return points
+
+    def _build(self, build: BuildTable, scenes: Scenes) -> Point:
+        case = next((case for case in self.cases if case.name == build.case), self.cases[0])
+        own = shafts_of(scenes.problem(Point(case)))
+        for shaft in build.shafts:
+            if shaft not in own:
+                rule = f"has no shaft '{shaft}', which '{build.name}' builds"
+                raise scenes.refused(case, "balancer_shafts", rule, nearest(shaft, own))
+        return Point(case, shafts=tuple(build.shafts))
+
+    def answer(self, point: Point, scenes: Scenes) -> Record:
+        """The front of one engine."""
+        with scenes.blamed(point):
+            try:
+                return asdict(front(with_shafts(scenes.problem(point), point.shafts or ()), self.mass_limits))
+            except SolverError as error:
+                raise ModelError(f"{error}; leave more to its decisions, or name larger mass limits") from None
+
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
+        """Fronts side by side."""
+        builds = [Build(PLAIN, Standing.PLAIN)]
+        builds += [Build(build.name, Standing.SHAFTS, _claim(build)) for build in self.builds]
+        builds += [Build(case.name, Standing.NEXT) for case in self.more_cylinders]
+        return compared(builds, [_front(record) for record in records]).assign_attrs(self.about())
+
+    @staticmethod
+    def table(data: xr.Dataset) -> list[Text]:
+        """Every engine at its optimum, what is worth building, what was said, and the front."""
+        judged = {worth.build: worth for worth in worths(data)}
+        unit, plain = data["optimum"].attrs["units"], float(data["optimum"].isel(build=0))
+        head = ["engine", "shafts", "mass on them [kg]", f"{data.attrs['objective']} [{unit}]", f"lower bound [{unit}]",
+                "beside plain", "worth building"]  # fmt: skip
+        rows = []
+        for name in data["build"].values:
+            row = data.sel(build=name)
+            force, worth = float(row["optimum"]), judged.get(str(name))
+            label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == Standing.NEXT else str(name)
+            cells = [label, str(int(row["shafts"])), f"{float(row['optimum_mass']):.2f}", number(force)]
+            change = NOTHING if force == plain else percent(force / plain - 1.0)
+            cells += [number(float(row["optimum_bound"]), 6), change]
+            rows.append([*cells, f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else NOTHING])
+        return [Rows(head, rows), *said([v for own in verdicts(data).values() for v in own]), *_front_rows(data)]
+
+    @staticmethod
+    def picture(data: xr.Dataset) -> p.Picture:
+        """Fronts on the left, what each set of shafts does and what is said of it on the right."""
+        built = _with_shafts(data)
+        colours = dict(zip(built, _SERIES * (1 + len(built) // len(_SERIES)), strict=False))
+        ends = (1.3 * float(data["optimum_mass"].max()) or 1.0, 1.06 * float(data["optimum"].max()))
+        unit = data["optimum"].attrs["units"]
+        fronts = p.Panel(
+            _lines(data, colours) + _levels(data, *ends),
+            p.Axis("mass on balancer shafts [kg]", (0.0, ends[0])),
+            p.Axis(f"{data.attrs['objective']} [{unit}]", (0.0, ends[1])),
+        )
+        table = p.Panel(_told(data, colours), p.Axis(ends=(0.0, 1.0)), p.Axis(ends=(0.0, 1.0)), bare=True)
+        legend = [
+            p.Line(marker="o", size=4.0, label="least force for this mass"),
+            p.Line(marker="D", width=0.0, label="optimum, whatever it weighs"),
+            p.Line(colour="before", label="no shafts"),
+            p.Line(dash=p.DASHES[0], width=1.2, label="more cylinders, no shafts, equal power"),
+        ]
+        gap = f"no design lies lower by more than {100.0 * float(data['gap'].max()):.1g} %"
+        words = f"Every point a proven optimum: {gap}. Crank weights are free."
+        credit = p.credit(data)[:-1] + "; filled dots: no other point has less force, mass and shafts."
+        return p.Picture(data.attrs["title"], words, [fronts, table], credit, (5.4, 4.4), 2, 0.25, legend=legend)
+
+
+_SERIES: tuple[p.Colour, ...] = ("blue", "vermilion", "green", "purple", "orange", "sky")
+
+
+def _rebuilt(case: CaseTable, whole: Problem, scenes: Scenes) -> Point:
+    """An engine with more cylinders, at the power of the whole one."""
     given = scenes.problem(Point(case))
     cylinders = len(whole.engine.slider_cranks)
     if shafts_of(given):
         rule = f"is there, and '{case.name}' is compared without"
-        raise refused(scenes, case, "balancer_shafts", rule, 'add without = ["balancer_shafts"] to its case')
+        raise scenes.refused(case, "balancer_shafts", rule, 'add without = ["balancer_shafts"] to its case')
     if len(given.engine.slider_cranks) <= cylinders:
         rule = f"has no more cylinders in '{case.name}' than the {cylinders} that it is compared with"
-        raise refused(scenes, case, "engine", rule, "name an engine with more")
+        raise scenes.refused(case, "engine", rule, "name an engine with more")
     with scenes.blamed(Point(case), "more_cylinders"):
         check_comparable(given, whole)
     return Point(case.model_copy(update={"equal_power_to": cylinders}), shafts=())
@@ -78,33 +216,17 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
         if not objective:
             rule = f"is {problem.objective_name}, which is no load" if problem.objective_name else "is missing"
             remedy = "minimise a load, such as mean mount force"
-            raise refused(scenes, point.case, "objective", f"{rule}, so shafts have nothing to lower", remedy)
+            raise scenes.refused(point.case, "objective", f"{rule}, so shafts have nothing to lower", remedy)
         asked.setdefault(str(objective), point)
     if len(asked) > 1:
         first, second = list(asked.values())[:2]
         rule = f"differs between '{first.case.name}' and '{second.case.name}'"
-        raise refused(scenes, second.case, "objective", rule, "give all engines the same")
-
-
-def _answer(part: EconomicsTable, point: Point, scenes: Scenes) -> dict[str, Any]:
-    with scenes.blamed(point):
-        try:
-            return asdict(front(with_shafts(scenes.problem(point), point.shafts or ()), part.mass_limits))
-        except SolverError as error:
-            raise ModelError(f"{error}; leave more to its decisions, or name larger mass limits") from None
-
-
-def _dataset(part: EconomicsTable, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG001
-    builds = [Build(PLAIN, Standing.PLAIN)]
-    builds += [Build(build.name, Standing.SHAFTS, _claim(build)) for build in part.builds]
-    builds += [Build(case.name, Standing.NEXT) for case in part.more_cylinders]
-    found = compared(builds, [_front(record) for record in records])
-    return found.assign_attrs(title=part.title, source=part.source)
+        raise scenes.refused(second.case, "objective", rule, "give all engines the same")
 
 
 def _claim(build: BuildTable) -> Claim:
-    said = build.claim
-    return Claim() if said is None else Claim(said.says or "", said.falls_by or math.nan, said.against, said.where)
+    given = build.claim
+    return Claim(given.says or "", given.falls_by or math.nan, given.against, given.where) if given else Claim()
 
 
 def _front(record: Mapping[str, Any]) -> Front:
@@ -112,4 +234,82 @@ def _front(record: Mapping[str, Any]) -> Front:
     return Front(**{**record, "points": points, "optimum": FrontPoint(**record["optimum"])})
 
 
-KIND = Kind(_points, _answer, _dataset)
+def _with_shafts(data: xr.Dataset) -> list[str]:
+    return [str(build) for build in data["build"].values[data["shafts"].values > 0]]
+
+
+def _front_rows(data: xr.Dataset) -> list[Text]:
+    """Least force by mass allowed, efficient points in bold."""
+    built = _with_shafts(data)
+    rows = []
+    for limit in data["mass_limit"].values:
+        here = data.sel(mass_limit=limit)
+        cells = [f"{float(here['force'].sel(build=b)):.1f}" for b in built]
+        best = [bool(here["efficient"].sel(build=b)) for b in built]
+        rows.append([f"{limit:g}", *(f"**{c}**" if b else c for c, b in zip(cells, best, strict=True))])
+    words = f"Least {data.attrs['objective']} [{data['force'].attrs['units']}] by mass allowed on the shafts, every "
+    words += f"number proven to {100.0 * float(data['gap'].max()):.1g} %; bold: nothing else has less force, mass and "
+    return [words + "shafts.", Rows(["mass [kg]", *built], rows)]
+
+
+def _lines(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:
+    """A front each; lines that run together show one beside the other."""
+    limits = data["mass_limit"].values
+    marks: list[p.Mark] = []
+    for k, (name, colour) in enumerate(colours.items()):
+        row = data.sel(build=name)
+        mass, force = float(row["optimum_mass"]), float(row["optimum"])
+        shown = limits < mass
+        x, y = limits[shown], row["force"].values[shown]
+        marks.append(p.Line(np.append(x, mass), np.append(y, force), colour, width=max(4.2 - 0.9 * k, 1.2)))
+        best = row["efficient"].values[shown]
+        marks.append(p.Line(x[best], y[best], colour, width=0.0, marker="o", size=4.0))
+        marks.append(p.Line(x[~best], y[~best], colour, width=0.0, marker="o", size=4.0, hollow=True))
+        marks.append(p.Line([mass], [force], colour, width=0.0, marker="D"))
+    return marks
+
+
+def _levels(data: xr.Dataset, right: float, high: float) -> list[p.Mark]:
+    """Engines without shafts: grey, and dashed where they have more cylinders."""
+    dashes = iter(p.DASHES * 4)
+    top = math.inf
+    marks: list[p.Mark] = []
+    bare = data.isel(build=np.flatnonzero(data["shafts"].values == 0)).sortby("optimum", ascending=False)
+    for name in bare["build"].values:
+        force = float(bare["optimum"].sel(build=name))
+        more = str(bare["standing"].sel(build=name).item()) == Standing.NEXT
+        dash, colour = (next(dashes), "ink") if more else ((), "before")
+        marks.append(p.Line([0.0, right], [force, force], colour, dash=dash, width=1.2, behind=True))
+        # names of levels close together stand one under the other
+        top = min(force, top - LINE * high)
+        place, colour = top + 0.15 * LINE * high, "ink" if more else "faint"
+        marks.append(p.Words(right, place, f"{name}: {force:.0f}", 7.5, colour, "right", "bottom", boxed=True))
+    return marks
+
+
+def _told(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:
+    """A few lines of text for every set of shafts, from above."""
+    unit, claims = data["optimum"].attrs["units"], verdicts(data)
+    y = 1.0
+    marks: list[p.Mark] = []
+
+    def write(text: str, colour: str = "ink", bold: bool = False) -> None:
+        marks.append(p.Words(0.07, y, text, colour=colour, along="top", bold=bold))
+
+    for worth in worths(data):
+        row = data.sel(build=worth.build)
+        shafts = int(row["shafts"])
+        marks.append(p.Line([0.0, 0.05], [y - 0.012] * 2, colours[worth.build], width=2.5))
+        write(f"{worth.build}, {shafts} shaft{'s' if shafts > 1 else ''}", bold=True)
+        y -= LINE
+        mass = float(row["optimum_mass"])
+        write(f"{float(row['optimum']):.0f} {unit} ({percent(-worth.fall)}) with {mass:.2f} kg")
+        y -= LINE
+        write(f"{'worth building' if worth.worth else 'not worth building'}: {worth.why}", "faint")
+        for verdict in claims.get(worth.build, ()):
+            y -= LINE
+            agreed = "confirmed" if verdict.agrees else f"not confirmed ({verdict.ours:+.0f} %)"
+            mark, colour = ("✓", "leaf") if verdict.agrees else ("✗", "rust")
+            write(f"{mark} said: {verdict.paper} {verdict.statement.partition(': ')[2]}: {agreed}", colour)
+        y -= 1.4 * LINE
+    return marks

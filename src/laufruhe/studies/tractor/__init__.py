@@ -19,7 +19,7 @@ from laufruhe.studies.tractor import (
     layouts,
     single,
 )
-from laufruhe.studies.tractor.verdict import Verdict
+from laufruhe.studies.verdict import Verdict
 
 __all__ = ["COMPUTE", "VERDICTS", "Verdict"]
 

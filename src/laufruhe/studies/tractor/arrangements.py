@@ -12,7 +12,7 @@ from laufruhe.machine.layouts import Layout, boxer, build, inline, vee
 from laufruhe.physics.metrics import order_amplitude, turning_parts
 from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.studies.tractor import engines as study
-from laufruhe.studies.tractor.verdict import Verdict
+from laufruhe.studies.verdict import Verdict
 
 ANGLES = np.arange(0.0, 181.0, 3.0)
 ORDERS = (1, 2, 4)

@@ -11,7 +11,7 @@ from laufruhe.physics.shaking_loads import reciprocating_loads, rotating_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
 from laufruhe.studies.tractor.designs import Design, bars, fall, free_shaft, free_webs, given, opened, optimum
-from laufruhe.studies.tractor.verdict import NEGLIGIBLE, NOTICEABLE, UNSTATED, Verdict
+from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE, UNSTATED, Verdict
 
 WEBS, SHAFT = "webs for half the couple", "with the shaft of the study"
 BEST_WEBS, BEST = "webs at the optimum", "shaft and webs at the optimum"

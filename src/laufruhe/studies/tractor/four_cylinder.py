@@ -9,7 +9,7 @@ from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
 from laufruhe.studies.tractor.designs import bars, fall, given, mean_of, open_rotor, optimum
 from laufruhe.studies.tractor.statements import Unprinted, moment_sweep
-from laufruhe.studies.tractor.verdict import PRINTED_FALL, UNSTATED, Verdict
+from laufruhe.studies.verdict import PRINTED_FALL, UNSTATED, Verdict
 
 BARE, FORCE, BOTH = "no shafts", "force pair (eq. 26)", "and moment pair, Φ = 50 % (eq. 28)"
 BEST_FORCE, BEST_BOTH = "force pair at the optimum", "both pairs at the optimum"

@@ -27,7 +27,7 @@ from laufruhe.studies.tractor.statements import (
     inertia_second_order,
     largest_gas_force,
 )
-from laufruhe.studies.tractor.verdict import Verdict
+from laufruhe.studies.verdict import Verdict
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from laufruhe.physics.elastic_mounts import single_transmissibility
 from laufruhe.physics.modes import sag_for_critical_speed, sag_frequency
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.studies.tractor import engines as study
-from laufruhe.studies.tractor.verdict import Verdict
+from laufruhe.studies.verdict import Verdict
 
 Array = NDArray[np.float64]
 

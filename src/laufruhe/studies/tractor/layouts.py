@@ -12,7 +12,7 @@ from laufruhe.machine.similarity import equal_power_scale
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
 from laufruhe.studies.tractor.designs import ASSUMED, Design, bars, free_webs, given, opened, optimum
-from laufruhe.studies.tractor.verdict import Verdict
+from laufruhe.studies.verdict import Verdict
 
 CYLINDERS = (2, 3, 4, 6)
 MOUNTINGS = {"short, k = 0": 0.0, "long, k = 6a": 6.0}

@@ -16,7 +16,7 @@ from laufruhe.physics.shaking_loads import gas_loads, reciprocating_loads, rod_i
 from laufruhe.problem.problem import Drive, UnbalanceDecision
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.designs import ASSUMED, given, optimum
-from laufruhe.studies.tractor.verdict import Verdict
+from laufruhe.studies.verdict import Verdict
 
 SAMPLES = 1440
 FRACTIONS = (0.0, 0.5, 1.0)

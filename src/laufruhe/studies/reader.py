@@ -1,20 +1,43 @@
-"""Reading a study file, and the scenes that it makes of problem files."""
+"""The study file, and how it is read: scenes, what of them is swept, and what is compared (docs/studies.md)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias, Union
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from laufruhe.errors import Complaint, InputError
-from laufruhe.files.complaints import Refused, complaints_of, nearest
+from laufruhe.files.complaints import Refused, complaints_of
+from laufruhe.files.file_models import Table
 from laufruhe.files.reader import tables_of
-from laufruhe.files.study_models import AnyPart, StudyFile
-from laufruhe.files.study_parts import CaseTable, SweptPartTable
-from laufruhe.files.study_paths import changed
 from laufruhe.files.study_sweeps import axis_of
+from laufruhe.studies.kinds import KINDS
+from laufruhe.studies.part import Part
+from laufruhe.studies.swept import SweptPart
+
+if TYPE_CHECKING:
+    AnyPart: TypeAlias = Part
+else:
+    AnyPart = Annotated[Union[tuple(KINDS.values())], Field(discriminator="kind")]  # noqa: UP007
+
+
+class StudyTable(Table):
+    """What a study consists of."""
+
+    figures: Literal["tractor"] | None = Field(
+        default=None, description="Every figure of Hasselgruber's study, beside what it says."
+    )
+    parts: list[AnyPart] = Field(default_factory=list)
+
+
+class StudyFile(Table):
+    """A whole study file."""
+
+    title: Annotated[str, Field(min_length=1)]
+    source: str = ""
+    assumptions: list[str] = Field(default_factory=list)
+    study: StudyTable
 
 
 def load_study(path: Path) -> StudyFile:
@@ -40,18 +63,18 @@ def load_study(path: Path) -> StudyFile:
         if names.count(part.name) > 1:
             raise _refused(path, f"{where}.name", part.name, "is given twice", "give each part its own name")
         _check_cases(part, path, where)
-        if isinstance(part, SweptPartTable):
+        if isinstance(part, SweptPart):
             _check_sweeps(part, path, where)
     return file
 
 
-def _check_cases(part: AnyPart, path: Path, where: str) -> None:
+def _check_cases(part: Part, path: Path, where: str) -> None:
     cases = [case.name for case in part.cases]
     if len(set(cases)) < len(cases):
         raise _refused(path, f"{where}.cases", "", "has two cases of one name", "give each its own")
 
 
-def _check_sweeps(part: SweptPartTable, path: Path, where: str) -> None:
+def _check_sweeps(part: SweptPart, path: Path, where: str) -> None:
     paths = [sweep.quantity for sweep in part.sweep]
     for k, sweep in enumerate(part.sweep):
         at = f"{where}.sweep[{k + 1}]"
@@ -66,31 +89,6 @@ def _check_sweeps(part: SweptPartTable, path: Path, where: str) -> None:
         except Refused as refused:
             found = refused.complaint
             raise _refused(path, f"{at}.{found.where}", found.value, found.rule, found.remedy) from None
-
-
-def scene_tables(
-    given: Mapping[str, Any], case: CaseTable, changes: Mapping[str, Any], path: Path, metric: str | None = None
-) -> dict[str, Any]:
-    """Tables of the problem of a case, with its own changes and those of a sweep.
-
-    Raises
-    ------
-    InputError
-        If the problem file has no such table or quantity.
-    """
-    tables = dict(given)
-    for name in case.without:
-        if name not in tables:
-            raise _refused(path, name, "", "is left out by the study and is not there", nearest(name, list(tables)))
-        del tables[name]
-    try:
-        for where, value in {**case.set, **changes}.items():
-            tables = changed(tables, where, value)
-    except Refused as refused:
-        raise InputError(str(path), (refused.complaint,)) from None
-    if metric is not None:
-        tables["objective"] = {"minimise": metric}
-    return tables
 
 
 def _refused(path: Path, where: str, value: str, rule: str, remedy: str) -> InputError:

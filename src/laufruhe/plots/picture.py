@@ -1,0 +1,124 @@
+"""Any picture that is described as data, drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator
+
+from laufruhe.plots import style
+from laufruhe.plots.style import heading, page
+from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
+
+MOST_ENTRIES, FEW_ENTRIES = 8, 5
+_MORE = {"indigo": "#332288", "olive": "#999933", "leaf": "#00664b", "rust": "#a63c00"}
+
+
+def draw(picture: Picture) -> Figure:
+    """The figure of a description."""
+    rows = -(-len(picture.panels) // picture.columns)
+    drawn = page(rows, picture.columns, picture.size, len(picture.panels), gap=picture.gap)
+    if picture.room:
+        _make_room(drawn.panels, picture.room / drawn.figure.get_figwidth())
+    for axes, panel in zip(drawn.panels, picture.panels, strict=True):
+        _panel(axes, panel)
+    legend = [_entry(mark) for mark in _named(picture)]
+    heading(drawn.figure, picture.title, picture.words, legend, picture.credit)
+    return drawn.figure
+
+
+def hue(colour: Colour) -> str:
+    """A colour as matplotlib takes it."""
+    if isinstance(colour, float):
+        return to_hex(colormaps["viridis"](colour))
+    return str(_MORE.get(colour) or getattr(style, colour.upper()))
+
+
+def _panel(axes: Axes, panel: Panel) -> None:
+    for mark in panel.marks:
+        _mark(axes, mark)
+    axes.set_title(panel.title, loc="left", size=9)
+    if panel.bare:
+        axes.set_axis_off()
+    _axis(axes, "x", panel.x)
+    _axis(axes, "y", panel.y)
+
+
+def _mark(axes: Axes, mark: Mark) -> None:
+    if isinstance(mark, Words):
+        drawn = axes.text(
+            mark.x, mark.y, mark.text, size=mark.size, color=hue(mark.colour), clip_on=False,
+            ha=mark.across, va=mark.along, weight="bold" if mark.bold else "normal",
+        )  # fmt: skip
+        if mark.boxed:
+            drawn.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.0})
+    elif isinstance(mark, Bars):
+        draws = axes.bar if mark.upright else axes.barh
+        bars = draws(mark.places, mark.values, mark.width, color=hue(mark.colour), linewidth=0)
+        if mark.numbers:
+            axes.bar_label(bars, list(mark.numbers), size=7.5)
+    elif isinstance(mark, Area):
+        axes.fill_between(mark.x, mark.low, mark.high, color=hue(mark.colour), linewidth=0)
+    elif np.size(mark.x):
+        axes.plot(mark.x, mark.y, clip_on=bool(mark.width), **_look(mark))
+
+
+def _look(line: Line) -> dict[str, Any]:
+    dash = (0, tuple(line.dash)) if line.dash else "-"
+    found: dict[str, Any] = {"color": hue(line.colour), "marker": line.marker, "markersize": line.size}
+    found |= {"linestyle": dash if line.width else "", "linewidth": line.width, "zorder": 1 if line.behind else 2}
+    if line.hollow:
+        found["fillstyle"] = "none"
+    if line.marker == "|":
+        found["markeredgewidth"] = 2.5
+    return found
+
+
+def _axis(axes: Axes, name: Literal["x", "y"], axis: Axis) -> None:
+    own = axes.xaxis if name == "x" else axes.yaxis
+    axes.set(**{f"{name}label": axis.label})
+    if axis.log:
+        axes.set(**{f"{name}scale": "log"})
+        own.set_major_locator(LogLocator(10.0, tuple(axis.log), numticks=12))
+        own.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        own.set_minor_locator(LogLocator(10.0, (), numticks=12))
+    if axis.ends is not None:
+        axes.set(**{f"{name}lim": axis.ends})
+    if axis.ticks is not None:
+        own.set_ticks([place for place, _ in axis.ticks], [text for _, text in axis.ticks], size=axis.small)
+    if not axis.grid:
+        axes.grid(axis=name, visible=False)
+        if name == "y":
+            axes.tick_params(axis="y", length=0)
+
+
+def _named(picture: Picture) -> Sequence[Mark]:
+    """Marks of the legend: those given for it, else those with a label; a few of very many."""
+    marks = list(picture.legend) or [m for p in picture.panels for m in p.marks if getattr(m, "label", "")]
+    if len(marks) <= MOST_ENTRIES:
+        return marks
+    return [marks[k] for k in np.linspace(0, len(marks) - 1, FEW_ENTRIES).round().astype(int)]
+
+
+def _entry(mark: Mark) -> Artist:
+    if isinstance(mark, Line):
+        return Line2D([], [], label=mark.label, **_look(mark))
+    return Patch(color=hue(mark.colour), label=getattr(mark, "label", ""))
+
+
+def _make_room(panels: Sequence[Axes], shift: float) -> None:
+    """Shift the panels right by a share of the page, for the names of rows."""
+    left, right = panels[0].get_position().x0, panels[-1].get_position().x1
+    factor = (right - left - shift) / (right - left)
+    for axes in panels:
+        own = axes.get_position()
+        axes.set_position((left + shift + (own.x0 - left) * factor, own.y0, own.width * factor, own.height))

@@ -1,0 +1,62 @@
+"""What every kind of study part is: one class with its keys, points, dataset, table and picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+from pydantic import Field
+
+from laufruhe.files.file_models import Table
+from laufruhe.files.study_parts import CaseTable
+from laufruhe.studies.picture import Picture
+from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.text import Text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Record: TypeAlias = dict[str, Any]
+
+
+class Part(Table):
+    """One dataset of a study, its cases, and words about it.
+
+    A kind is a subclass in a module of `laufruhe.studies.kinds` with its name as `kind: Literal[...]`;
+    it is found there. Its fields are its keys in the study file.
+    """
+
+    name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]*$", max_length=60)]
+    title: Annotated[str, Field(min_length=1)]
+    source: str = ""
+    cases: list[CaseTable] = Field(min_length=1)
+
+    def settings(self) -> dict[str, Any]:
+        """What is asked of every point: all but words, cases, and what is swept."""
+        return self.model_dump(exclude={"name", "title", "source", "cases", "sweep"})
+
+    def points(self, scenes: Scenes) -> list[Point]:
+        """The pieces of work. What is wrong with the part is refused here, before any is done."""
+        raise NotImplementedError
+
+    def answer(self, point: Point, scenes: Scenes) -> Record:
+        """One piece of work as JSON can hold it; it depends on the settings and the point alone."""
+        raise NotImplementedError
+
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+        """Records, in the order of the points, as one labelled dataset."""
+        raise NotImplementedError
+
+    @staticmethod
+    def table(data: xr.Dataset) -> list[Text]:
+        """What the report says of the dataset."""
+        raise NotImplementedError
+
+    @staticmethod
+    def picture(data: xr.Dataset) -> Picture:
+        """What is drawn of the dataset."""
+        raise NotImplementedError
+
+    def about(self, **more: Any) -> dict[str, Any]:
+        """Attributes of the dataset that every part has, and more."""
+        return {"title": self.title, "kind": self.settings()["kind"], "source": self.source, **more}

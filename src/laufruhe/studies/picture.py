@@ -1,0 +1,160 @@
+"""A picture as data: panels of lines, bars, areas and words. `laufruhe.plots.picture` draws it.
+
+Colours are names of `laufruhe.plots.style` in small letters, or numbers from dark (0) to light (1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+Colour: TypeAlias = str | float
+SERIES: tuple[Colour, ...] = ("blue", "orange", "green", "vermilion", "purple", "sky", "indigo", "olive")
+WIDE, HIGH = 6.4, 3.6
+DASHES = ((6.0, 2.0), (2.0, 2.0), (1.0, 3.0))
+
+
+def colour(k: int, count: int) -> Colour:
+    """Of the k-th line: told apart by hue, or ordered from dark to light where there are too many."""
+    return SERIES[k] if count <= len(SERIES) else k / (count - 1)
+
+
+@dataclass(frozen=True)
+class Line:
+    """Dots, joined unless `width` is zero. One with a label stands in the legend, drawn or not.
+
+    Attributes
+    ----------
+    width, size
+        Of line and dots [points].
+    dash
+        Lengths drawn and left out [points]; empty for a whole line.
+    marker
+        As matplotlib names it.
+    behind
+        Whether it lies under the other marks.
+    """
+
+    x: Any = ()
+    y: Any = ()
+    colour: Colour = "ink"
+    label: str = ""
+    width: float = 1.5
+    dash: Sequence[float] = ()
+    marker: str = ""
+    size: float = 6.0
+    hollow: bool = False
+    behind: bool = False
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Bars at places along the first axis, or lying where `upright` is false, with their numbers on top."""
+
+    places: Any = ()
+    values: Any = ()
+    width: float = 0.36
+    colour: Colour = "after"
+    label: str = ""
+    numbers: Sequence[str] = ()
+    upright: bool = True
+
+
+@dataclass(frozen=True)
+class Area:
+    """What lies between two lines."""
+
+    x: Any = ()
+    low: Any = ()
+    high: Any = ()
+    colour: Colour = "pale"
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Words:
+    """Text at a place; `across` and `along` say which end or side of it stands there."""
+
+    x: float
+    y: float
+    text: str
+    size: float = 7.5
+    colour: Colour = "ink"
+    across: str = "left"
+    along: str = "center"
+    bold: bool = False
+    boxed: bool = False
+
+
+Mark: TypeAlias = Line | Bars | Area | Words
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis.
+
+    Attributes
+    ----------
+    ends
+        First and last value; the last may be the smaller one. None where the marks decide.
+    ticks
+        Texts by their places, in place of numbers.
+    log
+        Whether equal factors are equally far apart; with the first figures of its ticks.
+    small
+        Size of the ticks' texts [points].
+    grid
+        Whether lines go through the ticks.
+    """
+
+    label: str = ""
+    ends: tuple[float, float] | None = None
+    ticks: Sequence[tuple[float, str]] | None = None
+    log: Sequence[float] = ()
+    small: float = 8.0
+    grid: bool = True
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Marks on two axes; `bare` leaves the axes out."""
+
+    marks: Sequence[Mark]
+    x: Axis = Axis()
+    y: Axis = Axis()
+    title: str = ""
+    bare: bool = False
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Panels side by side or one under the other, a title and what is seen above, the credit below.
+
+    Attributes
+    ----------
+    size
+        Width and height of each panel [inch].
+    columns
+        Panels side by side.
+    gap
+        Between panels [inch].
+    room
+        Left of the first panel, for long names [inch].
+    """
+
+    title: str
+    words: str
+    panels: Sequence[Panel]
+    credit: str
+    size: tuple[float, float] = (WIDE, HIGH)
+    columns: int = 1
+    gap: float = 0.42
+    room: float = 0.0
+    legend: Sequence[Mark] = ()
+
+
+def credit(data: Any, note: str = "") -> str:
+    """Source line of a study's dataset."""
+    source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
+    return f"{source}{note}Computed with Laufruhe."

@@ -1,0 +1,197 @@
+"""Tables and pictures of parts whose scenes are solved: a row a point, bars side by side, lines over what is swept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from laufruhe.studies import picture as p
+from laufruhe.studies.text import NOTHING, Rows, Text, figures, number, percent
+from laufruhe.units import readable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST_ROWS, MOST_DOTS = 80, 40
+NEGLIGIBLE = 1e-9
+# width of a letter of a tick [inch]
+LETTER = 0.066
+_PROOFS = {"global": "proven", "global within gap": "proven within gap", "local": "local", "none": "not proven"}
+
+
+def swept_names(data: xr.Dataset) -> list[str]:
+    """Swept coordinates, in the order of the study file."""
+    return [str(name) for name, values in data.coords.items() if values.attrs.get("swept")]
+
+
+def with_unit(values: xr.DataArray) -> str:
+    """A quantity's name and unit, as a column or an axis is headed."""
+    name, unit = str(values.attrs.get("long_name", values.name)), str(values.attrs.get("units", ""))
+    return name if unit in ("", "1") else f"{name} [{unit}]"
+
+
+def settled(value: float, scale: float) -> float:
+    """Zero for what rounding leaves beside a scale: an engine in balance has no small force."""
+    return 0.0 if abs(value) < NEGLIGIBLE * abs(scale) else value
+
+
+def readable_metric(data: xr.Dataset) -> xr.Dataset:
+    """The dataset with its metric in the unit that a reader expects: a sag in mm, a stiffness in N/mm."""
+    unit, factor = readable(data["objective"].attrs["units"])
+    if factor == 1.0:
+        return data
+    names = ("objective_given", "objective", "lower_bound")
+    return data.assign(
+        {name: (factor * data[name]).assign_attrs({**data[name].attrs, "units": unit}) for name in names}
+    )
+
+
+def claimed(data: xr.Dataset) -> str:
+    """What may be said of all that was decided."""
+    decided = (data["proof"].values != "as given") & np.isfinite(data["objective"].values)
+    return "proven optimum" if np.all(data["proof"].values[decided] == "global") else "best found"
+
+
+def by_point(data: xr.Dataset, *named: str) -> list[Text]:
+    """A row a point: what is swept with its unit, what is proven and what not.
+
+    Parameters
+    ----------
+    named
+        Coordinates that tell rows apart beside case and swept values.
+    """
+    data = readable_metric(data)
+    columns = ["case", *named, *swept_names(data)]
+    metric, unit = data.attrs["metric"], data["objective"].attrs["units"]
+    in_unit = f" [{unit}]" if unit else ""
+    head = ["case", *named, *(with_unit(data[name]) for name in swept_names(data))]
+    head += [f"{metric}, as given{in_unit}", f"at the optimum{in_unit}", f"lower bound{in_unit}", "change"]
+    head += [*(["largest mount force [N]"] if data.sizes["mount"] else []), "proof"]
+    rows = [_row(data.isel(point=k), columns) for k in range(min(data.sizes["point"], MOST_ROWS))]
+    return [Rows(head, rows, data.sizes["point"])]
+
+
+def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
+    given, best, bound = (float(row[name]) for name in ("objective_given", "objective", "lower_bound"))
+    best = settled(best, given)
+    proof, status = str(row["proof"].item()), str(row["status"].item())
+    decided = proof != "as given"
+    change = percent(best / given - 1.0) if decided and given and best == best else NOTHING
+    cells = [_cell(row[name].item()) for name in columns]
+    cells += [number(given), number(best) if decided else NOTHING, number(bound), change]
+    if row.sizes["mount"]:
+        cells.append(number(float(row["maximum"].max())))
+    cells.append("as given" if not decided else _PROOFS[proof] if status in ("optimal", "feasible") else status)
+    optimum = bool(row["optimum"].item()) if "optimum" in row.coords else False
+    return [f"**{cell}**" for cell in cells] if optimum else cells
+
+
+def _cell(value: Any) -> str:
+    return number(value) if isinstance(value, float) else str(value)
+
+
+def over_sweep(data: xr.Dataset, told_apart: Sequence[str], words: str) -> p.Picture:
+    """One line for every case and all that tells points apart, over the last sweep."""
+    data = readable_metric(data)
+    names = swept_names(data)
+    panel = p.Panel(lines(data, [*told_apart, *names]), swept_axis(data, names[-1]), metric_axis(data))
+    return p.Picture(data.attrs["title"], words, [panel], p.credit(data))
+
+
+def lines(data: xr.Dataset, names: Sequence[str]) -> list[p.Mark]:
+    """The metric over the last of these coordinates, a line for every case and combination of the others."""
+    place, numbers = spread(data, names[-1]), data[names[-1]].dtype.kind in "fi"
+    found: list[p.Mark] = []
+    for label, chosen, colour in groups(data, names[:-1]):
+        # nothing lies between two labels, and dots would hide a line of many points
+        dots = not numbers or chosen.sum() <= MOST_DOTS
+        size, width = (2.5, 1.5) if numbers else (6.0, 0.0)
+        y = data["objective"].values[chosen]
+        found.append(p.Line(place[chosen], y, colour, label, width, marker="o" if dots else "", size=size))
+    return found
+
+
+def spread(data: xr.Dataset, name: str) -> Any:
+    """Numbers along an axis; labels stand side by side."""
+    values = data[name].values
+    labels = list(dict.fromkeys(values.tolist()))
+    return values if values.dtype.kind in "fi" else np.array([labels.index(value) for value in values.tolist()])
+
+
+def swept_axis(data: xr.Dataset, name: str, named: bool = True) -> p.Axis:
+    """The axis of a swept coordinate: logarithmic for values that grow by equal factors."""
+    values, label = data[name].values, with_unit(data[name]) if named else ""
+    if values.dtype.kind not in "fi":
+        return p.Axis(label, ticks=[(float(k), str(text)) for k, text in enumerate(dict.fromkeys(values.tolist()))])
+    each = np.unique(values[np.isfinite(values)])
+    if len(each) < 4 or each[0] <= 0.0 or not np.allclose(np.diff(np.log(each)), np.log(each[1] / each[0]), rtol=1e-6):
+        return p.Axis(label)
+    return p.Axis(label, log=(1.0, 2.0, 5.0) if each[-1] > 20.0 * each[0] else (1.0, 2.0, 3.0, 4.0, 6.0, 8.0))
+
+
+def metric_axis(data: xr.Dataset, *drawn: str) -> p.Axis:
+    """From zero to a little over the largest objective and whatever else is drawn."""
+    unit = data["objective"].attrs["units"]
+    top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", *drawn))
+    return p.Axis(f"{data.attrs['metric']} [{unit}]" if unit else data.attrs["metric"], (0.0, 1.08 * top or 1.0))
+
+
+def groups(data: xr.Dataset, names: Sequence[str]) -> list[tuple[str, Any, p.Colour]]:
+    """Label, points and colour of every line: cases, where there are several, and what else is named."""
+    told = [*(["case"] if len(set(data["case"].values.tolist())) > 1 else []), *names]
+    columns = [data[name].values.tolist() for name in told]
+    keys = list(zip(*columns, strict=True)) if told else [()] * data.sizes["point"]
+    each = list(dict.fromkeys(keys))
+    found = []
+    for k, key in enumerate(each):
+        words = ", ".join(_said(data[name], value) for name, value in zip(told, key, strict=True))
+        chosen = np.array([one == key for one in keys])
+        found.append((words or str(data["case"].values[0]), chosen, p.colour(k, len(each))))
+    return found
+
+
+def _said(values: xr.DataArray, value: Any) -> str:
+    unit = values.attrs.get("units", "")
+    if not isinstance(value, float):
+        return str(value)
+    return f"{values.attrs['long_name']} {value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
+
+def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Picture:
+    """As given in grey beside the optimum in blue; one grey bar where nothing is open, or `once` says so."""
+    data = readable_metric(data)
+    count = data.sizes["point"]
+    alone = data["proof"].values == "as given"
+    single = alone if once is None else np.ones(count, dtype=bool)
+    plain = alone | (np.zeros(count, dtype=bool) if once is None else once)
+    given, best = data["objective_given"].values, data["objective"].values
+    most = max(np.nanmax(given, initial=0.0), np.nanmax(best, initial=0.0))
+    places, width = np.arange(count), 0.5 if single.all() else 0.36
+    whole = places[single]
+    marks = _bars(whole[plain[single]], best[single & plain], width, "before", most)
+    marks += _bars(whole[~plain[single]], best[single & ~plain], width, "after", most)
+    marks += _bars(places[~single] - 0.2, given[~single], 0.36, "before", most)
+    marks += _bars(places[~single] + 0.2, best[~single], 0.36, "after", most)
+    ticks = [(float(k), str(label)) for k, label in enumerate(labels)]
+    panel = p.Panel(
+        marks,
+        p.Axis(ends=(-0.6, count - 0.4), ticks=ticks, small=7.5, grid=False),
+        metric_axis(data, *(() if single.all() else ("objective_given",))),
+    )
+    grey = "no shafts" if once is not None else "as given"
+    legend = [p.Bars(colour="before", label=grey)] if plain.any() or not single.all() else []
+    legend += [p.Bars(label=claimed(data))] if not plain.all() else []
+    widest = max(len(line) for label in labels for line in str(label).split("\n"))
+    size = (max(p.WIDE, count * max(1.15, 0.2 + LETTER * widest)), p.HIGH)
+    return p.Picture(data.attrs["title"], words, [panel], p.credit(data), size=size, legend=legend)
+
+
+def _bars(places: Any, values: Any, width: float, colour: str, most: float) -> list[p.Mark]:
+    """Bars and their values; what rounding leaves of a balanced engine is zero."""
+    there = np.isfinite(values)
+    shown = [figures(settled(value, most)) for value in values[there]]
+    found: list[p.Mark] = [p.Bars(places[there], values[there], width, colour, numbers=shown)] if shown else []
+    missing = "no design"
+    return found + [p.Words(x, 0.02 * most, missing, across="center", along="bottom") for x in places[~there]]
