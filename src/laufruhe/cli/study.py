@@ -30,10 +30,11 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
     kept = folder / NAME
     datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or processors())
     # late: pictures and tables are not needed where the study is refused
+    from laufruhe.plots.picture import save_picture
     from laufruhe.report.study_report import as_json, file_names, write_study
 
     with files.staged(folder, "--out" if out is not None else "results", file_names(study)) as stage:
-        write_study(study, datasets, seconds, stage, shlex.join(["laufruhe", "study", str(path)]), say)
+        write_study(study, datasets, seconds, stage, shlex.join(["laufruhe", "study", str(path)]), say, save_picture)
     kept.unlink(missing_ok=True)
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())
     text = f"{spent}done in {time.perf_counter() - started:.1f} s: {folder / files.REPORT}\n"

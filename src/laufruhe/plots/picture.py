@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -16,7 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.plots import style
-from laufruhe.plots.style import heading, page
+from laufruhe.plots.style import heading, page, save
 from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
@@ -34,6 +35,11 @@ def draw(picture: Picture) -> Figure:
     legend = [_entry(mark) for mark in _named(picture)]
     heading(drawn.figure, picture.title, picture.words, legend, picture.credit)
     return drawn.figure
+
+
+def save_picture(picture: Picture, path: Path) -> None:
+    """Write the picture as a PNG file."""
+    save(draw(picture), path)
 
 
 def hue(colour: Colour) -> str:

@@ -10,6 +10,7 @@ from laufruhe.report import files
 from laufruhe.report.strict_json import strict
 from laufruhe.report.tractor_study import figure_files, write_figures
 from laufruhe.studies.part import Part
+from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.text import Rows, Text
 
@@ -31,6 +32,7 @@ def write_study(
     folder: Path,
     command: str,
     say: Callable[[str], None],
+    draw: Callable[[Picture, Path], None],
 ) -> None:
     """Datasets, pictures and the report into a folder that exists.
 
@@ -38,6 +40,8 @@ def write_study(
     ----------
     seconds
         What each part took.
+    draw
+        Makes a PNG file of a picture.
     """
     lines = [f"# {study.title}", ""]
     lines += [f"Source: {study.source}", ""] if study.source else []
@@ -48,7 +52,7 @@ def write_study(
         lines += write_figures(folder, say)
     for part in study.study.parts:
         say(f"writing {part.name}")
-        lines += _part(part, datasets[part.name], folder)
+        lines += _part(part, datasets[part.name], folder, draw)
     if datasets:
         spent = [f"| {name} | {duration:.1f} |" for name, duration in seconds.items()]
         lines += ["## Where the time went", "", "Seconds on one core.", "", "| part | s |", "| --- | ---: |", *spent,
@@ -56,16 +60,13 @@ def write_study(
     files.write(folder / files.REPORT, "\n".join(lines))
 
 
-def _part(part: Part, data: xr.Dataset, folder: Path) -> list[str]:
-    from laufruhe.plots.picture import draw
-    from laufruhe.plots.style import save
-
+def _part(part: Part, data: xr.Dataset, folder: Path, draw: Callable[[Picture, Path], None]) -> list[str]:
     name, title, source = part.name, data.attrs["title"], data.attrs["source"]
     # a name with a space cannot be marked as a coordinate there
     spaced = {str(coord): str(coord).replace(" ", "_") for coord in data.coords if " " in str(coord)}
     data.rename(spaced).to_netcdf(folder / f"{name}.nc")
     _flat(data).to_csv(folder / f"{name}.csv")
-    save(draw(part.picture(data)), folder / f"{name}.png")
+    draw(part.picture(data), folder / f"{name}.png")
     words = data.attrs["kind"].capitalize() + "." + (f" Source: {source}" if source else "")
     told = [line for text in part.table(data) for line in (*markdown(text), "")]
     return [f"## {title}", "", words, "", *told, f"![{title}]({name}.png)", ""]

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from laufruhe.present.numbers import number as figures
+from laufruhe.present.numbers import percent
 from laufruhe.studies import picture as p
-from laufruhe.studies.text import NOTHING, Rows, Text, figures, number, percent
+from laufruhe.studies.text import NOTHING, Rows, Text, number
 from laufruhe.units import readable
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -27,21 +26,6 @@ Text: TypeAlias = str | Rows
 def number(value: float, digits: int = 5) -> str:
     """A number of a table; a dash where there is none."""
     return NOTHING if value != value else f"{value:.{digits}g}"
-
-
-def figures(value: float) -> str:
-    """Four figures, without an exponent where it can be read without."""
-    return f"{value:.3e}" if value and not 1e-4 <= abs(value) < 9999999.5 else f"{value:.{_decimals(value)}f}"
-
-
-def _decimals(value: float) -> int:
-    size = math.floor(math.log10(abs(float(f"{value:.3e}")))) if value else 3
-    return max(3 - size, 0)
-
-
-def percent(share: float) -> str:
-    """A change as a reader expects it: with its sign."""
-    return NOTHING if share != share else f"{100.0 * share:+.1f} %"
 
 
 def said(found: Sequence[Verdict]) -> list[Text]:

@@ -25,8 +25,8 @@ import numpy as np
 import xarray as xr
 
 from laufruhe.errors import ModelError
+from laufruhe.present.numbers import percent
 from laufruhe.studies.economics import Standing
-from laufruhe.studies.text import percent
 from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 
 Judgement = Literal["negligible", "noticeable", "better", "worth building", "not worth building"]

@@ -16,6 +16,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import nearest
 from laufruhe.files.file_models import Name, Table
 from laufruhe.files.study_parts import CaseTable
+from laufruhe.present.numbers import percent
 from laufruhe.problem.problem import Problem
 from laufruhe.studies import picture as p
 from laufruhe.studies.economics import PLAIN, Build, Claim, Front, FrontPoint, Standing, compared, front
@@ -23,7 +24,7 @@ from laufruhe.studies.equal_power import check_comparable
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.shafts import refuse_open_phasing, shafts_of, with_shafts
-from laufruhe.studies.text import NOTHING, Rows, Text, number, percent, said
+from laufruhe.studies.text import NOTHING, Rows, Text, number, said
 from laufruhe.studies.worth import Judgement, verdicts, worths
 
 if TYPE_CHECKING:

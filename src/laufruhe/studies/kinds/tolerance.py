@@ -13,10 +13,11 @@ from laufruhe.files import fields as f
 from laufruhe.files.file_models import Name, Table
 from laufruhe.files.study_parts import CaseTable
 from laufruhe.physics.modes import GRAVITY
+from laufruhe.present.numbers import percent
 from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.text import Rows, Text, number, percent, said
+from laufruhe.studies.text import Rows, Text, number, said
 from laufruhe.studies.tolerance import CAUSES, Tolerances
 from laufruhe.studies.tolerance_study import Spread, compared, rise_of, spread, verdicts
 
