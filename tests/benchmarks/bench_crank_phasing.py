@@ -30,8 +30,8 @@ from laufruhe.physics.crank_stars import score_stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.report.grids import Grid
-from laufruhe.report.ranking import phasing_grids
+from laufruhe.report.grid import Grid
+from laufruhe.report.sections import stars
 from laufruhe.solvers import solve
 from laufruhe.solvers.mixed_conic import solve_program
 from laufruhe.solvers.star_cuts import owners_of, search_designs, solve_design
@@ -270,7 +270,7 @@ def rankings() -> str:
         parts.append(
             f"`problems/{name}.toml`: {objective.name} {objective.value:.6g} {objective.unit} in {took:.1f} s; {proof}."
         )
-        parts += [grid_text(grid) for grid in phasing_grids(result)]
+        parts += [grid_text(grid) for grid in stars.tables(result)]
     return "\n\n".join(parts) + "\n"
 
 

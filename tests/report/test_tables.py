@@ -11,9 +11,10 @@ import pytest
 
 from cli import scenes
 from laufruhe.present.numbers import aligned, number, trimmed, with_unit
-from laufruhe.report.grids import grids_of
-from laufruhe.report.markdown import as_markdown, escaped
-from laufruhe.report.tables import show
+from laufruhe.report.grid import escaped
+from laufruhe.report.markdown import as_markdown
+from laufruhe.report.screen import show
+from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, headline
 from laufruhe.solvers import Result
 
@@ -59,27 +60,27 @@ def test_a_limit_shows_its_price_in_user_units() -> None:
 def test_the_angle_of_nothing_is_a_dash() -> None:
     result = scenes.solved(scenes.TIGHT)
     size, angle = result.decisions[:2]
-    rows = {row[0]: row for row in grids_of(replace(result, decisions=(replace(size, value=1e-9), angle)))[0].rows}
+    rows = {row[0]: row for row in tables_of(replace(result, decisions=(replace(size, value=1e-9), angle)))[0].rows}
     assert rows["left.angle"][2] == "-"
-    rows = {row[0]: row for row in grids_of(result)[0].rows}
+    rows = {row[0]: row for row in tables_of(result)[0].rows}
     assert rows["left.angle"][2].endswith(" deg")
 
 
 def test_a_bound_is_marked() -> None:
     result = scenes.solved(scenes.PARTS)
-    rows = {row[0]: row for row in grids_of(result)[0].rows}
+    rows = {row[0]: row for row in tables_of(result)[0].rows}
     assert rows["webs.balance_fraction"][4] == "upper"
     assert rows["webs.balance_fraction"][5].endswith(" N")
 
 
 def test_every_operating_point_has_its_mounts() -> None:
-    mounts = next(grid for grid in grids_of(scenes.solved(scenes.TWO_POINTS)) if grid.head[0] == "at")
+    mounts = next(grid for grid in tables_of(scenes.solved(scenes.TWO_POINTS)) if grid.head[0] == "at")
     assert [row[:2] for row in mounts.rows] == [(p, f"mount {k}") for p in ("idle", "rated") for k in (1, 2, 3, 4)]
 
 
 def test_an_evaluated_design_has_no_before_and_after() -> None:
     result = scenes.stated(scenes.GIVEN)
-    heads = {name for grid in grids_of(result) for name in grid.head}
+    heads = {name for grid in tables_of(result) for name in grid.head}
     assert "mean" in heads
     assert not any("before" in name for name in heads)
     assert "as given" in headline(result)

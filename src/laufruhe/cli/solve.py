@@ -118,7 +118,7 @@ def solved(problem: Problem, say: Callable[[str], None]) -> Result:
 def show_result(result: Result, as_text: bool, folder: Path) -> None:
     """Tables on the screen, or JSON there and tables beside it."""
     from laufruhe.report.json_result import as_json
-    from laufruhe.report.tables import show
+    from laufruhe.report.screen import show
 
     if as_text:
         sys.stdout.write(as_json(result))

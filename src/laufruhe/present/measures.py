@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.metrics import CycleMeasures, order_amplitude
-from laufruhe.problem.evaluation import Evaluation, PointLoads, measured
+from laufruhe.physics.metrics import order_amplitude
+from laufruhe.problem.evaluation import Evaluation, PointLoads
 from laufruhe.problem.problem import Limit, Problem
 from laufruhe.solvers.mount_result import mount_limits
 from laufruhe.solvers.ranking import PhasingResult
@@ -19,28 +17,6 @@ Array = NDArray[np.float64]
 
 # An order counts as present from this share of the largest on.
 PRESENT = 1e-3
-
-
-@dataclass(frozen=True)
-class MountMeasures:
-    """One mount at one operating point, as given and as decided."""
-
-    point: str
-    mount: str
-    initial: CycleMeasures
-    final: CycleMeasures
-
-
-def mount_measures(result: Result) -> list[MountMeasures]:
-    """Of every operating point and mount, in the order of the problem."""
-    if not has_mounts(result):
-        return []
-    names = result.initial.mount_names
-    return [
-        MountMeasures(point.name, name, before, after)
-        for k, point in enumerate(result.problem.points)
-        for name, before, after in zip(names, measured(result.initial, k), measured(result.final, k), strict=True)
-    ]
 
 
 def hardest_point(result: Result) -> int:
@@ -80,8 +56,13 @@ def breaks_a_limit(problem: Problem, evaluation: Evaluation) -> bool:
 
 
 def _limits_at(problem: Problem, evaluation: Evaluation) -> tuple[LimitValue, ...]:
-    stated = tuple(_stated(limit, evaluation.value(limit.quantity)) for limit in problem.limits)
-    return (*stated, *mount_limits(problem, evaluation))
+    return (*(_stated(limit, evaluation) for limit in problem.limits), *mount_limits(problem, evaluation))
+
+
+def _stated(limit: Limit, evaluation: Evaluation) -> LimitValue:
+    value = evaluation.value(limit.quantity)
+    active = value >= limit.maximum * (1.0 - 1e-5)
+    return LimitValue(limit.name, value, limit.maximum, limit.quantity.unit, active, 0.0)
 
 
 def is_met(limit: LimitValue) -> bool:
@@ -117,6 +98,6 @@ def load_designs(result: Result) -> list[Evaluation]:
     return [result.initial, result.final] if changed(result) and not result.initial.resonance else [result.final]
 
 
-def _stated(limit: Limit, value: float) -> LimitValue:
-    active = value >= limit.maximum * (1.0 - 1e-5)
-    return LimitValue(limit.name, value, limit.maximum, limit.quantity.unit, active, 0.0)
+def objective_unit(result: Result) -> str:
+    """SI unit of what was minimised; empty where nothing was."""
+    return result.objective.unit if result.objective else ""

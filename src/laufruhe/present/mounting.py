@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import (
-    MOTIONS,
     Modes,
     static_motion,
     torque_roll_axis,
@@ -101,23 +100,3 @@ def main_orders(evaluation: Evaluation, mounting: ElasticMounting) -> tuple[floa
 def critical_speed(frequency: float, order: float) -> float:
     """Crank speed at which an order meets a natural frequency [rad/s]."""
     return math.tau * frequency / order
-
-
-def modes_as_dict(evaluation: Evaluation) -> dict[str, object]:
-    """The `modes` entry of `result.json`."""
-    facts = facts_of(evaluation)
-    return {
-        "frequencies": facts.modes.frequencies.tolist(),
-        "names": list(facts.modes.names),
-        "loss_factors": facts.modes.loss.tolist(),
-        "excited": [bool(j in facts.excited) for j in range(6)],
-        "motions": list(MOTIONS),
-        "energy": facts.modes.energy.T.tolist(),
-        "shapes": facts.modes.shapes.T.tolist(),
-        "main_orders": list(facts.orders),
-        "static_sag": facts.sag,
-        "mount_sag": facts.mount_sag.tolist(),
-        "mean_torque_travel": facts.torque_travel,
-        "torque_roll_axis": facts.torque_roll_axis.tolist(),
-        "torque_roll_coupling": facts.torque_roll_coupling,
-    }

@@ -58,3 +58,12 @@ def figure(value: float, unit: str, digits: int = 4, scale: float = 0.0) -> str:
 def percent(share: float) -> str:
     """A change as a reader expects it: with its sign."""
     return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH
+
+
+def price_of(price: float, unit: str, of: str) -> str:
+    """A shadow price in readable units: N per kg; N alone for a plain number."""
+    if not price:
+        return DASH
+    (name, factor), (of_name, of_factor) = readable(unit), readable(of)
+    units = f"{name} per {of_name}".strip() if of_name else name
+    return f"{number(price * factor / of_factor)} {units}".rstrip()

@@ -7,26 +7,22 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.metrics import CycleMeasures
+from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.shaking_loads import WRENCH
-from laufruhe.present.measures import (
-    PRESENT,
-    is_met,
-    limits_of,
-    mount_orders,
-    shaking_orders,
-)
-from laufruhe.present.mounting import is_elastic, modes_as_dict
-from laufruhe.problem.evaluation import measured
+from laufruhe.present.measures import PRESENT, is_met, limits_of, mount_orders, shaking_orders
+from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.prove.certificate import Proof
-from laufruhe.report.ranking import phasing_record
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
 from laufruhe.solvers.mount_result import objective_of
+from laufruhe.solvers.ranking import RankedStar
 from laufruhe.solvers.result import Result
+
+Record = dict[str, Any]
 
 
 def as_json(result: Result) -> str:
@@ -34,30 +30,33 @@ def as_json(result: Result) -> str:
     return strict(as_dict(result))
 
 
-def as_dict(result: Result) -> dict[str, Any]:
+def as_dict(result: Result) -> Record:
     """The contract as plain Python values."""
-    problem, engine = result.problem, result.final.engine
-    points = [_point(result, k, point) for k, point in enumerate(problem.points)]
+    problem = result.problem
+    points = [
+        {**_of(point, "name speed weight"), "mounts": _mounts(result, k),
+         "shaking": _shaking(result.final.loads[k].wrench)}
+        for k, point in enumerate(problem.points)
+    ]  # fmt: skip
     # one operating point stands at the top already
     own = ("name", "speed", "weight") if len(points) == 1 else ("name", "speed", "weight", "mounts", "shaking")
     return {
         "problem": problem.name,
-        "title": problem.title,
-        "source": problem.source,
-        "assumptions": list(problem.assumptions),
+        **_of(problem, "title source assumptions"),
         "status": str(result.status),
-        "message": result.message,
-        "conflict": list(result.conflict),
+        **_of(result, "message conflict"),
         "objective": _objective(result),
         "certificate": _certificate(result),
-        "decisions": _decisions(result),
+        "decisions": {
+            d.name: _of(d, "value unit lower upper at_bound initial shadow_price") for d in result.decisions
+        },
         "constraints": _constraints(result),
         "mounts": _all_points(result, [point["mounts"] for point in points]),
         "shaking": _largest([point["shaking"] for point in points]),
         "points": [{key: point[key] for key in own} for point in points],
-        **({"modes": modes_as_dict(result.final)} if is_elastic(result) else {}),
-        "firing_intervals": list(engine.firing_intervals),
-        **phasing_record(result),
+        **({"modes": _modes(result.final)} if is_elastic(result) else {}),
+        "firing_intervals": list(result.final.engine.firing_intervals),
+        **_phasing(result),
         "fidelity": {
             # the crank inertia is null where the crank turns evenly
             **asdict(problem.fidelity),
@@ -66,76 +65,48 @@ def as_dict(result: Result) -> dict[str, Any]:
         },
         "timing": dict(result.timing),
         "versions": versions(),
-    }
+    }  # fmt: skip
 
 
-def _objective(result: Result) -> dict[str, Any] | None:
+def _of(thing: object, names: str) -> Record:
+    """Attributes by their names; `key=name` stands under another key, and arrays and tuples become lists."""
+    pairs = (name.partition("=") for name in names.split())
+    return {key: _plain(getattr(thing, name or key)) for key, _, name in pairs}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _objective(result: Result) -> Record | None:
     """Null where nothing is minimised; without a design its value alone is."""
-    o = result.objective
-    if o is not None:
-        return {"name": o.name, "value": o.value, "unit": o.unit, "initial": o.initial, "reduction": o.reduction}
+    if result.objective is not None:
+        return _of(result.objective, "name value unit initial reduction")
     given = objective_of(result.problem, result.initial, result.initial)
-    if given is None:
-        return None
-    return {"name": given.name, "value": None, "unit": given.unit, "initial": given.initial, "reduction": None}
+    return None if given is None else {**_of(given, "name value unit initial"), "value": None, "reduction": None}
 
 
-def _certificate(result: Result) -> dict[str, Any]:
+def _certificate(result: Result) -> Record:
     c = result.certificate
     if c is None:
         return {"kind": str(Proof.NONE), "lower_bound": None, "gap": None, "kkt_residual": None, "method": ""}
-    return {
-        "kind": str(c.kind),
-        "lower_bound": c.lower_bound,
-        "gap": c.gap,
-        "kkt_residual": c.kkt_residual,
-        "method": c.method,
-    }
+    return {"kind": str(c.kind), **_of(c, "lower_bound gap kkt_residual method")}
 
 
-def _decisions(result: Result) -> dict[str, Any]:
-    return {
-        d.name: {
-            "value": d.value,
-            "unit": d.unit,
-            "lower": d.lower,
-            "upper": d.upper,
-            "at_bound": d.at_bound,
-            "initial": d.initial,
-            "shadow_price": d.shadow_price,
-        }
-        for d in result.decisions
-    }
-
-
-def _constraints(result: Result) -> list[dict[str, Any]]:
-    priced = result.certificate is not None
+def _constraints(result: Result) -> list[Record]:
     return [
         {
-            "name": limit.name,
-            "value": limit.value,
-            "limit": limit.limit,
-            "side": limit.side,
-            "unit": limit.unit,
-            "active": limit.active,
+            **_of(limit, "name value limit side unit active"),
             "met": is_met(limit),
-            "shadow_price": limit.shadow_price if priced else None,
+            "shadow_price": None if result.certificate is None else limit.shadow_price,
         }
         for limit in limits_of(result)
     ]
 
 
-def _point(result: Result, k: int, point: OperatingPoint) -> dict[str, Any]:
-    return {
-        "name": point.name,
-        "speed": point.speed,
-        "weight": point.weight,
-        "mounts": _mounts(result, k),
-        "shaking": _shaking(result.final.loads[k].wrench),
-    }
-
-
-def _mounts(result: Result, k: int) -> list[dict[str, Any]]:
+def _mounts(result: Result, k: int) -> list[Record]:
     forces = result.final.loads[k].mount_forces
     if forces is None:
         return []
@@ -145,36 +116,25 @@ def _mounts(result: Result, k: int) -> list[dict[str, Any]]:
     return [
         {
             "name": name,
-            **_measures(after[m]),
-            "orders": [
-                {"order": float(forces.orders[j]), "amplitude": float(amplitudes[j, m])} for j in kept
-            ],
-            "initial": _measures(before[m]),
+            **_of(after[m], "mean max rms"),
+            "orders": [{"order": float(forces.orders[j]), "amplitude": float(amplitudes[j, m])} for j in kept],
+            "initial": _of(before[m], "mean max rms"),
         }
         for m, name in enumerate(result.final.mount_names)
-    ]  # fmt: skip
+    ]
 
 
-def _measures(measures: CycleMeasures) -> dict[str, float]:
-    return {"mean": measures.mean, "max": measures.max, "rms": measures.rms}
-
-
-def _shaking(wrench: Spectrum) -> dict[str, Any]:
+def _shaking(wrench: Spectrum) -> Record:
     """Orders side by side with amplitudes, and with the complex coefficients of the wrench (C8)."""
     force, moment = shaking_orders(wrench)
-    present = (force > PRESENT * force.max(initial=0.0)) | (moment > PRESENT * moment.max(initial=0.0))
-    kept = np.flatnonzero(present)
-    return {
-        "orders": wrench.orders[kept].tolist(),
-        "force": force[kept].tolist(),
-        "moment": moment[kept].tolist(),
-        "components": list(WRENCH),
-        "real": wrench.coefficients[kept].real.tolist(),
-        "imag": wrench.coefficients[kept].imag.tolist(),
-    }
+    kept = np.flatnonzero((force > PRESENT * force.max(initial=0.0)) | (moment > PRESENT * moment.max(initial=0.0)))
+    whole = wrench.coefficients[kept]
+    found = {"orders": wrench.orders[kept], "force": force[kept], "moment": moment[kept], "components": tuple(WRENCH),
+             "real": whole.real, "imag": whole.imag}  # fmt: skip
+    return {key: _plain(value) for key, value in found.items()}
 
 
-def _all_points(result: Result, mounts: list[list[dict[str, Any]]]) -> list[dict[str, Any]]:
+def _all_points(result: Result, mounts: list[list[Record]]) -> list[Record]:
     """Mounts over all operating points: weighted mean and RMS, largest maximum and orders."""
     if len(mounts) == 1:
         return mounts[0]
@@ -188,10 +148,10 @@ def _all_points(result: Result, mounts: list[list[dict[str, Any]]]) -> list[dict
             "initial": _over_points([entry["initial"] for entry in same], share),
         }
         for same in zip(*mounts, strict=True)
-    ]  # fmt: skip
+    ]
 
 
-def _over_points(entries: Any, share: Any) -> dict[str, float]:
+def _over_points(entries: Any, share: NDArray[np.float64]) -> dict[str, float]:
     return {
         "mean": float(share @ [entry["mean"] for entry in entries]),
         "max": max(entry["max"] for entry in entries),
@@ -206,6 +166,37 @@ def _largest_orders(lists: list[list[dict[str, float]]]) -> list[dict[str, float
     return [{"order": order, "amplitude": found[order]} for order in sorted(found)]
 
 
-def _largest(shaking: list[dict[str, Any]]) -> dict[str, Any]:
+def _largest(shaking: list[Record]) -> Record:
     """Shaking loads of the operating point with the largest force or, without any, moment."""
     return max(shaking, key=lambda s: (max(s["force"], default=0.0), max(s["moment"], default=0.0)))
+
+
+def _modes(design: Evaluation) -> Record:
+    facts = facts_of(design)
+    return {
+        **_of(facts.modes, "frequencies names loss_factors=loss"),
+        "excited": [j in facts.excited for j in range(6)],
+        "motions": list(MOTIONS),
+        "energy": facts.modes.energy.T.tolist(),
+        "shapes": facts.modes.shapes.T.tolist(),
+        **_of(facts, "main_orders=orders static_sag=sag mount_sag mean_torque_travel=torque_travel"),
+        **_of(facts, "torque_roll_axis torque_roll_coupling"),
+    }
+
+
+def _phasing(result: Result) -> Record:
+    """`ranking` and `phasing` where stars and firing orders were open."""
+    if result.phasing is None:
+        return {}
+    points = [_of(p, "allowed deviation value lower_bound throws kkt_residual") for p in result.phasing.trade]
+    return {
+        "ranking": [{"rank": k, **_star(star)} for k, star in enumerate(result.phasing.ranking, 1)],
+        "phasing": {**_of(result.phasing, "designs looked_at method even_value"), "trade": points},
+    }
+
+
+def _star(star: RankedStar) -> Record:
+    names = "throws bank_angle split_pin_angle=split_pin shafts objective=value lower_bound proven orders "
+    names += "free_force=forces free_couple=couples even firing_order_count=order_count"
+    orders = [_of(order, "order neighbours longest_gap roll_content intervals") for order in star.firing_orders]
+    return {**_of(star, names), "firing_orders": orders}

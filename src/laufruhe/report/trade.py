@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
-from laufruhe.report.markdown import escaped
+from laufruhe.report.grid import escaped
 from laufruhe.report.strict_json import strict
 from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade
 from laufruhe.studies.trade_optima import is_local

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from laufruhe.report.grid import Grid
-from laufruhe.report.grids import grids_of
+from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, headline
 from laufruhe.solvers.result import Result, Status
 
@@ -29,7 +29,7 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
     console.print(Text(headline(result), style=_COLOURS[result.status]))
     if result.certificate is not None:
         console.print(Text(explained(result), style="dim"))
-    for grid in grids_of(result):
+    for grid in tables_of(result):
         console.print()
         console.print(Text(grid.title, style="bold"))
         console.print(_table(grid))

@@ -1,4 +1,4 @@
-"""Tables of natural modes and of the mounts themselves."""
+"""Natural modes, and the mounts themselves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
 
-def mode_grids(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Grid]:
     """Modes before and after, and the mounts as they are now; none for rigid mounts."""
     if not is_elastic(result):
         return []
@@ -29,15 +29,12 @@ def _modes(facts: MountingFacts, title: str) -> Grid:
         driven = j in facts.excited
         critical = critical_speed(frequency, order) * readable("rad/s")[1] if order and driven else 0.0
         shares = [f"{round(100.0 * share, 1) + 0.0:.1f}" for share in facts.modes.energy[:, j]]
-        rows.append(
-            (name, number(frequency), "yes" if driven else "no", number(critical) if critical else DASH, *shares)
-        )
-    still = sum(j not in facts.excited for j in range(6))
-    note = "Kinetic energy in %; " + (
-        f"{still} of 6 modes are not excited in this scene and not computed." if still else "every mode is excited."
-    )
+        reached = number(critical) if critical else DASH
+        rows.append((name, number(frequency), "yes" if driven else "no", reached, *shares))
+    still = 6 - len(facts.excited)
+    rest = f"{still} of 6 modes are not excited in this scene and not computed" if still else "every mode is excited"
     head = ("mode", "Hz", "excited", f"order {order:g} at rpm" if order else "critical rpm", *MOTIONS)
-    return Grid(title, head, tuple(rows), note=note)
+    return Grid(title, head, tuple(rows), note=f"Kinetic energy in %; {rest}.")
 
 
 def _mounts(result: Result, facts: MountingFacts) -> Grid:

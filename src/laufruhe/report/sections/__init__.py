@@ -1,0 +1,14 @@
+"""Tables of a result: a file each, with `tables`; `SECTIONS` is all that knows of them."""
+
+from __future__ import annotations
+
+from laufruhe.report.grid import Grid
+from laufruhe.report.sections import decisions, limits, modes, mounts, orders, stars
+from laufruhe.solvers.result import Result
+
+SECTIONS = (stars, decisions, limits, mounts, modes, orders)
+
+
+def tables_of(result: Result) -> list[Grid]:
+    """Every table that this result fills, in the order of a report."""
+    return [grid for section in SECTIONS for grid in section.tables(result) if grid.rows]

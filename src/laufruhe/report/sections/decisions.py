@@ -1,0 +1,35 @@
+"""What was open, and what was decided of it."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from laufruhe.present.measures import objective_unit
+from laufruhe.present.numbers import DASH, figure, price_of, trimmed, with_unit
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import DecisionValue, Result
+from laufruhe.units import readable
+
+HEAD = ("open", "as given", "decided", "bounds", "at bound", "shadow price")
+NEXT_TO_NOTHING = 1e-5
+
+
+def tables(result: Result) -> list[Grid]:
+    """A row a decision."""
+    pairs = pairwise([None, *result.decisions])
+    rows = tuple(_row(before, d, objective_unit(result)) for before, d in pairs if d is not None)
+    return [Grid("Decisions", HEAD, rows)]
+
+
+def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str, ...]:
+    name, factor = readable(d.unit)
+    most = max(abs(d.lower), abs(d.upper))
+    bounds = f"{trimmed(d.lower * factor)} to {trimmed(d.upper * factor)} {name}".rstrip()
+    # the angle of a size that is none means nothing
+    size = before if d.name.endswith(".angle") else None
+    given = DASH if size and not size.initial else with_unit(d.initial, d.unit)
+    if size and abs(size.value) <= NEXT_TO_NOTHING * max(abs(size.lower), abs(size.upper)):
+        return d.name, given, DASH, bounds, DASH, DASH
+    upper = abs(d.value - d.upper) <= abs(d.value - d.lower)
+    mark = DASH if not d.at_bound else "upper" if upper else "lower"
+    return d.name, given, figure(d.value, d.unit, scale=most), bounds, mark, price_of(d.shadow_price, unit, d.unit)

@@ -1,0 +1,41 @@
+"""Force of every mount over the cycle, before and after."""
+
+from __future__ import annotations
+
+from laufruhe.physics.metrics import CycleMeasures
+from laufruhe.present.measures import has_mounts, load_designs
+from laufruhe.present.numbers import DASH, number, percent
+from laufruhe.problem.evaluation import measured
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import Result
+
+ONE, TWO = ("mean", "max", "rms"), ("mean before", "mean after", "change", "max before", "max after")
+
+
+def tables(result: Result) -> list[Grid]:
+    """A row a mount, at every operating point."""
+    if not has_mounts(result):
+        return []
+    points, designs = result.problem.points, load_designs(result)
+    names = result.initial.mount_names
+    found = [
+        ((point.name, name) if len(points) > 1 else (name,), each)
+        for k, point in enumerate(points)
+        for name, *each in zip(names, *(measured(design, k) for design in designs), strict=True)
+    ]
+    scale = max((each[0].max for _, each in found), default=0.0)
+    rows = tuple((*lead, *_cells(each, scale)) for lead, each in found)
+    at, first = ("", ("at", "mount")) if len(points) > 1 else (f" at {points[0].name}", ("mount",))
+    note = f"The design as given has none: {result.initial.resonance}." if result.initial.resonance else ""
+    head = (*first, *(TWO if len(designs) > 1 else ONE))
+    return [Grid(f"Mount forces{at} [N]", head, rows, note=note, left=len(first))]
+
+
+def _cells(each: list[CycleMeasures], scale: float) -> list[str]:
+    """Of one design, or of two beside each other."""
+    a, b = each[0], each[-1]
+    if len(each) == 1:
+        return [number(value, scale=scale) for value in (b.mean, b.max, b.rms)]
+    change = percent(b.mean / a.mean - 1.0) if a.mean > 1e-9 * scale else DASH
+    means, most = ([number(value, scale=scale) for value in pair] for pair in ((a.mean, b.mean), (a.max, b.max)))
+    return [*means, change, *most]

@@ -1,0 +1,45 @@
+"""Orders that the loads are made of, before and after."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.present.measures import hardest_point, has_mounts, load_designs, mount_orders, padded, shaking_orders
+from laufruhe.present.numbers import aligned
+from laufruhe.problem.evaluation import PointLoads
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import Result
+
+Array = NDArray[np.float64]
+
+SHOWN = 8
+SHARE = 0.005
+
+
+def tables(result: Result) -> list[Grid]:
+    """Orders that make at least a small share of the largest, of the hardest operating point."""
+    k, designs = hardest_point(result), load_designs(result)
+    series = [
+        column for pair in zip(*(_columns(design.loads[k]) for design in designs), strict=True) for column in pair
+    ]
+    length = max(len(column) for column in series)
+    table = np.stack([padded(column, length) for column in series], axis=1)
+    # a quantity has one scale, before and after
+    scale = np.repeat(table.max(axis=0).reshape(-1, len(designs)).max(axis=1), len(designs))
+    weight = (table / np.where(scale > 0.0, scale, 1.0)).max(axis=1)
+    present = np.flatnonzero(weight > SHARE)
+    kept = sorted(sorted(present, key=lambda j: -weight[j])[:SHOWN])
+    base = float(result.initial.loads[k].wrench.base)
+    cells = ([aligned(value, top) for value, top in zip(table[j], scale, strict=True)] for j in kept)
+    rows = tuple((f"{j * base:g}", *row) for j, row in zip(kept, cells, strict=True))
+    names = ("mount force [N]", "shaking force [N]", "moment [N m]")[0 if has_mounts(result) else 1 :]
+    head = ("order", *(f"{name}{side}" for name in names for side in (("",), (" before", " after"))[len(designs) - 1]))
+    note = f"Amplitudes; the largest {SHOWN} of {len(present)} orders." if len(present) > len(kept) else ""
+    return [Grid(f"Orders at {result.problem.points[k].name}", head, rows, note=note)]
+
+
+def _columns(loads: PointLoads) -> list[Array]:
+    """Amplitudes by order: mount force if there is one, shaking force, moment."""
+    shaking = list(shaking_orders(loads.wrench))
+    return shaking if loads.mount_forces is None else [mount_orders(loads.mount_forces).mean(axis=1), *shaking]

@@ -1,0 +1,89 @@
+"""Ranked stars, their firing orders, and what uneven firing buys."""
+
+from __future__ import annotations
+
+import math
+
+from laufruhe.present.measures import objective_unit, ranking_of
+from laufruhe.present.numbers import DASH, number, percent, trimmed
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.ranking import PhasingResult, RankedStar
+from laufruhe.solvers.result import Result
+from laufruhe.units import readable
+
+ORDERS_SHOWN = 6
+
+
+def tables(result: Result) -> list[Grid]:
+    """Stars, firing orders, and the trade against even firing where there is one."""
+    if result.phasing is None:
+        return []
+    phasing = ranking_of(result)
+    return [_stars(result, phasing), _orders(phasing), *([_trade(result, phasing)] if len(phasing.trade) > 1 else [])]
+
+
+def _degrees(angle: float, digits: int = 4) -> str:
+    return trimmed(math.degrees(angle), digits)
+
+
+def _stars(result: Result, phasing: PhasingResult) -> Grid:
+    unit, factor = readable(objective_unit(result))
+    scale = factor * (result.objective.initial if result.objective else 0.0)
+    built = any(star.shafts for star in phasing.ranking)
+    rows = []
+    for k, star in enumerate(phasing.ranking):
+        pairs = [f"{number(f, 3, 1.0)} / {number(c, 3, 1.0)}" for f, c in zip(star.forces, star.couples, strict=True)]
+        name = f"{k + 1}" + (" proven" if star.proven else "")
+        shafts = (", ".join(star.shafts) or DASH,) if built else ()
+        intervals = _span(star.firing_orders[0].intervals) if star.firing_orders else DASH
+        rows.append((name, _angles(star), *shafts, number(factor * star.value, scale=scale), *pairs, intervals))
+    objective = f"objective [{unit}]" if unit else "objective"
+    orders = (f"order {h}" for h in phasing.ranking[0].orders)
+    head = ("rank", "throws [deg]", *(("shafts",) if built else ()), objective, *orders, "intervals [deg]")
+    note = (
+        "Free force / couple of the star alone by order, in forces of one throw and that times the throw spacing. "
+        f"{phasing.designs} star(s) to choose from; {phasing.method}."
+    )
+    return Grid("Crank stars", head, tuple(rows), left=3 if built else 2, note=note)
+
+
+def _angles(star: RankedStar) -> str:
+    text = " ".join(_degrees(angle, 5) for angle in star.throws)
+    named = (("bank", star.bank_angle), ("split", star.split_pin))
+    extra = ", ".join(f"{name} {_degrees(value)}" for name, value in named if value)
+    return text + (f" ({extra})" if extra else "")
+
+
+def _span(intervals: tuple[float, ...]) -> str:
+    low, high = min(intervals), max(intervals)
+    return _degrees(low) if math.degrees(high - low) < 1e-6 else f"{_degrees(low)} to {_degrees(high)}"
+
+
+def _orders(phasing: PhasingResult) -> Grid:
+    rows = tuple(
+        (f"{k + 1}", "-".join(map(str, order.order)), f"{order.neighbours}", _degrees(order.longest_gap),
+         number(order.roll_content, 3, 1.0), f"{star.order_count}")
+        for k, star in enumerate(phasing.ranking)
+        for order in star.firing_orders[: ORDERS_SHOWN if k == 0 else 1]
+    )  # fmt: skip
+    head = ("star", "firing order", "neighbours", "longest gap [deg]", "roll content", "orders")
+    note = (
+        "Neighbours: firings in succession on one throw or on throws side by side. Longest gap: in which one bank does "
+        "not fire. Roll content: what is left of the largest torque order below the firing order. Orders: how many "
+        "belong to the star."
+    )
+    return Grid("Firing orders", head, rows, left=2, note=note)
+
+
+def _trade(result: Result, phasing: PhasingResult) -> Grid:
+    even = phasing.trade[0].value
+    rows = tuple(
+        (f"{_degrees(p.allowed)} deg", _degrees(p.deviation), number(p.value, scale=even),
+         number(p.lower_bound, scale=even), percent(p.value / even - 1.0).replace("-", "−") if even else DASH,
+         f"{p.kkt_residual:.0e}" if p.kkt_residual else DASH)
+        for p in phasing.trade
+    )  # fmt: skip
+    objective = f"objective [{objective_unit(result)}]"
+    head = ("deviation allowed", "used [deg]", objective, "not under", "change", "KKT residual")
+    note = "Local optima, the best found of every freedom; no design with that freedom goes under the bound."
+    return Grid("Objective against even firing", head, rows, note=note)
