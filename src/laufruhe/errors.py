@@ -13,6 +13,25 @@ class ModelError(LaufruheError, ValueError):
     """A machine that cannot exist or cannot run as described."""
 
 
+class KeyedError(ModelError):
+    """A machine that cannot exist, and the key of [engine] that is to blame.
+
+    Parameters
+    ----------
+    text
+        A rule, and a remedy after '; '.
+    value
+        What stands at the key, as a user would write it.
+    """
+
+    def __init__(self, key: str, text: str, value: str = "") -> None:
+        self.key, self.text, self.value = key, text, value
+        super().__init__(key, text, value)
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.text}"
+
+
 @dataclass(frozen=True)
 class Complaint:
     """One thing wrong with an input, in the order in which a user reads it."""
@@ -30,7 +49,9 @@ class Complaint:
     @classmethod
     def of(cls, error: Exception, where: str, value: str = "", remedy: str = "") -> Complaint:
         """Of an error whose text is a rule, and a remedy after '; '; `remedy` where it names none."""
-        rule, _, own = str(error).partition("; ")
+        if isinstance(error, KeyedError):
+            where, value = f"engine.{error.key}", error.value
+        rule, _, own = (error.text if isinstance(error, KeyedError) else str(error)).partition("; ")
         return cls(where, value, rule, own or remedy)
 
 

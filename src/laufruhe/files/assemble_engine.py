@@ -9,6 +9,7 @@ from typing import Any
 
 from laufruhe import units
 from laufruhe.files.complaints import Refused, blamed_on, nearest
+from laufruhe.files.fields import Open
 from laufruhe.files.file_models import (
     EngineTable,
     OperatingPointTable,
@@ -21,25 +22,12 @@ from laufruhe.files.file_models import (
 from laufruhe.files.read_trace import trace_of
 from laufruhe.machine import CRANKSHAFT, Cycle, OperatingPoint, PressureTrace, Rod, Shaft, SliderCrank
 from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
-from laufruhe.machine.layouts import Layout, Mechanism, Throw, boxer, build, even_throws, facing_pistons, inline, vee
+from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, Mechanism, Throw, even_throws
 from laufruhe.machine.slider_crank import radius_for_stroke
 from laufruhe.physics.seiliger_cycle import motored_cycle
 
 _CYCLES = {str(cycle): cycle for cycle in Cycle}
-_WITH_THROWS = ("inline", "vee", "boxer", "opposed-piston")
-_ONLY_FOR = {
-    "bank_angle": ("vee",),
-    "split_pin_angle": ("vee",),
-    "bank_stagger": ("vee", "boxer"),
-    "crank_distance": ("opposed-piston",),
-    "crank_ratio": ("opposed-piston",),
-    "crank_lead": ("opposed-piston",),
-    "cylinder_spacing": _WITH_THROWS,
-    "throws": _WITH_THROWS,
-    "firing_order": _WITH_THROWS,
-    "slider_cranks": ("parts",),
-    "shafts": ("parts",),
-}
+_OWNED = tuple(dict.fromkeys(key for k in LAYOUTS.values() for key in (*(own.name for own in k.keys), *k.lists)))
 
 
 def cycle_of(table: EngineTable) -> Cycle:
@@ -49,62 +37,42 @@ def cycle_of(table: EngineTable) -> Cycle:
 
 def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
     """Slider-cranks of [engine], and the throws that they work on."""
-    for key, layouts in _ONLY_FOR.items():
-        if getattr(table, key) and table.layout not in layouts:
+    kind = LAYOUTS[table.layout]
+    for key in _OWNED:
+        if getattr(table, key) and not kind.takes(key):
             raise Refused(f"engine.{key}", None, f"means nothing in layout '{table.layout}'", "leave it out")
     bores = [part.bore for part in table.slider_cranks] or [None]
     if gas and table.bore is None and None in bores:
         raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
-    if table.layout == "parts":
+    if kind.is_free:
         parts = _free_parts(table)
         return parts, tuple(Throw(p.x, p.throw, (k,)) for k, p in enumerate(parts) if p.shaft == CRANKSHAFT)
-    layout = layout_of(table)
+    asked, layout = _asked(table, gas), layout_of(table)
     throws = _throws(table, layout)
     with blamed_on("engine.firing_order" if table.given_order else "engine"):
-        parts, cranks = build(cycle_of(table), layout, _mechanism(table), throws, table.given_order)
-    return (*parts, *_facing(table, parts, gas)) if table.layout == "opposed-piston" else parts, cranks
-
-
-def _facing(table: EngineTable, lower: tuple[SliderCrank, ...], gas: bool) -> tuple[SliderCrank, ...]:
-    """The second pistons of opposed-piston cylinders."""
-    if table.crank_distance is None:
-        raise Refused("engine.crank_distance", None, "is missing", "add the distance between the two cranks")
-    if gas and table.crank_lead:
-        rule = "puts pistons out of step, and gas is known of pistons that mirror each other"
-        raise Refused("engine.crank_lead", units.shown(table.crank_lead, "rad"), rule, "leave it out, or [gas]")
-    if table.offset:
-        rule = "means nothing for pistons on one axis"
-        raise Refused("engine.offset", units.shown(table.offset, "m"), rule, "leave it out")
-    crank = Shaft("second crankshaft", float(table.crank_ratio or -1), 0.0, table.crank_distance)
-    return facing_pistons(lower, crank, table.crank_lead, table.rotating_mass)
+        return kind.parts(asked, layout, throws)
 
 
 def layout_of(table: EngineTable) -> Layout:
     """Places, banks and pins, without masses."""
-    count = _cylinders(table)
-    spacing = table.cylinder_spacing
-    if spacing is None:
-        if count > 1:
-            raise Refused("engine.cylinder_spacing", None, "is missing", 'add it, for example "125 mm"')
-        spacing = 1.0
     with blamed_on("engine.cylinders"):
-        if table.layout in ("inline", "opposed-piston"):
-            return inline(count, spacing)
-        if table.layout == "boxer":
-            if table.bank_stagger is None:
-                raise Refused("engine.bank_stagger", None, "is missing", "add the distance between opposed cylinders")
-            return boxer(count, spacing, table.bank_stagger)
-        if table.given_bank is None:
-            raise Refused("engine.bank_angle", None, "is missing", "add the angle between the banks")
-        return vee(count, spacing, table.given_bank, table.given_split or 0.0, table.bank_stagger or 0.0)
+        return LAYOUTS[table.layout].place(_asked(table))
+
+
+def _asked(table: EngineTable, gas: bool = False) -> Asked:
+    """What [engine] says to its layout."""
+    given = {key.name: table.own(key.name) for key in LAYOUTS[table.layout].keys}
+    own = {name: None if isinstance(value, Open) else value for name, value in given.items()}
+    order = None if table.given_order is None else tuple(table.given_order)
+    return Asked(cycle_of(table), _cylinders(table), _mechanism(table), own, order, gas)
 
 
 def _cylinders(table: EngineTable) -> int:
-    throws_per_cylinder = 2 if table.layout == "vee" else 1
+    per_throw = LAYOUTS[table.layout].cylinders_per_throw
     told = {
         "engine.cylinders": table.cylinders,
         "engine.firing_order": len(table.given_order) if table.given_order is not None else None,
-        "engine.throws": len(table.given_throws) * throws_per_cylinder if table.given_throws is not None else None,
+        "engine.throws": len(table.given_throws) * per_throw if table.given_throws is not None else None,
     }
     given = {key: count for key, count in told.items() if count is not None}
     if not given:
@@ -124,6 +92,8 @@ def _cylinders(table: EngineTable) -> int:
 def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
     if table.given_throws is not None:
         return tuple(table.given_throws)
+    if layout.throws is not None:
+        return layout.throws
     if table.given_order is None:
         if len(layout.throw_positions) == 1:
             return (layout.banks[0] - layout.pin_offsets[0],)

@@ -179,4 +179,4 @@ def blamed_on(where: str) -> Iterator[None]:
         yield
     except ModelError as error:
         found = Complaint.of(error, where, remedy="correct it")
-        raise Refused(where, None, found.rule, found.remedy) from None
+        raise Refused(found.where, found.value or None, found.rule, found.remedy) from None

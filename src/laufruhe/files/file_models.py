@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from laufruhe.files import fields as f
+from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.measure import MASSES, MEASURES, Subject
 from laufruhe.problem.mount_design import MOUNT_NAMES
 
@@ -61,10 +62,10 @@ class SliderCrankTable(Table):
     rod_inertia_deficit: f.Inertia | None = None
 
 
-class EngineTable(Table):
-    """What the engine is."""
+class EngineKeys(Table):
+    """The keys of [engine] that no layout owns."""
 
-    layout: Literal["inline", "vee", "boxer", "opposed-piston", "parts"]
+    layout: str
     cycle: Literal["two-stroke", "four-stroke"]
     cylinders: Count | None = Field(default=None, description="Told by throws or firing order where left out.")
     bore: f.PositiveLength | None = Field(default=None, description="Needed with gas.")
@@ -78,17 +79,6 @@ class EngineTable(Table):
     rotating_mass: f.Mass = Field(default=0.0, description="Per throw, at the crank radius.")
     rod: RodTable | None = None
     rod_inertia_deficit: f.Inertia = Field(default=0.0, description="True inertia less that of the two masses.")
-    cylinder_spacing: f.PositiveLength | None = Field(
-        default=None, description="Between throws; in a boxer, of a bank."
-    )
-    bank_angle: f.OpenAngle | None = Field(default=None, description="Between the banks of a vee.")
-    split_pin_angle: f.OpenAngle | None = Field(default=None, description="By which the right bank's pin leads.")
-    bank_stagger: f.Length | None = None
-    crank_distance: f.PositiveLength | None = Field(default=None, description="Of the two cranks of opposed pistons.")
-    crank_ratio: Literal[1, -1] | None = Field(
-        default=None, description="Of the second crank of opposed pistons; -1, against the first, where left out."
-    )
-    crank_lead: f.Angle = Field(default=0.0, description="By which the second crank of opposed pistons leads.")
     throws: f.Throws | None = Field(default=None, description="At phi = 0; even firing where left out.")
     firing_order: FiringOrder | None = None
     shafts: list[ShaftTable] = Field(default_factory=list)
@@ -107,15 +97,34 @@ class EngineTable(Table):
         """Firing order, where it is a list."""
         return None if self.firing_order is None or self.firing_order == "open" else self.firing_order
 
-    @property
-    def given_bank(self) -> float | None:
-        """Bank angle, where it is a number."""
-        return self.bank_angle if isinstance(self.bank_angle, float) else None
+    def own(self, key: str) -> Any:
+        """What stands at a key that a layout owns."""
+        return getattr(self, key)
 
-    @property
-    def given_split(self) -> float | None:
-        """Angle between split pins, where it is a number."""
-        return self.split_pin_angle if isinstance(self.split_pin_angle, float) else None
+
+_KINDS: dict[str, Any] = {
+    "length": f.Length,
+    "positive length": f.PositiveLength,
+    "angle": f.Angle,
+    "open angle": f.OpenAngle,
+    "sign": Literal[1, -1],
+}
+
+
+def _layout_fields() -> dict[str, Any]:
+    """The keys that layouts own, each as it may be left out or must not be nothing."""
+    names: Any = tuple(LAYOUTS)
+    fields: dict[str, Any] = {"layout": (Literal[names], ...)}
+    for key in (key for kind in LAYOUTS.values() for key in kind.keys):
+        kind = _KINDS[key.kind] if key.default is not None else _KINDS[key.kind] | None
+        fields[key.name] = (kind, Field(default=key.default, description=key.description or None))
+    return fields
+
+
+if TYPE_CHECKING:
+    EngineTable = EngineKeys
+else:
+    EngineTable = create_model("EngineTable", __base__=EngineKeys, __doc__="What the engine is.", **_layout_fields())
 
 
 class IntervalsTable(Table):

@@ -24,7 +24,7 @@ from laufruhe.machine.firing import (
     lap_orders,
     star_throws,
 )
-from laufruhe.machine.layouts import Layout
+from laufruhe.machine.layouts import LAYOUTS, Layout, even_throws
 from laufruhe.problem.phasing import (
     SOONEST,
     Candidate,
@@ -47,8 +47,8 @@ def is_open(file: ProblemFile) -> bool:
     return (
         engine.throws == "open"
         or engine.firing_order == "open"
-        or isinstance(engine.bank_angle, Open)
-        or isinstance(engine.split_pin_angle, Open)
+        or isinstance(engine.own("bank_angle"), Open)
+        or isinstance(engine.own("split_pin_angle"), Open)
         or any(isinstance(angle, Open) for angle in lists)
         or any(shaft.optional for shaft in file.balancer_shafts)
         or file.phasing is not None
@@ -64,19 +64,19 @@ def opened(file: ProblemFile, assemble: Assemble) -> Problem:
         If the open parts contradict the file.
     """
     engine, table = file.engine, file.phasing or PhasingTable()
-    if engine.layout not in ("inline", "vee"):
-        _only_shafts(file)
+    _check_open_keys(engine)
     cycle, count = cycle_of(engine), _cylinders(engine)
+    left = _without_choice(engine, count)
     phasing = Phasing(
         cycle=cycle,
         layout=lambda bank, split: layout_of(_closed_engine(engine, count, bank, split)),
         cylinders=count,
-        throws=_fixed_throws(engine),
+        throws=_fixed_throws(engine) if left is None else left.throws,
         throw_bounds=_throw_bounds(engine),
         firing_order=None if engine.given_order is None else tuple(engine.given_order),
-        bank=_bounds(engine.bank_angle),
-        split=_bounds(engine.split_pin_angle) if engine.layout == "vee" else None,
-        intervals=_intervals(table, cycle, count, _throw_bounds(engine) is not None),
+        bank=_bounds(engine.own("bank_angle")),
+        split=_bounds(engine.own("split_pin_angle")),
+        intervals=_intervals(table, cycle, count, _throw_bounds(engine) is not None, left.spread if left else 0.0),
         realise=lambda candidate: _without(assemble(_with(file, count, candidate)), candidate.left_out),
         steps=table.phases,
         shafts=_shaft_choice(file.balancer_shafts, table),
@@ -101,30 +101,36 @@ def _check_speed(problem: Problem, phasing: Phasing) -> None:
         )  # fmt: skip
 
 
-def _only_shafts(file: ProblemFile) -> None:
-    engine = file.engine
+def _check_open_keys(engine: EngineTable) -> None:
+    """Whether the layout lets open what is open."""
+    kind = LAYOUTS[engine.layout]
     for key in ("throws", "firing_order", "bank_angle", "split_pin_angle"):
-        value = getattr(engine, key)
-        if (
-            value == "open"
-            or isinstance(value, Open)
-            or (isinstance(value, list) and any(isinstance(angle, Open) for angle in value))
-        ):
-            raise Refused(
-                f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", "use layout inline or vee"
-            )
+        value = engine.own(key)
+        values = value if isinstance(value, list) else [value]
+        if key not in kind.openable and any(part == "open" or isinstance(part, Open) for part in values):
+            others = " or ".join(name for name, other in LAYOUTS.items() if key in other.openable)
+            raise Refused(f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", f"use layout {others}")
 
 
 def _cylinders(engine: EngineTable) -> int:
+    kind = LAYOUTS[engine.layout]
     if engine.cylinders is not None:
         return engine.cylinders
     if engine.given_order is not None:
         return len(engine.given_order)
     if isinstance(engine.throws, list):
-        return len(engine.throws) * (2 if engine.layout == "vee" else 1)
-    if engine.layout == "parts":
+        return len(engine.throws) * kind.cylinders_per_throw
+    if kind.is_free:
         return len(engine.slider_cranks)
     raise Refused("engine.cylinders", None, "is missing, and open throws do not tell it", "add it")
+
+
+def _without_choice(engine: EngineTable, count: int) -> Layout | None:
+    """The layout, if it leaves its throws no choice."""
+    kind = LAYOUTS[engine.layout]
+    if kind.is_free or kind.takes("throws"):
+        return None
+    return layout_of(_closed_engine(engine, count, None, None))
 
 
 def _fixed_throws(engine: EngineTable) -> tuple[float, ...] | None:
@@ -144,12 +150,12 @@ def _bounds(value: float | Open | None) -> tuple[float, float] | None:
     return (value.lower, value.upper) if isinstance(value, Open) else (value, value)
 
 
-def _intervals(table: PhasingTable, cycle: Cycle, count: int, bounded: bool) -> Intervals:
+def _intervals(table: PhasingTable, cycle: Cycle, count: int, bounded: bool, spread: float) -> Intervals:
     even = cycle.angle / count
     given = table.intervals
     if given is None:
         # throws with bounds of their own need no others
-        return Intervals(0.0, cycle.angle) if bounded else Intervals(even, even)
+        return Intervals(0.0, cycle.angle) if bounded else Intervals(even - spread, even + spread)
     low = given.min if given.min is not None else 0.0
     high = given.max if given.max is not None else cycle.angle
     if given.min is None and given.max is None and given.largest_deviation is None:
@@ -198,15 +204,18 @@ def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> 
 
 def _check(phasing: Phasing, engine: EngineTable) -> None:
     """What no solver needs to be asked: keys that do not go together."""
-    if engine.layout == "vee" and engine.bank_angle is None:
-        raise Refused("engine.bank_angle", None, "is missing", "add the angle between the banks, or its bounds")
-    count = phasing.cylinders
-    if not phasing.continuous and isinstance(engine.bank_angle, Open) and isinstance(engine.split_pin_angle, Open):
+    kind, count = LAYOUTS[engine.layout], phasing.cylinders
+    for key in kind.keys:
+        if key.remedy and engine.own(key.name) is None:
+            raise Refused(f"engine.{key.name}", None, "is missing", key.remedy)
+    both = all(isinstance(engine.own(key), Open) for key in ("bank_angle", "split_pin_angle"))
+    if not phasing.continuous and both:
         rule = "is open beside bank_angle, and even firing binds only their sum"
         raise Refused("engine.split_pin_angle", None, rule, "fix one of the two, or let the firing be uneven")
-    if engine.layout == "vee" and count % 2:
-        raise Refused("engine.cylinders", count, "is odd in a vee", "give an even number")
-    throws = count // 2 if engine.layout == "vee" else count
+    throws, rest = divmod(count, kind.cylinders_per_throw)
+    if rest:
+        rule = f"is no multiple of the {kind.cylinders_per_throw} cylinders that share a throw"
+        raise Refused("engine.cylinders", count, rule, "give one that is")
     if isinstance(engine.throws, list) and len(engine.throws) != throws:
         raise Refused("engine.throws", None, f"has {len(engine.throws)} of {throws} throws", "let them agree")
     if phasing.firing_order is not None and sorted(phasing.firing_order) != list(range(1, count + 1)):
@@ -268,8 +277,6 @@ def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> t
 
 
 def _of_order(phasing: Phasing, layout: Layout) -> tuple[float, ...]:
-    from laufruhe.machine.layouts import even_throws
-
     return even_throws(phasing.cycle, layout, phasing.firing_order or ())
 
 
@@ -285,10 +292,12 @@ def _closed_engine(engine: EngineTable, count: int, bank: float | None, split: f
 def _with(file: ProblemFile, count: int, candidate: Candidate) -> ProblemFile:
     """The file with a candidate's numbers in place of what is open."""
     engine = file.engine
-    if engine.layout in ("inline", "vee"):
+    kind = LAYOUTS[engine.layout]
+    if kind.openable:
         engine = _closed_engine(engine, count, candidate.bank_angle, candidate.split_pin)
         order = None if candidate.firing_order is None else list(candidate.firing_order)
-        engine = engine.model_copy(update={"throws": list(candidate.throws), "firing_order": order})
+        throws = list(candidate.throws) if kind.takes("throws") else None
+        engine = engine.model_copy(update={"throws": throws, "firing_order": order})
     update: dict[str, object] = {"engine": engine}
     if candidate.without_gas:
         points = [point.model_copy(update={"gas": False}) for point in file.operating_points]

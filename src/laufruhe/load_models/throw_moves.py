@@ -99,7 +99,7 @@ class ThrowMoves:
         moments = []
         for turn, number in zip(firing_turns(self.layout, start.throws, order), order, strict=True):
             k = number - 1
-            side = 0.5 if 2 * k < len(pins) else -0.5
+            side = self.layout.side(k)
             moved = start.throws[pins[k]] - throws[pins[k]]
             if bank is not None and start.bank_angle is not None:
                 moved = moved + side * (bank - start.bank_angle)

@@ -1,17 +1,15 @@
-"""Engine layouts: lists of slider-cranks built from what engineers say of them.
-
-Cylinders are counted from the front (C3). In a vee and a boxer the left bank, leaning
-to +y, has numbers 1 to n/2 and the right bank the rest.
-"""
+"""What every layout is made of: places of cylinders and throws, and the slider-cranks built from them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any, ClassVar
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
@@ -97,6 +95,13 @@ class Layout:
         Angle of a cylinder's own pin from its throw [rad], for split pins.
     throw_positions
         Place along x of every throw [m].
+    sides
+        Share of the angle between the banks at which every cylinder leans; its pin is offset by as much of the
+        split pins' angle the other way. Empty where no bank is.
+    late
+        Crank angle from alpha = 0 to the dead centre that every cylinder fires at [rad]; empty where there is none.
+    throws
+        Angle of every throw [rad] where the layout leaves no choice.
     """
 
     name: str
@@ -105,14 +110,27 @@ class Layout:
     pins: tuple[int, ...]
     pin_offsets: tuple[float, ...]
     throw_positions: tuple[float, ...]
+    sides: tuple[float, ...] = ()
+    late: tuple[float, ...] = ()
+    throws: tuple[float, ...] | None = None
 
     def own_turn(self, k: int) -> Turn:
-        """Dead centre of cylinder k, were its throw at zero, as a part of a turn (C5)."""
+        """Crank angle at which alpha of cylinder k is 0, were its throw at zero, as a part of a turn (C5)."""
         return as_turn(self.banks[k]) - as_turn(self.pin_offsets[k])
 
     def dead_centre(self, throws: Sequence[float], k: int) -> Turn:
-        """Crank angle of cylinder k's dead centre as a part of a turn: alpha = 0 (C5)."""
-        return self.own_turn(k) - as_turn(throws[self.pins[k]])
+        """Crank angle of cylinder k's dead centre as a part of a turn (C5)."""
+        late = as_turn(self.late[k]) if self.late else 0
+        return self.own_turn(k) - as_turn(throws[self.pins[k]]) + late
+
+    @property
+    def spread(self) -> float:
+        """How far firing intervals may be from even for dead centres that are late [rad]."""
+        return max(self.late) - min(self.late) if self.late else 0.0
+
+    def side(self, k: int) -> float:
+        """Share of the angle between the banks at which cylinder k leans, 1/2 to the left, -1/2 to the right."""
+        return self.sides[k] if self.sides else 0.0
 
 
 def stations(count: int, spacing: float) -> tuple[float, ...]:
@@ -120,64 +138,107 @@ def stations(count: int, spacing: float) -> tuple[float, ...]:
     return tuple((count - 1 - 2 * k) * (0.5 * spacing) for k in range(count))
 
 
-def inline(cylinders: int, spacing: float) -> Layout:
-    """One bank, upright."""
-    places = stations(cylinders, spacing)
-    none = (0.0,) * cylinders
-    return Layout("inline", places, none, tuple(range(cylinders)), none, places)
-
-
-def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.0, bank_stagger: float = 0.0) -> Layout:
-    """Two banks on shared or split pins.
-
-    Parameters
-    ----------
-    cylinders
-        Even number.
-    spacing
-        Between throws [m].
-    bank_angle
-        Between the banks [rad].
-    split_pin
-        Angle by which the right bank's pin leads the left bank's on one throw [rad].
-    bank_stagger
-        Distance by which the left bank stands forward of the right one [m].
-    """
-    _even(cylinders, "a vee")
-    throws = cylinders // 2
-    places = stations(throws, spacing)
-    half = 0.5 * bank_stagger
-    return Layout(
-        "vee",
-        tuple(x + half for x in places) + tuple(x - half for x in places),
-        (0.5 * bank_angle,) * throws + (-0.5 * bank_angle,) * throws,
-        (*range(throws), *range(throws)),
-        (-0.5 * split_pin,) * throws + (0.5 * split_pin,) * throws,
-        places,
-    )
-
-
-def boxer(cylinders: int, spacing: float, bank_stagger: float) -> Layout:
-    """Banks at 180 degrees, every cylinder on a throw of its own, opposed pistons in step.
-
-    Parameters
-    ----------
-    spacing
-        Between neighbours of one bank [m].
-    bank_stagger
-        Distance by which a left cylinder stands forward of its opposite [m].
-    """
-    _even(cylinders, "a boxer")
-    count, half, quarter = cylinders // 2, 0.5 * bank_stagger, 0.5 * math.pi
-    centres = stations(count, spacing)
-    places = tuple(x + half for x in centres) + tuple(x - half for x in centres)
-    banks = (quarter,) * count + (-quarter,) * count
-    return Layout("boxer", places, banks, tuple(range(cylinders)), (0.0,) * cylinders, places)
-
-
-def _even(cylinders: int, what: str) -> None:
+def check_even(cylinders: int, what: str) -> None:
+    """Two banks share the cylinders."""
     if cylinders < 2 or cylinders % 2:
         raise ModelError(f"{what} needs an even number of cylinders, got {cylinders}")
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of [engine] that a layout takes.
+
+    Attributes
+    ----------
+    kind
+        "length", "positive length", "angle", "open angle", "angles", "count", "sign", "mass" or "rod".
+    default
+        Where it is left out.
+    remedy
+        What to do where it is left out, if it must not be.
+    """
+
+    name: str
+    kind: str
+    description: str = ""
+    default: Any = None
+    remedy: str = ""
+
+
+SPACING = Key("cylinder_spacing", "positive length", "Between throws; in a boxer, of a bank.")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is said of an engine.
+
+    Attributes
+    ----------
+    own
+        The layout's own keys in SI, None where left out or open.
+    gas
+        Whether gas acts on the pistons.
+    """
+
+    cycle: Cycle
+    cylinders: int
+    mechanism: Mechanism
+    own: Mapping[str, Any]
+    firing_order: tuple[int, ...] | None = None
+    gas: bool = False
+
+    @property
+    def spacing(self) -> float:
+        """Between cylinders [m]; that of one alone does not matter."""
+        given = self.own["cylinder_spacing"]
+        if given is None and self.cylinders > 1:
+            raise KeyedError("cylinder_spacing", 'is missing; add it, for example "125 mm"')
+        return 1.0 if given is None else float(given)
+
+
+class LayoutKind(ABC):
+    """What a layout takes and builds: a new one is a file of its own and a line in `LAYOUTS`.
+
+    Attributes
+    ----------
+    keys
+        Of [engine], beside those of every layout.
+    lists
+        Of the keys `throws`, `firing_order`, `slider_cranks` and `shafts` those that it takes.
+    openable
+        Keys that may be left open.
+    cylinders_per_throw
+        Cylinders that share a throw.
+    is_free
+        Whether every slider-crank is listed, and nothing is placed.
+    """
+
+    name: ClassVar[str]
+    keys: ClassVar[tuple[Key, ...]] = (SPACING,)
+    lists: ClassVar[tuple[str, ...]] = ("throws", "firing_order")
+    openable: ClassVar[tuple[str, ...]] = ()
+    cylinders_per_throw: ClassVar[int] = 1
+    is_free: ClassVar[bool] = False
+
+    def takes(self, key: str) -> bool:
+        """Whether a key means anything here."""
+        return key in self.lists or any(own.name == key for own in self.keys)
+
+    @abstractmethod
+    def place(self, asked: Asked) -> Layout:
+        """Places, banks and pins.
+
+        Raises
+        ------
+        ModelError
+            A `KeyedError` where one key is to blame.
+        """
+
+    def parts(
+        self, asked: Asked, layout: Layout, throws: Sequence[float]
+    ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
+        """Slider-cranks and the throws that they work on."""
+        return build(asked.cycle, layout, asked.mechanism, throws, asked.firing_order)
 
 
 def firing_angles(
@@ -311,45 +372,6 @@ def build(
         for k in cylinders
     )
     return slider_cranks, _throws_of(layout, mechanism, angles)
-
-
-def facing_pistons(
-    lower: Sequence[SliderCrank], crank: Shaft, lead: float = 0.0, pin_mass: float = 0.0
-) -> tuple[SliderCrank, ...]:
-    """The second pistons of opposed-piston cylinders, upside down on a crank of their own.
-
-    Parameters
-    ----------
-    lower
-        Upright slider-cranks on the crankshaft, one for each cylinder.
-    crank
-        Above them, geared at a ratio of 1 or -1.
-    lead
-        Crank angle by which its pistons come to their dead centre first [rad].
-    pin_mass
-        What turns at its crank pins beside the rods' shares [kg].
-
-    Raises
-    ------
-    ModelError
-        If the crank does not keep step or does not lie above.
-    """
-    if abs(crank.ratio) != 1.0:
-        raise ModelError(f"an opposed-piston engine needs a crank ratio of 1 or -1, got {crank.ratio:g}")
-    if not crank.z > 0.0:
-        raise ModelError(f"the second crank of an opposed-piston engine lies above the first, not at {crank.z:g} m")
-    return tuple(
-        replace(
-            part,
-            name=f"{part.name} upper",
-            bank=math.pi,
-            throw=math.pi + crank.ratio * (part.throw + lead),
-            rotating_mass=part.rotating_mass + pin_mass,
-            firing_angle=part.firing_angle - lead,
-            shaft=crank,
-        )
-        for part in lower
-    )
 
 
 def _throws_of(layout: Layout, mechanism: Mechanism, angles: Sequence[float]) -> tuple[Throw, ...]:

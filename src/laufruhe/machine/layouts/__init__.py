@@ -1,0 +1,53 @@
+"""Engine layouts: lists of slider-cranks built from what engineers say of them.
+
+Cylinders are counted from the front (C3).
+"""
+
+from laufruhe.machine.layouts.base import (
+    Asked,
+    Key,
+    Layout,
+    LayoutKind,
+    Mechanism,
+    Throw,
+    build,
+    even_throws,
+    firing_angles,
+    stations,
+    throw_rotors,
+)
+from laufruhe.machine.layouts.boxer import Boxer, boxer
+from laufruhe.machine.layouts.inline import Inline, inline
+from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_pistons
+from laufruhe.machine.layouts.parts import Parts
+from laufruhe.machine.layouts.vee import Vee, vee
+
+LAYOUTS: dict[str, LayoutKind] = {
+    kind.name: kind
+    for kind in (
+        Inline(),
+        Vee(),
+        Boxer(),
+        OpposedPiston(),
+        Parts(),
+    )
+}
+
+__all__ = [
+    "LAYOUTS",
+    "Asked",
+    "Key",
+    "Layout",
+    "LayoutKind",
+    "Mechanism",
+    "Throw",
+    "boxer",
+    "build",
+    "even_throws",
+    "facing_pistons",
+    "firing_angles",
+    "inline",
+    "stations",
+    "throw_rotors",
+    "vee",
+]

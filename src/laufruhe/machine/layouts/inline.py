@@ -1,0 +1,25 @@
+"""Cylinders in line."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from laufruhe.machine.layouts.base import Asked, Layout, LayoutKind, stations
+
+
+def inline(cylinders: int, spacing: float) -> Layout:
+    """One bank, upright."""
+    places = stations(cylinders, spacing)
+    none = (0.0,) * cylinders
+    return Layout("inline", places, none, tuple(range(cylinders)), none, places)
+
+
+class Inline(LayoutKind):
+    """One bank, a throw for every cylinder."""
+
+    name = "inline"
+    openable: ClassVar[tuple[str, ...]] = ("throws", "firing_order")
+
+    def place(self, asked: Asked) -> Layout:
+        """One bank, upright."""
+        return inline(asked.cylinders, asked.spacing)

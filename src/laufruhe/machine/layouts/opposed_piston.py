@@ -1,0 +1,83 @@
+"""Two pistons in each cylinder, on two cranks geared to each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from laufruhe import units
+from laufruhe.errors import KeyedError, ModelError
+from laufruhe.machine.layouts.base import SPACING, Asked, Key, Layout, Throw
+from laufruhe.machine.layouts.inline import Inline
+from laufruhe.machine.rotor import Shaft
+from laufruhe.machine.slider_crank import SliderCrank
+
+
+def facing_pistons(
+    lower: Sequence[SliderCrank], crank: Shaft, lead: float = 0.0, pin_mass: float = 0.0
+) -> tuple[SliderCrank, ...]:
+    """The second pistons of opposed-piston cylinders, upside down on a crank of their own.
+
+    Parameters
+    ----------
+    lower
+        Upright slider-cranks on the crankshaft, one for each cylinder.
+    crank
+        Above them, geared at a ratio of 1 or -1.
+    lead
+        Crank angle by which its pistons come to their dead centre first [rad].
+    pin_mass
+        What turns at its crank pins beside the rods' shares [kg].
+
+    Raises
+    ------
+    ModelError
+        If the crank does not keep step or does not lie above.
+    """
+    if abs(crank.ratio) != 1.0:
+        raise ModelError(f"an opposed-piston engine needs a crank ratio of 1 or -1, got {crank.ratio:g}")
+    if not crank.z > 0.0:
+        raise ModelError(f"the second crank of an opposed-piston engine lies above the first, not at {crank.z:g} m")
+    return tuple(
+        replace(
+            part,
+            name=f"{part.name} upper",
+            bank=math.pi,
+            throw=math.pi + crank.ratio * (part.throw + lead),
+            rotating_mass=part.rotating_mass + pin_mass,
+            firing_angle=part.firing_angle - lead,
+            shaft=crank,
+        )
+        for part in lower
+    )
+
+
+class OpposedPiston(Inline):
+    """In line, with a second crank above."""
+
+    name = "opposed-piston"
+    keys = (
+        SPACING,
+        Key("crank_distance", "positive length", "Of the two cranks of opposed pistons."),
+        Key("crank_ratio", "sign", "Of the second crank of opposed pistons; -1, against the first, where left out."),
+        Key("crank_lead", "angle", "By which the second crank of opposed pistons leads.", 0.0),
+    )
+    openable = ()
+
+    def parts(
+        self, asked: Asked, layout: Layout, throws: Sequence[float]
+    ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
+        """The lower pistons, then the upper ones, and the throws of the lower crank."""
+        lower, cranks = super().parts(asked, layout, throws)
+        distance, lead = asked.own["crank_distance"], asked.own["crank_lead"]
+        if distance is None:
+            raise KeyedError("crank_distance", "is missing; add the distance between the two cranks")
+        if asked.gas and lead:
+            rule = "puts pistons out of step, and gas is known of pistons that mirror each other"
+            raise KeyedError("crank_lead", f"{rule}; leave it out, or [gas]", units.shown(lead, "rad"))
+        if asked.mechanism.offset:
+            rule = "means nothing for pistons on one axis; leave it out"
+            raise KeyedError("offset", rule, units.shown(asked.mechanism.offset, "m"))
+        crank = Shaft("second crankshaft", float(asked.own["crank_ratio"] or -1), 0.0, distance)
+        return (*lower, *facing_pistons(lower, crank, lead, asked.mechanism.rotating_mass)), cranks

@@ -1,0 +1,65 @@
+"""Two banks that share the throws."""
+
+from __future__ import annotations
+
+from laufruhe.errors import KeyedError
+from laufruhe.machine.layouts.base import SPACING, Asked, Key, Layout, LayoutKind, check_even, stations
+
+STAGGER = Key("bank_stagger", "length")
+
+
+def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.0, bank_stagger: float = 0.0) -> Layout:
+    """Two banks on shared or split pins.
+
+    Parameters
+    ----------
+    cylinders
+        Even number: the left bank, leaning to +y, has numbers 1 to n/2, the right bank the rest.
+    spacing
+        Between throws [m].
+    bank_angle
+        Between the banks [rad].
+    split_pin
+        Angle by which the right bank's pin leads the left bank's on one throw [rad].
+    bank_stagger
+        Distance by which the left bank stands forward of the right one [m].
+    """
+    check_even(cylinders, "a vee")
+    throws = cylinders // 2
+    places = stations(throws, spacing)
+    half = 0.5 * bank_stagger
+    sides = (0.5,) * throws + (-0.5,) * throws
+    return Layout(
+        "vee",
+        tuple(x + half for x in places) + tuple(x - half for x in places),
+        tuple(side * bank_angle for side in sides),
+        (*range(throws), *range(throws)),
+        tuple(-side * split_pin for side in sides),
+        places,
+        sides,
+    )
+
+
+class Vee(LayoutKind):
+    """Two banks, a throw for each pair of cylinders."""
+
+    name = "vee"
+    keys = (
+        SPACING,
+        Key(
+            "bank_angle", "open angle", "Between the banks of a vee.",
+            remedy="add the angle between the banks, or its bounds",
+        ),
+        Key("split_pin_angle", "open angle", "By which the right bank's pin leads."),
+        STAGGER,
+    )  # fmt: skip
+    openable = ("throws", "firing_order", "bank_angle", "split_pin_angle")
+    cylinders_per_throw = 2
+
+    def place(self, asked: Asked) -> Layout:
+        """Two banks on shared or split pins."""
+        own = asked.own
+        if own["bank_angle"] is None:
+            raise KeyedError("bank_angle", "is missing; add the angle between the banks")
+        split, stagger = own["split_pin_angle"] or 0.0, own["bank_stagger"] or 0.0
+        return vee(asked.cylinders, asked.spacing, own["bank_angle"], split, stagger)
