@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import tractor
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
-from laufruhe.physics import slider_crank
+from laufruhe.machine import kinematics as slider_crank
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import gas_torque, shaking_loads
 from laufruhe.physics.uneven_speed import crank_motion

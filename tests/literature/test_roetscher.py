@@ -14,7 +14,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from laufruhe.machine import Cycle, Engine, OperatingPoint, SliderCrank
-from laufruhe.physics import slider_crank
+from laufruhe.machine import kinematics as slider_crank
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 

@@ -14,8 +14,8 @@ import pytest
 from scipy.optimize import brentq
 
 from laufruhe.machine import Cycle, Engine, Rod, SliderCrank
+from laufruhe.machine import kinematics as slider_crank
 from laufruhe.machine.layouts import Mechanism, build, even_throws, inline
-from laufruhe.physics import slider_crank
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import reciprocating_loads, rotating_loads
 

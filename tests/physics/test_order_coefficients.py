@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from laufruhe.errors import ModelError
+from laufruhe.machine import kinematics as slider_crank
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
-from laufruhe.physics import slider_crank
 from laufruhe.physics.order_coefficients import (
     inertia_roll_orders,
     orders_needed,

@@ -14,6 +14,7 @@ from laufruhe.files.file_models import (
     EngineTable,
     OperatingPointTable,
     ProblemFile,
+    RodTable,
     SeiligerTable,
     SliderCrankTable,
     TraceTable,
@@ -63,8 +64,11 @@ def _asked(table: EngineTable, gas: bool = False) -> Asked:
     """What [engine] says to its layout."""
     given = {key.name: table.own(key.name) for key in LAYOUTS[table.layout].keys}
     own = {name: None if isinstance(value, Open) else value for name, value in given.items()}
+    rods = {name: value.model_dump() for name, value in own.items() if isinstance(value, RodTable)}
     order = None if table.given_order is None else tuple(table.given_order)
-    return Asked(cycle_of(table), _cylinders(table), _mechanism(table), own, order, gas)
+    count, mechanism = _cylinders(table), _mechanism(table)
+    rod = _rod(table, mechanism.rod_length)
+    return Asked(cycle_of(table), count, mechanism, own | rods, order, table.reciprocating_mass, rod, gas)
 
 
 def _cylinders(table: EngineTable) -> int:

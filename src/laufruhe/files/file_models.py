@@ -108,6 +108,11 @@ _KINDS: dict[str, Any] = {
     "angle": f.Angle,
     "open angle": f.OpenAngle,
     "sign": Literal[1, -1],
+    "non-negative length": f.NonNegativeLength,
+    "angles": list[f.Angle],
+    "cylinder": CylinderNumber,
+    "mass": f.Mass,
+    "rod": RodTable,
 }
 
 

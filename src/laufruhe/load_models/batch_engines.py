@@ -206,10 +206,10 @@ class EngineFamily:
 def _alike(engine: Engine) -> SliderCrank:
     first = engine.slider_cranks[0]
     for part in engine.slider_cranks:
-        same = (part.crank_radius, part.rod_length, part.reciprocating_mass, part.rotating_mass,
-                part.rod_inertia_deficit, part.shaft) == (first.crank_radius, first.rod_length,
-                first.reciprocating_mass, first.rotating_mass, first.rod_inertia_deficit, first.shaft)  # fmt: skip
-        if not same or part.offset or part.shaft.ratio != 1.0 or part.shaft.y or part.shaft.z:
+        as_first = replace(part, name=first.name, x=first.x, throw=first.throw, bank=first.bank, bore=first.bore,
+                           firing_angle=first.firing_angle)  # fmt: skip
+        plain = type(part) is SliderCrank and not part.offset
+        if not plain or as_first != first or part.shaft.ratio != 1.0 or part.shaft.y or part.shaft.z:
             raise ModelError(f"{part.name}: a family needs cylinders that are alike, without offset, on one crank")
     return first
 

@@ -209,7 +209,7 @@ class UnevenModel:
 
     def _place(self, k: int, part: SliderCrank, at: Symbols) -> tuple[Any, Any]:
         """Angle of a cylinder's own pin, and of its bank."""
-        side = 0.5 if 2 * k < len(self.layout.pins) else -0.5
+        side = self.layout.side(k)
         bank = side * at.bank if at.bank is not None else part.bank
         offset = -side * at.split if at.split is not None else self.layout.pin_offsets[k]
         return at.throws[self.layout.pins[k]] + offset, bank
@@ -221,16 +221,17 @@ class UnevenModel:
 
     def _cylinder(self, k: int, part: SliderCrank, speed: float, at: Symbols) -> list[tuple[float, Any]]:
         angle, bank = self._place(k, part, at)
-        axial, roll = inertia_coefficients(part, speed, self.problem.fidelity)
+        axial, across, roll = inertia_coefficients(part, speed, self.problem.fidelity)
         star = angle - bank
-        size = np.abs(axial).max() + np.abs(roll).max() / part.crank_radius
+        size = np.abs(axial).max() + np.abs(across).max() + np.abs(roll).max() / part.crank_radius
         zero = ca.DM.zeros(1, 2)
         out = []
         for h in range(1, len(axial)):
-            if abs(axial[h]) <= NEGLIGIBLE * size and abs(roll[h]) <= NEGLIGIBLE * size * part.crank_radius:
+            if max(abs(axial[h]), abs(across[h]), abs(roll[h]) / part.crank_radius) <= NEGLIGIBLE * size:
                 continue
-            force, moment = _times(axial[h], h * star), _times(roll[h], h * star)
-            lateral, vertical = force * ca.sin(bank), force * ca.cos(bank)
+            along, side, moment = (_times(series[h], h * star) for series in (axial, across, roll))
+            lateral = along * ca.sin(bank) + side * ca.cos(bank)
+            vertical = along * ca.cos(bank) - side * ca.sin(bank)
             out.append((float(h), ca.vertcat(zero, lateral, vertical, moment, -part.x * vertical, part.x * lateral)))
         if part.rotating_mass > 0.0:
             mass = part.rotating_mass * part.crank_radius

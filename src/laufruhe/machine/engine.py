@@ -118,7 +118,7 @@ class Engine:
             )
 
     def _check_firing(self, part: SliderCrank) -> None:
-        crank_angle = part.shaft.ratio * part.firing_angle + part.throw - part.bank
+        crank_angle = part.shaft.ratio * part.firing_angle + part.throw - part.bank - part.fires_at
         if abs(math.remainder(crank_angle, math.tau)) > 1e-9:
             raise ModelError(
                 f"{part.name} fires at {math.degrees(part.firing_angle):g} deg, "

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, Self
 
 from laufruhe.errors import ModelError
+from laufruhe.machine import kinematics
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
 from laufruhe.numerics.turns import Turn, as_turn, cis
 
@@ -51,8 +54,27 @@ class Rod:
 
 
 @dataclass(frozen=True)
+class Motion:
+    """Where a mechanism's masses are and how they move, by the crank's own angle alpha (C5).
+
+    The plane is turned so that the cylinder axis is real: zeta e^{-i beta} (C4). Momentum of all this is
+    the mechanism's load; the mass at the crank pin is a rotor and left out.
+
+    Attributes
+    ----------
+    points
+        Mass [kg], and its place [m] with first and second derivative. The piston comes first.
+    swings
+        Inertia that point masses leave out [kg m2], with first and second derivative of its angle.
+    """
+
+    points: tuple[tuple[float, tuple[Any, Any, Any]], ...]
+    swings: tuple[tuple[float, tuple[Any, Any]], ...] = ()
+
+
+@dataclass(frozen=True)
 class SliderCrank:
-    """One cylinder's mechanism.
+    """One cylinder's mechanism; any other is a class of its own that says how it moves.
 
     Attributes
     ----------
@@ -122,6 +144,61 @@ class SliderCrank:
     def offset_ratio(self) -> float:
         """epsilon = e / l."""
         return self.offset / self.rod_length
+
+    @property
+    def path(self) -> Hashable:
+        """What the piston's path depends on, besides the angle of the crank."""
+        return self.crank_radius, self.rod_length, self.offset
+
+    @property
+    def fires_at(self) -> float:
+        """Local crank angle of the dead centre that firing is counted from [rad] (C5)."""
+        return 0.0
+
+    @cached_property
+    def dead_centres(self) -> tuple[float, float]:
+        """Local crank angles of the highest and the lowest piston position [rad] (G2).
+
+        Crank and rod are in one line there. With an offset both lie off alpha = 0 and pi.
+        """
+        top = math.asin(self.offset_ratio / (1.0 + self.rod_ratio))
+        return top, math.pi + math.asin(self.offset_ratio / (1.0 - self.rod_ratio))
+
+    def travel(self, lib: Any, alpha: Any) -> Any:
+        """Way of the piston towards the crank from alpha = 0 [m] (K4)."""
+        return self.crank_radius * kinematics.travel(lib, alpha, self.rod_ratio, self.offset_ratio)
+
+    def velocity(self, lib: Any, alpha: Any) -> Any:
+        """Velocity of the piston away from the crank, by the angle of its crank [m] (K5)."""
+        return self.crank_radius * kinematics.piston_velocity(lib, alpha, self.rod_ratio, self.offset_ratio)
+
+    def motion(self, lib: Any, alpha: Any) -> Motion:
+        """Piston, counted from where it stands at alpha = 0, and rod; in the digits of `lib` and `alpha`."""
+        zero = 0.0 * alpha
+        radius, offset = zero + self.crank_radius, zero + self.offset
+        shape = (lib, alpha, radius / self.rod_length, offset / self.rod_length)
+        piston = (
+            1j * offset - radius * kinematics.travel(*shape),
+            radius * kinematics.piston_velocity(*shape),
+            radius * kinematics.piston_acceleration(*shape),
+        )
+        rod = (-kinematics.rod_rate(*shape), -kinematics.rod_acceleration(*shape))
+        return Motion(((self.reciprocating_mass, piston),), ((self.rod_inertia_deficit, rod),))
+
+    def scaled(self, length: float, mass: float) -> Self:
+        """The same mechanism in another size."""
+        return replace(
+            self,
+            x=self.x * length,
+            crank_radius=self.crank_radius * length,
+            rod_length=self.rod_length * length,
+            offset=self.offset * length,
+            bore=None if self.bore is None else self.bore * length,
+            reciprocating_mass=self.reciprocating_mass * mass,
+            rotating_mass=self.rotating_mass * mass,
+            rod_inertia_deficit=self.rod_inertia_deficit * mass * length**2,
+            shaft=replace(self.shaft, y=self.shaft.y * length, z=self.shaft.z * length),
+        )
 
     @cached_property
     def star_turn(self) -> Turn:

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Charge, Cycle, SliderCrank
-from laufruhe.physics import slider_crank
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -30,40 +29,31 @@ _JUMP_WIDTH = 1e-11
 
 def swept_volume(part: SliderCrank, angles: FloatArray) -> FloatArray:
     """Volume swept from the highest piston position, over the displacement (G1); 0 to 1, shape of `angles`."""
-    rod_ratio, offset_ratio = part.rod_ratio, _turned_offset(part)
-    top, _ = dead_centres(part)
-    path = slider_crank.travel(np, angles, rod_ratio, offset_ratio)
-    highest = slider_crank.travel(np, top, rod_ratio, offset_ratio)
-    return np.asarray((path - highest) * (part.crank_radius / part.stroke))
+    highest = part.travel(np, np.asarray(part.dead_centres[0]))
+    return np.asarray((part.travel(np, part.fires_at + _ratio(part) * angles) - highest) / part.stroke)
 
 
 def swept_rate(part: SliderCrank, angles: FloatArray) -> FloatArray:
     """Derivative of `swept_volume` by the crank angle, exact, shape of `angles`."""
-    velocity = slider_crank.piston_velocity(np, angles, part.rod_ratio, _turned_offset(part))
-    return np.asarray(-velocity * (part.crank_radius / part.stroke))
+    ratio = _ratio(part)
+    return np.asarray(-ratio * part.velocity(np, part.fires_at + ratio * angles) / part.stroke)
 
 
 def dead_centres(part: SliderCrank) -> tuple[float, float]:
-    """Crank angles of the highest and the lowest piston position [rad] (G2).
-
-    Crank and rod are in one line there. With an offset both lie off gamma = 0 and pi.
-    """
-    rod_ratio, offset_ratio = part.rod_ratio, _turned_offset(part)
-    return math.asin(offset_ratio / (1.0 + rod_ratio)), math.pi + math.asin(offset_ratio / (1.0 - rod_ratio))
+    """Angles gamma of the highest piston position and of the lowest after it [rad] (G2)."""
+    top, bottom = (_ratio(part) * (alpha - part.fires_at) for alpha in part.dead_centres)
+    return top, bottom % math.tau
 
 
-def _turned_offset(part: SliderCrank) -> float:
-    """Offset ratio as it is met in the direction in which the crank turns.
-
-    alpha = n gamma (C5), and a mechanism seen in a mirror turns the other way.
-    """
+def _ratio(part: SliderCrank) -> float:
+    """Of its crank, 1 or -1: alpha = n gamma from the dead centre that it fires at (C5)."""
     ratio = part.shaft.ratio
     if abs(ratio) != 1.0:
         raise ModelError(
             f"{part.name}: a working cycle on shaft '{part.shaft.name}' with ratio {ratio:g} is not modelled, "
             "the ratio must be 1 or -1; give a pressure trace"
         )
-    return ratio * part.offset_ratio
+    return ratio
 
 
 def indicated_mean_pressure(pressures: FloatArray, part: SliderCrank, cycle: Cycle) -> float:

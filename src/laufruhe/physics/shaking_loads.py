@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -18,9 +19,9 @@ from numpy.typing import NDArray
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum, as_order, spectrum_of
 from laufruhe.numerics.turns import Turn, as_turn, cancelling_sum, cis, star_sum
-from laufruhe.physics import order_coefficients, slider_crank
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import cylinder_pressure
+from laufruhe.physics.mechanism import Direction, Effect, mass_effects, rod_effects
 
 WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
@@ -80,36 +81,13 @@ def _kept(loads: Spectrum, fidelity: Fidelity) -> Spectrum:
 
 
 def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Inertia of the reciprocating masses: F = -m s'' along each axis, and its roll moment (L2, L3)."""
-
-    def force(part: SliderCrank) -> NDArray[np.complex128]:
-        return -_acceleration(part, fidelity)
-
-    def roll(part: SliderCrank) -> NDArray[np.complex128]:
-        return _roll(part, fidelity)
-
-    moving = [part for part in engine.slider_cranks if part.reciprocating_mass > 0.0]
-    forces = _star_loads(
-        engine.cycle, moving, force, lambda p: p.reciprocating_mass * p.crank_radius * _square(p, speed) * _axial(p)
-    )
-    rolls = _star_loads(
-        engine.cycle, moving, roll, lambda p: p.reciprocating_mass * p.crank_radius**2 * _square(p, speed) * _ROLL
-    )
-    return forces + rolls
+    """Inertia of the reciprocating masses: F = -m s'' along each axis, and its roll moment (L2, L3, L7)."""
+    return _star_loads(engine, speed, lambda part: mass_effects(part, fidelity))
 
 
 def rod_inertia_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
     """Roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
-
-    def roll(part: SliderCrank) -> NDArray[np.complex128]:
-        return _rod_roll(part, fidelity)
-
-    swinging = [
-        part
-        for part in engine.slider_cranks
-        if fidelity.rod == "rigid" and part.rod_inertia_deficit != 0.0 and part.rod_ratio > 0.0
-    ]
-    return _star_loads(engine.cycle, swinging, roll, lambda p: p.rod_inertia_deficit * _square(p, speed) * _ROLL)
+    return _star_loads(engine, speed, lambda part: rod_effects(part, fidelity))
 
 
 def rotating_loads(engine: Engine, speed: float) -> Spectrum:
@@ -144,8 +122,8 @@ def unit_star_load(engine: Engine, order: int, coefficient: complex, roll: bool)
     """
     series = np.zeros(order + 1, dtype=complex)
     series[order] = coefficient
-    weight = (lambda _: _ROLL) if roll else _axial
-    return _star_loads(engine.cycle, engine.slider_cranks, lambda _: series, weight)
+    effect = Effect(Direction.ROLL if roll else Direction.AXIAL, 1.0, None, lambda: series)
+    return _star_loads(engine, 1.0, lambda part: (replace(effect, size=1.0 / part.shaft.ratio**2),))
 
 
 def added_rotor_loads(
@@ -174,7 +152,7 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
     # equal mechanisms differ only in when they fire
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
     for part in engine.slider_cranks:
-        alike[part.crank_radius, part.rod_length, part.offset, part.bore, part.shaft.ratio].append(part)
+        alike[part.path, part.bore, part.shaft.ratio].append(part)
     total = Spectrum(engine.cycle.base_order, np.zeros((1, 6), dtype=complex))
     for parts in alike.values():
         torque = gas_coefficients(gas, parts[0], engine.cycle, fidelity)
@@ -201,9 +179,8 @@ def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> 
     Shape (samples,) [N m], at equal steps over the cycle from the firing dead centre.
     """
     pressure = cylinder_pressure(gas, part, cycle, samples) - gas.crankcase_pressure
-    alpha = part.shaft.ratio * cycle.angle * np.arange(samples) / samples
-    velocity = slider_crank.piston_velocity(np, alpha, part.rod_ratio, part.offset_ratio)
-    return np.asarray(-part.shaft.ratio * part.piston_area * part.crank_radius * pressure * velocity)
+    alpha = part.fires_at + part.shaft.ratio * cycle.angle * np.arange(samples) / samples
+    return np.asarray(-part.shaft.ratio * part.piston_area * pressure * part.velocity(np, alpha))
 
 
 _ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
@@ -215,9 +192,11 @@ def plane_wrench(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> NDArray
     return np.array([lateral - lateral, lateral, vertical, roll, -x * vertical, x * lateral])
 
 
-def _axial(part: SliderCrank) -> NDArray[np.float64]:
-    """Wrench of a unit force along the cylinder axis through the crank axis."""
-    axis = cis(as_turn(part.bank))
+def _weight(part: SliderCrank, direction: Direction) -> NDArray[np.float64]:
+    """Wrench of a unit load of a cylinder: a force along its axis or across it, or a roll moment."""
+    if direction is Direction.ROLL:
+        return _ROLL
+    axis = cis(as_turn(part.bank)) * (1j if direction is Direction.TRANSVERSE else 1.0)
     return plane_wrench(axis.imag, axis.real, part.x, part.shaft).real
 
 
@@ -225,72 +204,39 @@ def _square(part: SliderCrank, speed: float) -> float:
     return (part.shaft.ratio * speed) ** 2
 
 
-def _acceleration(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
-    if fidelity.kinematics == "two-order":
-        return np.array([0.0, -1.0, -part.rod_ratio], dtype=complex)
-    return order_coefficients.piston_acceleration_orders(part.rod_ratio, part.offset_ratio, _highest(part, fidelity))
-
-
-def _roll(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
-    if fidelity.kinematics == "two-order":
-        ratio, lam = part.shaft.ratio, part.rod_ratio
-        # (cos a + lam cos 2a)(-n)(sin a + lam/2 sin 2a), to first order in lam
-        return ratio * 1j * np.array([0.0, -lam / 4.0, 0.5, 0.75 * lam])
-    highest = _highest(part, fidelity)
-    return order_coefficients.inertia_roll_orders(part.rod_ratio, part.offset_ratio, part.shaft.ratio, highest)
-
-
-def _highest(part: SliderCrank, fidelity: Fidelity) -> int:
-    """Last order of the local crank angle that is kept: all that matter, or fewer."""
-    needed = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
-    asked = fidelity.local_orders(part.shaft.ratio)
-    return needed if asked is None else min(needed, asked)
-
-
-def _rod_roll(part: SliderCrank, fidelity: Fidelity) -> NDArray[np.complex128]:
-    if fidelity.kinematics == "two-order":
-        return np.array([0.0, -1j * part.rod_ratio])
-    highest = _highest(part, fidelity)
-    return order_coefficients.rod_roll_orders(part.rod_ratio, part.offset_ratio, part.shaft.ratio, highest)
-
-
 def inertia_coefficients(
     part: SliderCrank, speed: float, fidelity: Fidelity = EXACT
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Force along the axis [N] and roll moment [N m] of one cylinder, by order of its own crank angle (L2-L4).
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]:
+    """Force along the axis and across it [N] and roll moment [N m] of one cylinder, by order of its own crank angle.
 
     Returns
     -------
-    Two arrays of one length: the coefficients that `reciprocating_loads` and
-    `rod_inertia_loads` multiply by the phase and place of each cylinder.
+    Three arrays of one length: the coefficients that `reciprocating_loads` and
+    `rod_inertia_loads` multiply by the phase and place of each cylinder (L2-L4, L7).
     """
-    square = _square(part, speed)
-    force = -part.reciprocating_mass * part.crank_radius * square * _acceleration(part, fidelity)
-    roll = part.reciprocating_mass * part.crank_radius**2 * square * _roll(part, fidelity)
-    swinging = fidelity.rod == "rigid" and part.rod_inertia_deficit != 0.0 and part.rod_ratio > 0.0
-    rod = part.rod_inertia_deficit * square * _rod_roll(part, fidelity) if swinging else np.zeros(1, dtype=complex)
-    size = max(len(force), len(roll), len(rod))
-    padded = [np.pad(series, (0, size - len(series))) for series in (force, roll, rod)]
-    return padded[0], padded[1] + padded[2]
+    effects = (*mass_effects(part, fidelity), *rod_effects(part, fidelity))
+    found = [(effect.direction, effect.size * _square(part, speed) * effect.series()) for effect in effects]
+    out = np.zeros((3, max((len(series) for _, series in found), default=1)), dtype=complex)
+    for direction, series in found:
+        out[direction, : len(series)] += series
+    return out[0], out[1], out[2]
 
 
-def _star_loads(
-    cycle: Cycle,
-    parts: Sequence[SliderCrank],
-    coefficients: Callable[[SliderCrank], NDArray[np.complex128]],
-    weight: Callable[[SliderCrank], NDArray[np.float64]],
-) -> Spectrum:
+def _star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
     """(coefficients of one cylinder) x (phase and weight of each), summed over the star (L6)."""
-    alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
-    for part in parts:
-        alike[part.rod_ratio, part.offset_ratio, part.shaft.ratio].append(part)
+    cycle = engine.cycle
+    alike: dict[Hashable, list[tuple[SliderCrank, Effect]]] = defaultdict(list)
+    for part in engine.slider_cranks:
+        for effect in effects(part):
+            alike[effect.direction, effect.shape, part.shaft.ratio].append((part, effect))
     total = Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
     for members in alike.values():
-        series = coefficients(members[0])
-        weights = np.array([weight(part) for part in members])
-        star = star_sum(weights, [part.star_turn for part in members], np.arange(len(series)))
+        first, effect = members[0]
+        series = effect.series()
+        weights = np.array([own.size * _square(part, speed) * _weight(part, own.direction) for part, own in members])
+        star = star_sum(weights, [part.star_turn for part, _ in members], np.arange(len(series)))
         load = series[:, None] * star
-        ratio = members[0].shaft.ratio
+        ratio = first.shaft.ratio
         # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
         total = total + _spread(load if ratio > 0.0 else load.conj(), _index(cycle, abs(ratio)), cycle)
     return total

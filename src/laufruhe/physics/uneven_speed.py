@@ -19,8 +19,8 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.numerics.turns import as_turn, cis
-from laufruhe.physics import slider_crank
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.mechanism import momentum_loads
 from laufruhe.physics.shaking_loads import gas_loads, plane_wrench
 
 Array = NDArray[np.float64]
@@ -155,16 +155,13 @@ def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Arr
     """Inertia reduced to the crank, and its derivative by the crank angle (F3), shape of `phi`."""
     total, slope = np.full(len(phi), float(fidelity.crank_inertia)), np.zeros(len(phi))
     for part in engine.slider_cranks:
-        ratio, alpha = part.shaft.ratio, _alpha(part, phi)
-        shape = (np, alpha, part.rod_ratio, part.offset_ratio)
-        mass = part.reciprocating_mass * (ratio * part.crank_radius) ** 2
-        velocity = slider_crank.piston_velocity(*shape)
-        total += mass * velocity**2
-        slope += 2.0 * ratio * mass * velocity * slider_crank.piston_acceleration(*shape)
-        if fidelity.rod == "rigid":
-            swing, deficit = slider_crank.rod_rate(*shape), part.rod_inertia_deficit * ratio**2
-            total += deficit * swing**2
-            slope += 2.0 * ratio * deficit * swing * slider_crank.rod_acceleration(*shape)
+        ratio, motion = part.shaft.ratio, part.motion(np, _alpha(part, phi))
+        for mass, (_, velocity, acceleration) in motion.points:
+            total += mass * ratio**2 * np.abs(velocity) ** 2
+            slope += 2.0 * mass * ratio**3 * (np.conj(velocity) * acceleration).real
+        for inertia, (rate, swing) in motion.swings if fidelity.rod == "rigid" else ():
+            total += inertia * ratio**2 * rate**2
+            slope += 2.0 * inertia * ratio**3 * rate * swing
     if total.min() <= 0.0:
         raise ModelError("the moving parts have no positive inertia; raise the crank inertia")
     return total, slope
@@ -219,21 +216,12 @@ def _alpha(part: SliderCrank, phi: Array) -> Array:
 
 
 def _slider_loads(part: SliderCrank, motion: CrankMotion, fidelity: Fidelity) -> Array:
-    """Loads of one piston and rod, shape (n, 6): L2-L4 with d2/dt2 in full (F5)."""
-    ratio, alpha = part.shaft.ratio, _alpha(part, motion.angle)
-    shape = (np, alpha, part.rod_ratio, part.offset_ratio)
-    square, turning = (ratio * motion.speed) ** 2, ratio * motion.acceleration
-    velocity = slider_crank.piston_velocity(*shape)
-    acceleration = slider_crank.piston_acceleration(*shape) * square + velocity * turning
-    force = -part.reciprocating_mass * part.crank_radius * acceleration
-    axis = cis(as_turn(part.bank))
-    wrench = plane_wrench(force * axis.imag, force * axis.real, part.x, part.shaft).T
-    arm = ratio * velocity + (part.offset / part.crank_radius)
-    wrench[:, 3] += force * part.crank_radius * arm
-    if fidelity.rod == "rigid" and part.rod_inertia_deficit:
-        rate = slider_crank.rod_rate(*shape)
-        swing = slider_crank.rod_acceleration(*shape) * square + rate * turning
-        wrench[:, 3] -= part.rod_inertia_deficit * swing * (1.0 + ratio * rate)
+    """Loads of one piston and its rods, shape (n, 6): L7 with d2/dt2 in full (F5)."""
+    square, turning = (part.shaft.ratio * motion.speed) ** 2, part.shaft.ratio * motion.acceleration
+    force, roll, rods = momentum_loads(part, part.motion(np, _alpha(part, motion.angle)), square, turning)
+    force = force * cis(as_turn(part.bank))
+    wrench = plane_wrench(force.imag, force.real, part.x, part.shaft).T
+    wrench[:, 3] += roll + rods if fidelity.rod == "rigid" else roll
     return wrench
 
 

@@ -72,21 +72,7 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
     k, m = scale.length, scale.mass
     return replace(
         engine,
-        slider_cranks=tuple(
-            replace(
-                part,
-                x=part.x * k,
-                crank_radius=part.crank_radius * k,
-                rod_length=part.rod_length * k,
-                offset=part.offset * k,
-                bore=None if part.bore is None else part.bore * k,
-                reciprocating_mass=part.reciprocating_mass * m,
-                rotating_mass=part.rotating_mass * m,
-                rod_inertia_deficit=part.rod_inertia_deficit * m * k**2,
-                shaft=replace(part.shaft, y=part.shaft.y * k, z=part.shaft.z * k),
-            )
-            for part in engine.slider_cranks
-        ),
+        slider_cranks=tuple(part.scaled(k, m) for part in engine.slider_cranks),
         rotors=tuple(
             replace(
                 rotor,

@@ -17,8 +17,8 @@ from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import spectrum_of
 from laufruhe.numerics.turns import Turn, as_turn
-from laufruhe.physics import slider_crank
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.mechanism import momentum_loads
 from laufruhe.physics.rigid_body import point_motion
 from laufruhe.physics.shaking_loads import gas_torque, plane_wrench
 from laufruhe.problem.evaluation import evaluate
@@ -118,26 +118,21 @@ def _add(total: Vector, load: Sequence[Any]) -> None:
 
 
 def _cylinder(part: Any, turn: Any, speed: float) -> Vector:
-    """Pistons, rods and the rotating mass of one cylinder (L1-L4)."""
+    """Pistons, rods and the rotating mass of one cylinder (L1-L4, L7)."""
     import mpmath
 
     mpf, ratio = mpmath.mpf, mpmath.mpf(part.shaft.ratio)
     alpha = 2 * mpmath.pi * (ratio * turn + _exact(part.star_turn))
-    radius, square = mpf(part.crank_radius), (ratio * mpf(speed)) ** 2
-    shape = mpf(part.crank_radius) / mpf(part.rod_length), mpf(part.offset) / mpf(part.rod_length)
-    acceleration = slider_crank.piston_acceleration(mpmath, alpha, *shape)
-    force = -mpf(part.reciprocating_mass) * radius * square * acceleration
-    axis = mpmath.expjpi(2 * _exact(as_turn(part.bank)))
-    load = [force * value for value in plane_wrench(axis.imag, axis.real, part.x, part.shaft)]
-    velocity = slider_crank.piston_velocity(mpmath, alpha, *shape)
-    arm = ratio * velocity + mpf(part.offset) / radius
-    load[3] += -mpf(part.reciprocating_mass) * radius**2 * square * acceleration * arm
-    swing = 1 + ratio * slider_crank.rod_rate(mpmath, alpha, *shape)
-    rod = slider_crank.rod_acceleration(mpmath, alpha, *shape)
-    load[3] += -mpf(part.rod_inertia_deficit) * square * rod * swing
+    force, roll, rods = momentum_loads(part, part.motion(mpmath, alpha), (ratio * mpf(speed)) ** 2)
+    force *= mpmath.expjpi(2 * _exact(as_turn(part.bank)))
+    load = list(plane_wrench(force.imag, force.real, part.x, part.shaft))
+    load[3] += roll + rods
     if part.rotating_mass > 0.0:
         pin = Rotor("pin", part.x, 0.0, part.shaft)
-        _add(load, _rotor(pin, mpf(part.rotating_mass) * radius, _exact(as_turn(part.throw)), turn, speed))
+        _add(
+            load,
+            _rotor(pin, mpf(part.rotating_mass) * mpf(part.crank_radius), _exact(as_turn(part.throw)), turn, speed),
+        )
     return load
 
 

@@ -64,7 +64,7 @@ def _unit_forces(engine: Engine, speed: float) -> Array:
     """Lateral and vertical force of one kilogram more on each piston, shape (cylinders, angles, 2)."""
     forces = []
     for part in engine.slider_cranks:
-        alone = replace(engine, slider_cranks=(replace(part, reciprocating_mass=1.0),), rotors=())
+        alone = replace(engine, slider_cranks=(replace(part, reciprocating_mass=1.0, rotating_mass=0.0),), rotors=())
         forces.append(_sampled(reciprocating_loads(alone, speed).sample(ANGLES * engine.cycle.turns)))
     return np.array(forces)
 

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
-from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.machine.slider_crank import Rod, SliderCrank
 from laufruhe.numerics.turns import SAME_TURN, Turn, angle_of, as_turn, cis, within
 
 
@@ -151,7 +151,8 @@ class Key:
     Attributes
     ----------
     kind
-        "length", "positive length", "angle", "open angle", "angles", "count", "sign", "mass" or "rod".
+        "length", "positive length", "non-negative length", "angle", "open angle", "angles", "cylinder", "sign",
+        "mass", or "rod" of a mass, centre of gravity and inertia.
     default
         Where it is left out.
     remedy
@@ -176,6 +177,10 @@ class Asked:
     ----------
     own
         The layout's own keys in SI, None where left out or open.
+    piston_mass
+        Reciprocating mass without the share of `rod` [kg].
+    rod
+        Where it is given as a rigid body.
     gas
         Whether gas acts on the pistons.
     """
@@ -185,6 +190,8 @@ class Asked:
     mechanism: Mechanism
     own: Mapping[str, Any]
     firing_order: tuple[int, ...] | None = None
+    piston_mass: float = 0.0
+    rod: Rod | None = None
     gas: bool = False
 
     @property

@@ -1,0 +1,175 @@
+"""What a mechanism loads its block with, by order of its own crank angle (L2-L4, L7).
+
+Every mechanism says how its masses move (`SliderCrank.motion`). Momentum and angular momentum
+of that motion are its loads, whatever it is; where closed forms are known, as of the plain
+slider-crank, they are taken in place of a transform.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import SliderCrank
+from laufruhe.machine.slider_crank import Motion
+from laufruhe.physics import order_coefficients
+from laufruhe.physics.fidelity import Fidelity
+
+ComplexArray: TypeAlias = NDArray[np.complex128]
+
+_TAIL = 1e-15
+_MOST_STEPS = 1 << 16
+
+
+class Direction(IntEnum):
+    """Of a load in the frame of its cylinder: along the axis, across it towards +i e^{i beta}, about the crank."""
+
+    AXIAL = 0
+    TRANSVERSE = 1
+    ROLL = 2
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One load of a mechanism.
+
+    Attributes
+    ----------
+    size
+        What its series is multiplied with, besides the square of the speed [kg m, kg m2].
+    shape
+        Equal where series are equal.
+    series
+        Coefficients by order of the crank's own angle (C8).
+    """
+
+    direction: Direction
+    size: float
+    shape: Hashable
+    series: Callable[[], ComplexArray]
+
+
+def mass_effects(part: SliderCrank, fidelity: Fidelity) -> tuple[Effect, ...]:
+    """Loads of the point masses (L2, L3, L7)."""
+    masses, _ = CLOSED_FORMS.get(type(part), _of_momentum)(part, fidelity)
+    return tuple(effect for effect in masses if effect.size != 0.0)
+
+
+def rod_effects(part: SliderCrank, fidelity: Fidelity) -> tuple[Effect, ...]:
+    """Roll moment of what point masses leave of the rods' inertia (L4, L7)."""
+    if fidelity.rod != "rigid":
+        return ()
+    _, rods = CLOSED_FORMS.get(type(part), _of_momentum)(part, fidelity)
+    return tuple(effect for effect in rods if effect.size != 0.0)
+
+
+def momentum_loads(part: SliderCrank, motion: Motion, square: Any, turning: Any = 0.0) -> tuple[Any, Any, Any]:
+    """Force on the block in the turned plane, roll moment of its point masses and of its swings (L7).
+
+    Parameters
+    ----------
+    square, turning
+        Square of the speed of its crank [rad2/s2], and acceleration [rad/s2].
+    """
+    ratio = part.shaft.ratio
+    force, roll, rods = 0.0, 0.0, 0.0
+    for mass, (place, velocity, acceleration) in motion.points:
+        pull = mass * (acceleration * square + velocity * turning)
+        force = force - pull
+        roll = roll + (place.conjugate() * pull).imag - ratio * (velocity.conjugate() * pull).real
+    for inertia, (rate, acceleration) in motion.swings:
+        rods = rods + inertia * (acceleration * square + rate * turning) * (1.0 - ratio * rate)
+    return force, roll, rods
+
+
+def _slider_crank(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
+    """Piston and rod by their closed forms (K7-K10)."""
+    radius, ratio = part.crank_radius, part.shaft.ratio
+    shape = part.rod_ratio, part.offset_ratio
+
+    def force() -> ComplexArray:
+        if fidelity.kinematics == "two-order":
+            return np.array([0.0, 1.0, part.rod_ratio], dtype=complex)
+        return -order_coefficients.piston_acceleration_orders(*shape, _highest(part, fidelity))
+
+    def roll() -> ComplexArray:
+        if fidelity.kinematics == "two-order":
+            # (cos a + lam cos 2a)(-n)(sin a + lam/2 sin 2a), to first order in lam
+            return ratio * 1j * np.array([0.0, -part.rod_ratio / 4.0, 0.5, 0.75 * part.rod_ratio])
+        return order_coefficients.inertia_roll_orders(*shape, ratio, _highest(part, fidelity))
+
+    def rod() -> ComplexArray:
+        if fidelity.kinematics == "two-order":
+            return np.array([0.0, -1j * part.rod_ratio])
+        return order_coefficients.rod_roll_orders(*shape, ratio, _highest(part, fidelity))
+
+    mass, deficit = part.reciprocating_mass, part.rod_inertia_deficit if part.rod_ratio > 0.0 else 0.0
+    return (
+        Effect(Direction.AXIAL, mass * radius, shape, force),
+        Effect(Direction.ROLL, mass * radius**2, shape, roll),
+    ), (Effect(Direction.ROLL, deficit, ("rod", shape), rod),)
+
+
+CLOSED_FORMS: dict[type[SliderCrank], Callable[..., tuple[tuple[Effect, ...], tuple[Effect, ...]]]] = {
+    SliderCrank: _slider_crank,
+}
+
+
+def _highest(part: SliderCrank, fidelity: Fidelity) -> int:
+    """Last order of the local crank angle that is kept: all that matter, or fewer."""
+    needed = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
+    asked = fidelity.local_orders(part.shaft.ratio)
+    return needed if asked is None else min(needed, asked)
+
+
+def _of_momentum(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
+    """Any mechanism; of two orders as many of each load as a slider-crank then has."""
+    table = momentum_orders(part)
+    asked = fidelity.local_orders(part.shaft.ratio)
+    shape = part, fidelity.kinematics, asked
+
+    def series(row: int, few: int) -> Callable[[], ComplexArray]:
+        last = few if fidelity.kinematics == "two-order" else len(table[row]) - 1
+        return lambda: table[row, : min(last, last if asked is None else asked) + 1]
+
+    masses = tuple(Effect(direction, 1.0, shape, series(direction, 2 + direction // 2)) for direction in Direction)
+    return masses, (Effect(Direction.ROLL, 1.0, ("rod", shape), series(3, 1)),)
+
+
+@lru_cache(maxsize=1024)
+def momentum_orders(part: SliderCrank) -> ComplexArray:
+    """Loads at unit speed of its crank by a transform of the exact motion, as many orders as matter (L7).
+
+    Returns
+    -------
+    Shape (4, orders): axial and transverse force, roll moment of point masses and of swings.
+
+    Raises
+    ------
+    ModelError
+        If steps that fine do not resolve it: the crank all but locks.
+    """
+    scale = np.array([1.0, 1.0, part.crank_radius, part.crank_radius])[:, None]
+    steps = 64
+    while steps <= _MOST_STEPS:
+        alpha = 2.0 * np.pi * np.arange(steps) / steps
+        force, roll, rods = momentum_loads(part, part.motion(np, alpha), 1.0)
+        rows = np.stack([np.broadcast_to(row, alpha.shape) for row in (np.real(force), np.imag(force), roll, rods)])
+        table = 2.0 * np.fft.rfft(rows)[:, :-1] / steps
+        # a periodic momentum has no mean derivative
+        table[:, 0] = 0.0
+        sizes = np.abs(table / scale).max(axis=0)
+        if sizes[-steps // 8 :].max() <= _TAIL * sizes.max():
+            last = int(np.flatnonzero(sizes > 0.1 * _TAIL * sizes.max()).max(initial=0))
+            kept = np.ascontiguousarray(table[:, : last + 1])
+            kept.setflags(write=False)
+            return kept
+        steps *= 2
+    raise ModelError(f"{part.name}: its motion is too close to locking to be resolved; lengthen the rods")
