@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, OperatingPoint, Role, Rotor, Seiliger, Shaft
 from laufruhe.machine.layouts import Mechanism, build, inline
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.measure import MEAN_MOUNT_FORCE
-from laufruhe.problem.problem import Drive, Limit, Problem, Term, UnbalanceDecision
+from laufruhe.problem.decision import Decision
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Limit, Term
+from laufruhe.problem.problem import Problem
 
 RADIUS, LAMBDA, MASS, SPACING = 0.06, 0.26, 1.25, 0.125
 SPEED = 2500 * math.pi / 30
@@ -41,9 +42,9 @@ def engine(
     return Engine("tractor", cycle, cylinders, tuple(rotors), mounts(len(throws_deg)))
 
 
-def free_unbalance(rotor: str, upper: float = 0.3) -> UnbalanceDecision:
+def free_unbalance(rotor: str, upper: float = 0.3) -> Decision:
     """Size and angle of one rotor open."""
-    return UnbalanceDecision(f"{rotor}.unbalance", "kg m", 0.0, upper, (0.0, math.tau), 0j, (Drive(rotor, 1.0),))
+    return Decision(f"{rotor}.unbalance", "kg m", 0.0, upper, (0.0, math.tau), 0j, (Drive(rotor, 1.0),))
 
 
 def shaft_rotor(name: str, ratio: float, x: float, y: float = 0.0, z: float = 0.0) -> Rotor:

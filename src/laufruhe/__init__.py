@@ -11,6 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Term
+
 if TYPE_CHECKING:
     from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem.problem import Problem
@@ -50,13 +53,12 @@ def evaluate(design: Problem | Engine, points: Sequence[OperatingPoint] = ()) ->
     points
         Of an engine that stands in no problem.
     """
-    from laufruhe.numerics.mixed_norms import Norm
-    from laufruhe.problem.measure import Quantity, Subject
-    from laufruhe.problem.problem import Problem, Term
+    from laufruhe.problem.measure import Measure
+    from laufruhe.problem.problem import Problem
     from laufruhe.solvers import state
 
     if isinstance(design, Problem):
         return state(design)
-    subject = Subject.MOUNT_FORCE if design.mounts else Subject.SHAKING_FORCE
-    wanted = (Term(Quantity(subject, Norm.SUM)),)
+    channel = channels.MOUNT_FORCE if design.mounts else channels.SHAKING_FORCE
+    wanted = (Term(Measure(channel)),)
     return state(Problem(design.name, design.name, design, tuple(points), objective=wanted))

@@ -28,12 +28,12 @@ from laufruhe.load_models.batch import Designs, prepare, random_decisions  # noq
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
 from laufruhe.machine.layouts import Mechanism, boxer, build, inline  # noqa: E402
 from laufruhe.numerics.batch_norms import BatchNorm  # noqa: E402
-from laufruhe.numerics.mixed_norms import Norm  # noqa: E402
+from laufruhe.numerics.norms import (Norm  # noqa: E402)
 from laufruhe.physics.fidelity import Fidelity  # noqa: E402
 from laufruhe.physics.shaking_loads import forget  # noqa: E402
-from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
-from laufruhe.problem.measure import Quantity, Subject  # noqa: E402
-from laufruhe.problem.problem import Problem, Term  # noqa: E402
+from laufruhe.problem.evaluation import (evaluate, objective_value  # noqa: E402)
+from laufruhe.problem.measure import (Measure, Subject  # noqa: E402)
+from laufruhe.problem.problem import (Problem, Term  # noqa: E402)
 
 OUT = PAGES / "fidelity.md"
 DESIGNS = 100_000
@@ -168,7 +168,7 @@ def _scenes() -> list[tuple[str, Problem]]:
 
 
 def _mean() -> Term:
-    return Term(Quantity(Subject.MOUNT_FORCE, Norm.SUM))
+    return Term(Measure(channels.MOUNT_FORCE, NORMS["mean"]))
 
 
 def _mounts(count: int) -> tuple[Mount, ...]:

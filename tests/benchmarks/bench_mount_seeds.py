@@ -22,7 +22,7 @@ def elastic_problems() -> list[Problem]:
     """Ready problems that leave mounts open."""
     # a study file is no problem, and the others are not read for nothing
     files = [p for p in sorted((ROOT / "problems").glob("*.toml")) if 'kind = "elastic"' in p.read_text("utf-8")]
-    return [problem for problem in map(load, files) if problem.mount_design.decisions]
+    return [problem for problem in map(load, files) if problem.mount_decisions]
 
 
 def row_of(problem: Problem) -> str:
@@ -39,7 +39,7 @@ def row_of(problem: Problem) -> str:
         values.append(result.objective.value)
         print(problem.name, seed, values[-1], f"{seconds[-1]:.1f} s", file=sys.stderr, flush=True)
     spread = max(values) / min(values) - 1.0
-    starts = "cone program, no starts" if is_convex(problem) else f"{problem.mount_design.starts}"
+    starts = "cone program, no starts" if is_convex(problem) else f"{problem.search.starts}"
     return (
         f"| `{problem.name}` | {starts} | {min(values):.8g} | {max(values):.8g} | {spread:.0e} | {max(seconds):.1f} |"
     )

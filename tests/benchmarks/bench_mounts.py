@@ -13,7 +13,12 @@ import numpy as np
 from pages import PAGES, ROOT, publish, spent
 from scipy.optimize import minimize
 
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import objective_value
+
 sys.path.insert(0, str(ROOT / "tests"))
+
+from laufruhe.solvers.mount_program import JointProgram
 
 from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint
@@ -21,11 +26,8 @@ from laufruhe.numerics.cores import processors
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.speed_map import speed_map, split_loads
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.mount_design import mounting_in
-from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint
-from laufruhe.solvers.mount_program import JointProgram
 from laufruhe.solvers.mount_starts import start_points
 from laufruhe.solvers.nonlinear import NonlinearProgram, solve_nonlinear
 from mounts.test_moving_block import simulated_forces
@@ -167,9 +169,9 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
         unbalances = [complex(a, b) for a, b in x[count:].reshape(-1, 2)]
         at = evaluate(problem, problem.design(unbalances, x[:count].tolist()), SAMPLES)
         rooms = [-excess(limit, at) for limit in design.limits]
-        rooms += [1.0 - at.value(limit.quantity) / limit.maximum for limit in problem.limits]
+        rooms += [1.0 - at.value(limit.measure) / limit.maximum for limit in problem.limits]
         rooms += [1.0 - abs(u) / d.upper for d, u in zip(problem.decisions, unbalances, strict=True)]
-        return whole_objective(problem, at), np.array(rooms)
+        return objective_value(problem, at), np.array(rooms)
 
     def seen(y: np.ndarray) -> tuple[float, np.ndarray]:
         """One evaluation for objective and limits."""

@@ -20,11 +20,13 @@ from pages import PAGES, ROOT, publish, spent
 
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import forget, shaking_loads
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.problem import Drive, Problem, Term, UnbalanceDecision
+from laufruhe.problem import channels
+from laufruhe.problem.decision import Decision
+from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.problem import Problem
 
 OUT = PAGES / "multibody.md"
 
@@ -74,10 +76,10 @@ class Scene:
         """Exact mount forces at the same angles of the same engine with other counterweights (P1)."""
         weights = tuple(Rotor(name, x, 0j, radius=0.08) for name, x in (("front", 0.2), ("rear", -0.2)))
         decisions = tuple(
-            UnbalanceDecision(w.name, "kg m", 0.0, 0.1, (0.0, math.tau), 0j, (Drive(w.name, 1.0),)) for w in weights
+            Decision(w.name, "kg m", 0.0, 0.1, (0.0, math.tau), 0j, (Drive(w.name, 1.0),)) for w in weights
         )
         engine = replace(self.engine, rotors=(*self.engine.rotors, *weights))
-        objective = (Term(Quantity(Subject.MOUNT_FORCE, Norm.SUM)),)
+        objective = (Term(Measure(channels.MOUNT_FORCE, NORMS["mean"])),)
         model = AffineModel(Problem("bench", "bench", engine, (self.point,), decisions, objective))
         _, norm = model.at(SAMPLES).terms[0]
         return norm.rows

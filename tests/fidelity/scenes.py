@@ -8,11 +8,12 @@ from dataclasses import replace
 
 from laufruhe.machine import Block, Cycle, Engine, GasModel, Mount, OperatingPoint, Rotor, Seiliger, Shaft, Wiebe
 from laufruhe.machine.layouts import Mechanism, build, inline, vee
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.problem import Problem, Term
+from laufruhe.numerics.norms import NORMS
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.problem import Problem
 
-SUBJECTS = (Subject.MOUNT_FORCE, Subject.SHAKING_FORCE, Subject.ROLL_MOMENT, Subject.ROCKING_COUPLE)
+SUBJECTS = (channels.MOUNT_FORCE, channels.SHAKING_FORCE, channels.ROLL_MOMENT, channels.ROCKING_COUPLE)
 
 
 def random_problem(rng: random.Random, gas: bool | None = None) -> Problem:
@@ -43,10 +44,10 @@ def random_problem(rng: random.Random, gas: bool | None = None) -> Problem:
         for k in range(rng.choice([1, 1, 2]))
     )
     subject = rng.choice(SUBJECTS if count > 1 else SUBJECTS[:3])
-    norm = rng.choice([Norm.SUM, Norm.SUM, Norm.RMS, Norm.MAXIMUM])
+    norm = rng.choice([NORMS["mean"], NORMS["mean"], NORMS["rms"], NORMS["maximum"]])
     return Problem(
         "random", "random", Engine("random", cycle, parts, rotors, mounts), points,
-        objective=(Term(Quantity(subject, norm)),),
+        objective=(Term(Measure(subject, norm)),),
     )  # fmt: skip
 
 
@@ -78,7 +79,7 @@ def random_elastic_problem(rng: random.Random, gas: bool | None = None) -> Probl
             for k, mount in enumerate(mounts) for a, b, _ in [mount.position]
         )  # fmt: skip
     elastic = replace(problem, engine=replace(engine, mounts=mounts, block=block))
-    subject = rng.choice([Subject.MOUNT_FORCE, Subject.MOUNT_FORCE, Subject.MOUNT_TRAVEL])
+    subject = rng.choice([channels.MOUNT_FORCE, channels.MOUNT_FORCE, channels.MOUNT_TRAVEL])
     quantity = replace(problem.objective[0].quantity, subject=subject)
     return replace(elastic, objective=(Term(quantity),))
 

@@ -22,9 +22,12 @@ from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import reference
 from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Term
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from problem_files import written
@@ -134,11 +137,9 @@ def test_automatic_finds_what_is_not_there() -> None:
 
 def test_gas_that_the_objective_cannot_see_is_dropped() -> None:
     engine = replace(tractor.engine((0, 180, 180, 0)), mounts=())
-    from laufruhe.numerics.mixed_norms import Norm
-    from laufruhe.problem.measure import Quantity, Subject
-    from laufruhe.problem.problem import Term
+    from laufruhe.problem.measure import Measure
 
-    force = Term(Quantity(Subject.SHAKING_FORCE, Norm.SUM))
+    force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"]))
     choice = choose(tractor.problem(engine, [], tractor.GAS, objective=(force,)), 1e-3)
     assert not choice.fidelity.gas
     assert choice.error_estimate <= 1e-3
@@ -149,11 +150,9 @@ def test_gas_that_the_objective_cannot_see_is_dropped() -> None:
 
 def test_balanced_objective_of_zero() -> None:
     engine = replace(tractor.engine((0, 120, 240, 240, 120, 0)), mounts=())
-    from laufruhe.numerics.mixed_norms import Norm
-    from laufruhe.problem.measure import Quantity, Subject
-    from laufruhe.problem.problem import Term
+    from laufruhe.problem.measure import Measure
 
-    force = Term(Quantity(Subject.SHAKING_FORCE, Norm.SUM, orders=(1.0, 2.0)))
+    force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"], orders=(1.0, 2.0)))
     choice = choose(tractor.problem(engine, [], objective=(force,)), 1e-3)
     assert choice.error_estimate < 1e-9
 

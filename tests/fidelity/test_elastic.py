@@ -23,8 +23,10 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mounting import mounting_of
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.mount_design import NOTHING_ASKED, mounting_in
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from problem_files import written
@@ -278,10 +280,9 @@ def test_a_question_about_modes_needs_no_loads() -> None:
 
 
 def test_a_transmissibility_needs_its_loads() -> None:
-    from laufruhe.problem.mount_design import MountMeasure, MountQuantity
 
     problem = load(PROBLEMS / "powertrain-torque-roll.toml")
-    asked = ((MountQuantity(MountMeasure.TRANSMISSIBILITY), 1.0),)
+    asked = ((Measure(channels.TRANSMISSIBILITY), 1.0),)
     choice = needs(replace(problem, mount_design=replace(problem.mount_design, terms=asked, limits=())))
     kept = " ".join(choice.kept)
     assert "gas" in kept

@@ -27,7 +27,7 @@ from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.mounting import mount_maps
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.speed_map import speed_map, split_loads
-from laufruhe.problem.mount_design import mounting_in
+from laufruhe.problem.channels import mounting_in
 from mounts.files import BLOCK as BLOCK_TABLE
 from mounts.files import ENGINE, MOUNTS, SAG, problem_of
 from mounts.powertrain import BLOCK, powertrain, random_mounting, wrench

@@ -10,8 +10,11 @@ import pytest
 from scipy.optimize import lsq_linear, minimize
 
 from laufruhe.files.reader import load
+from laufruhe.physics import mount_numbers
 from laufruhe.physics.modes import sag_for_critical_speed
-from laufruhe.problem.mount_design import MountMeasure, mounting_in
+from laufruhe.physics.mount_numbers import total_stiffness
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.mount_convex import ConvexDuals, convex_program, dual_bound, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts import solve_mounts
@@ -81,11 +84,9 @@ def test_least_stiff_design_agrees_with_a_search(tmp_path):
     def design(x):
         return mounting_in(problem.design((), [float(v) * 1e5 for v in x]))
 
-    from laufruhe.problem.mount_design import sag_of, total_stiffness
-
     found = minimize(
         lambda x: total_stiffness(design(x).mounts) / 1e6, [5.0, 5.0], method="SLSQP", bounds=[(0.2, 40.0)] * 2,
-        constraints=[{"type": "ineq", "fun": lambda x: (3e-3 - sag_of(design(x))) * 1e3},
+        constraints=[{"type": "ineq", "fun": lambda x: (3e-3 - mount_numbers.sag(design(x))) * 1e3},
                      {"type": "ineq", "fun": lambda x: design(x).modes.frequencies[0] - 4.2}],
         options={"ftol": 1e-13},
     )  # fmt: skip
@@ -135,7 +136,7 @@ def test_what_is_not_convex_is_not_called_so(tmp_path):
     assert not is_convex(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, band))
     moved = MOUNTS.replace('"300 mm", "200 mm"', '{ between = ["250 mm", "300 mm"] }, "200 mm"')
     assert not is_convex(problem_of(tmp_path, ENGINE, BLOCK, moved, SAG))
-    assert problem.mount_design.terms[0][0].measure is MountMeasure.SAG
+    assert problem.mount_terms[0][0].measure is channels.SAG
 
 
 def test_a_solver_that_lies_is_found_out(tmp_path, monkeypatch):

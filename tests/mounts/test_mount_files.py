@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import InputError
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.mount_design import mounting_in
 from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN, SAG, changed, problem_of
 
 RIGID = '[mounts]\npositions = [["1 m", "0.2 m", "0 m"], ["-1 m", "-0.2 m", "0 m"]]\n'
@@ -31,8 +31,8 @@ def test_a_mirrored_mount_is_the_mirror_image_when_turned_and_moved(tmp_path):
                  'turned = [{ between = [0, 80] }, 20, 30]\nstiffness'),
     )  # fmt: skip
     problem = problem_of(tmp_path, ENGINE, BLOCK, text, SAG)
-    values = [d.start for d in problem.mount_design.decisions]
-    values[[d.name for d in problem.mount_design.decisions].index("front left.turned.x")] = 0.7
+    values = [d.start for d in problem.mount_decisions]
+    values[[d.name for d in problem.mount_decisions].index("front left.turned.x")] = 0.7
     left, right = problem.design((), values).mounts[:2]
     mirror = np.diag([1.0, -1.0, 1.0])
     assert right.stiffness_matrix == pytest.approx(mirror @ left.stiffness_matrix @ mirror)

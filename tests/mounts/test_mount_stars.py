@@ -8,14 +8,13 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from laufruhe.solvers.mount_program import JointProgram
 
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.mount_program import JointProgram
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, MOUNTS, SAG, changed, problem_of
 
@@ -127,16 +126,16 @@ def test_no_star_near_an_uneven_one_is_better(uneven):
         own = replace(phasing.realise(replace(candidate, throws=throws)), phasing=None)
         mounts = [
             float(np.clip(values[d.name] * (1 + size * generator.normal()), d.lower, d.upper))
-            for d in own.mount_design.decisions
+            for d in own.mount_decisions
         ]
         fraction = float(np.clip(values["web.balance_fraction"] + size * generator.normal(), 0.0, 1.0))
         near = evaluate(own, own.design([fraction], mounts), 96)
         if not phasing.intervals.holds(near.engine.firing_intervals, 1e-9):
             continue
-        if max(excess(limit, near) for limit in own.mount_design.limits) > 0.0:
+        if max(excess(limit, near) for limit in own.mount_limits) > 0.0:
             continue
         tried += 1
-        assert whole_objective(own, near) > uneven.objective.value * (1 - 1e-5)
+        assert objective_value(own, near) > uneven.objective.value * (1 - 1e-5)
     assert tried > 20
 
 
@@ -159,13 +158,13 @@ def test_the_program_of_moved_throws_says_what_the_exact_model_says(quantity, tm
     generator = np.random.default_rng(5)
     for _ in range(3):
         turns = generator.uniform(-0.07, 0.07, moves.size)
-        mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_design.decisions]
+        mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_decisions]
         x = joint.start(mounts, generator.uniform(0.0, 1.0, 1), turns)
         moved = joint.designed(x)
         given, unbalances = joint.split(x)
         # at as many angles as the program has: 32 a turn
         exact = evaluate(moved, moved.design(unbalances, given), 64)
-        assert float(value(x, 1e-9)) == pytest.approx(whole_objective(moved, exact), rel=1e-3)
+        assert float(value(x, 1e-9)) == pytest.approx(objective_value(moved, exact), rel=1e-3)
         rows, _ = moves.firing(turns)
         assert sorted(rows) == pytest.approx(sorted(exact.engine.firing_intervals), abs=1e-9)
 
@@ -185,13 +184,13 @@ def test_the_program_of_moved_throws_has_the_gas_of_the_exact_model(quantity, tm
     generator = np.random.default_rng(6)
     for _ in range(2):
         turns = generator.uniform(-0.07, 0.07, moves.size)
-        mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_design.decisions]
+        mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_decisions]
         x = joint.start(mounts, np.array([0.5]), turns)
         moved = joint.designed(x)
         given, unbalances = joint.split(x)
         exact = evaluate(moved, moved.design(unbalances, given))
         assert max(abs(loads.wrench.at(0.5)[3]) for loads in exact.loads) > 0.5
-        assert float(value(x, 1e-9)) == pytest.approx(whole_objective(moved, exact), rel=2e-3)
+        assert float(value(x, 1e-9)) == pytest.approx(objective_value(moved, exact), rel=2e-3)
 
 
 def test_throws_between_bounds_of_their_own_are_decided_with_the_mounts(tmp_path):

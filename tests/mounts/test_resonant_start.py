@@ -12,9 +12,8 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.physics.elastic_mounts import ResonanceError
-from laufruhe.problem.evaluation import evaluate, measured
+from laufruhe.problem.evaluation import evaluate, measured, objective_value
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
-from laufruhe.problem.mount_values import whole_objective
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
@@ -41,17 +40,17 @@ def test_only_what_stands_on_the_resonance_is_infinite(tmp_path: Path) -> None:
     assert np.isinf(np.abs(forces.at(2))).all()
     assert np.isfinite(np.abs(forces.at(4))).all()
     assert np.abs(forces.at(4)).max() > 0.0
-    assert math.isinf(whole_objective(problem, start))
+    assert math.isinf(objective_value(problem, start))
     assert all(math.isinf(m.mean) for m in measured(start, 0))
     fourth = resonant(tmp_path, FORCE.replace("[search]", "orders = [4]\n[search]"))
-    assert math.isfinite(whole_objective(fourth, evaluate_start(fourth)))
+    assert math.isfinite(objective_value(fourth, evaluate_start(fourth)))
 
 
 def test_a_design_off_resonance_is_evaluated_as_ever(tmp_path: Path) -> None:
     problem = resonant(tmp_path, mounts=UNDAMPED)
     start, usual = evaluate_start(problem), evaluate(problem)
     assert not start.resonance
-    assert whole_objective(problem, start) == whole_objective(problem, usual)
+    assert objective_value(problem, start) == objective_value(problem, usual)
     assert off_resonance(problem) is problem
 
 

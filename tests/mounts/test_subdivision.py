@@ -11,8 +11,7 @@ import pytest
 
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
-from laufruhe.problem.evaluation import evaluate, remounted
-from laufruhe.problem.mount_values import excess, whole_objective
+from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.subdivision import _Search, divided_bound, divides
 from laufruhe.solvers import solve
@@ -65,7 +64,7 @@ def asked_for(folder: Path, text: str, more: str = "", mounts: str = DAMPED) -> 
 def boxes(problem: Problem, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Boxes within the bounds, from nearly all of them to a thousandth, stiffness by ratio."""
     generator = np.random.default_rng(seed)
-    low, high = (np.array([getattr(d, side) for d in problem.mount_design.decisions]) for side in ("lower", "upper"))
+    low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     centres = low * (high / low) ** generator.random((count, len(low)))
     widths = (high - low) * 10.0 ** -generator.uniform(0.2, 4.0, (count, 1)) * generator.random((count, len(low)))
     return np.clip(centres - widths, low, high), np.clip(centres + widths, low, high)
@@ -76,7 +75,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
     problem = asked_for(tmp_path, ASKED[name])
     assert divides(problem)
     given = evaluate(problem)
-    search = _Search(problem, 1e-4 * whole_objective(problem, given))
+    search = _Search(problem, 1e-4 * objective_value(problem, given))
     low, high = boxes(problem, 40, 1)
     bounds, _ = search.bounds(low, high)
     generator = np.random.default_rng(2)
@@ -86,7 +85,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
         found = []
         for share in (*generator.random((3, len(below))), *corners):
             engine = problem.mount_design.applied(problem.engine, (below + share * (above - below)).tolist())
-            found.append(whole_objective(problem, remounted(given, engine)))
+            found.append(objective_value(problem, remounted(given, engine)))
         assert bound <= min(found) * (1.0 + 1e-9)
         tight.append(bound / min(found))
     assert max(tight) > 0.99
@@ -96,8 +95,8 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
 def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
     problem = asked_for(tmp_path, ASKED["mean"])
     search = _Search(problem, 0.0)
-    centre = np.array([d.start for d in problem.mount_design.decisions])
-    value = whole_objective(problem, evaluate(problem))
+    centre = np.array([d.start for d in problem.mount_decisions])
+    value = objective_value(problem, evaluate(problem))
     lacking = []
     for share in (1e-2, 1e-3):
         low, high = centre * (1.0 - share), centre * (1.0 + share)
@@ -138,8 +137,8 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
     for below, above, bound in zip(low, high, bounds, strict=True):
         engine = problem.mount_design.applied(problem.engine, generator.uniform(below, above).tolist())
         design = remounted(given, engine)
-        broken = any(excess(limit, design) > 1e-5 for limit in problem.mount_design.limits)
-        broken |= any(design.value(limit.quantity) > limit.maximum for limit in problem.limits)
+        broken = any(excess(limit, design) > 1e-5 for limit in problem.mount_limits)
+        broken |= any(design.value(limit.measure) > limit.maximum for limit in problem.limits)
         allowed_ones += not broken
         assert np.isfinite(bound) or broken
     assert 20 < np.count_nonzero(np.isinf(bounds)) < 130
@@ -162,12 +161,12 @@ def test_few_open_stiffnesses_are_decided_with_proof(text: str, tmp_path: Path) 
     assert result.certificate.method.endswith("boxes")
     given = evaluate(problem)
 
-    axes = [np.geomspace(d.lower, d.upper, 25) for d in problem.mount_design.decisions]
+    axes = [np.geomspace(d.lower, d.upper, 25) for d in problem.mount_decisions]
     values = []
     for x in itertools.product(*axes):
         design = remounted(given, problem.mount_design.applied(problem.engine, list(x)))
-        if all(excess(each, design) <= 0.0 for each in problem.mount_design.limits):
-            values.append(whole_objective(problem, design))
+        if all(excess(each, design) <= 0.0 for each in problem.mount_limits):
+            values.append(objective_value(problem, design))
     assert len(values) > 100
     assert min(values) >= result.certificate.lower_bound
     assert result.objective.value <= min(values) * (1.0 + 1e-6)

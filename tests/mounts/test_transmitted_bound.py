@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 
 from laufruhe.files.reader import load
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import NORMS, Norm
 from laufruhe.physics.mounting import mounting_of
-from laufruhe.problem.evaluation import evaluate, remounted
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.mount_design import MountMeasure
-from laufruhe.problem.mount_values import excess, whole_objective
-from laufruhe.problem.problem import Term
+from laufruhe.problem import channels
+from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.prove.transmitted_bound import least_transmitted, softest_of, transmitted_bound
 from laufruhe.solvers.mount_cones import covering
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
@@ -30,7 +28,7 @@ OVER_CENTRE = ('centre_of_gravity = ["0 mm", "0 mm", "120 mm"]', 'centre_of_grav
 def random_designs(problem, count: int, seed: int = 0):
     """Mounts and unbalances within their bounds; half of them with most numbers at an end, stiffness by ratio."""
     generator = np.random.default_rng(seed)
-    decisions = problem.mount_design.decisions
+    decisions = problem.mount_decisions
     for k in range(count):
         mounts = []
         for d in decisions:
@@ -44,8 +42,8 @@ def random_designs(problem, count: int, seed: int = 0):
 @pytest.mark.parametrize("name", ["powertrain-least-force", "tractor-four-elastic"])
 def test_no_design_allowed_is_under_the_bound(name):
     problem = load(PROBLEMS / f"{name}.toml")
-    floors = (MountMeasure.SAG, MountMeasure.FREQUENCIES)
-    limits = tuple(replace(m, outside=None) for m in problem.mount_design.limits if m.quantity.measure in floors)
+    floors = (channels.SAG, channels.FREQUENCIES)
+    limits = tuple(replace(m, outside=None) for m in problem.mount_limits if m.quantity.channel in floors)
     problem = replace(problem, mount_design=replace(problem.mount_design, limits=limits), limits=())
     each = [replace(problem.objective[0].quantity, norm=norm) for norm in Norm]
     bounds = [transmitted_bound(replace(problem, objective=(Term(quantity),))) for quantity in each]
@@ -73,7 +71,7 @@ def test_every_order_of_every_design_obeys_its_own_bound():
             continue
         loads = (softest.load @ wrench.coefficients[k])[None]
         omega = float(wrench.orders[k]) * problem.points[0].speed
-        bounds[k] = least_transmitted(loads, omega, softest.metric(Norm.RMS, loads), softest.floors)
+        bounds[k] = least_transmitted(loads, omega, softest.metric(NORMS["rms"], loads), softest.floors)
     assert sum(value > 0.0 for value in bounds.values()) >= 4
     for mounts, _ in random_designs(problem, 2000, 1):
         mounting = mounting_of(problem.mount_design.applied(problem.engine, mounts))
@@ -88,8 +86,8 @@ def test_undamped_softest_mounts_under_a_vertical_force_meet_the_bound(speed, tm
     engine = changed(ENGINE, ('"700 rpm"', f'"{speed:g} rpm"'))
     mounts = changed(MOUNTS, LOSSLESS)
     problem = problem_of(tmp_path, engine, changed(BLOCK, OVER_CENTRE), mounts, FORCE)
-    softest = [d.lower for d in problem.mount_design.decisions]
-    value = whole_objective(problem, evaluate(problem, problem.design((), softest)))
+    softest = [d.lower for d in problem.mount_decisions]
+    value = objective_value(problem, evaluate(problem, problem.design((), softest)))
     assert transmitted_bound(problem) == pytest.approx(value, rel=1e-3)
     assert transmitted_bound(problem) <= value
 
@@ -110,7 +108,7 @@ def test_limits_bound_a_vertical_force_like_the_single_mass_that_they_describe(l
         loads = (softest.load @ np.array([0.0, 0.0, 1000.0, 0.0, 0.0, 0.0]))[None].astype(complex)
         of_squares, of_forces = (
             least_transmitted(loads, math.tau * 25.0, softest.metric(norm, loads), softest.floors)
-            for norm in (Norm.RMS, Norm.SUM)
+            for norm in (NORMS["rms"], NORMS["mean"])
         )
         # four mounts share the force evenly; the covering matrix is tight along it but not exact
         assert of_squares == pytest.approx(force**2 / 4.0, rel=1e-3, abs=1e-6)
@@ -121,11 +119,11 @@ def test_limits_bound_a_vertical_force_like_the_single_mass_that_they_describe(l
 def test_the_mean_torque_is_carried_whole(tmp_path):
     """At order zero the mounts carry the load itself, however soft they are."""
     problem = load(PROBLEMS / "powertrain-least-force.toml")
-    steady = Quantity(Subject.MOUNT_FORCE, Norm.RMS, orders=(0.0,))
+    steady = Measure(channels.MOUNT_FORCE, NORMS["rms"], orders=(0.0,))
     problem = replace(problem, objective=(Term(steady),), mount_design=replace(problem.mount_design, limits=()))
     bound, given = transmitted_bound(problem), evaluate(problem, samples=24)
     assert bound > 0.0
-    values = [whole_objective(problem, remounted(given, problem.mount_design.applied(problem.engine, m)))
+    values = [objective_value(problem, remounted(given, problem.mount_design.applied(problem.engine, m)))
               for m, _ in random_designs(problem, 300)]  # fmt: skip
     assert bound <= min(values) <= 3.0 * bound
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from laufruhe.numerics import mixed_norms
 from laufruhe.numerics.batch_norms import BatchNorm
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import NORMS, Norm
 
 DESIGNS, FEATURES, ROWS = 70, 5, 40
 
@@ -29,7 +28,7 @@ def test_norm_of_each_design(norm: Norm, components: int) -> None:
 
 @pytest.mark.parametrize("components", [1, 2, 3])
 def test_blocks_and_threads_change_no_digit_that_counts(components: int) -> None:
-    batch, features = _batch(Norm.SUM, components)
+    batch, features = _batch(NORMS["mean"], components)
     alone = batch.values(features)
     np.testing.assert_array_equal(batch.values(features, threads=2, cache_bytes=1), batch.values(features, 1, 1))
     np.testing.assert_allclose(batch.values(features, cache_bytes=1), alone, rtol=1e-14)
@@ -37,7 +36,7 @@ def test_blocks_and_threads_change_no_digit_that_counts(components: int) -> None
 
 @pytest.mark.parametrize("components", [2, 3])
 def test_turning_every_row_changes_nothing(components: int) -> None:
-    batch, features = _batch(Norm.MAXIMUM, components)
+    batch, features = _batch(NORMS["maximum"], components)
     turn, _ = np.linalg.qr(np.random.default_rng(9).normal(size=(components, components)))
     turned = BatchNorm(batch.norm, np.einsum("cd,dfk->cfk", turn, batch.rows), batch.weights)
     np.testing.assert_allclose(turned.values(features), batch.values(features), rtol=1e-13)

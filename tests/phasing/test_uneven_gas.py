@@ -6,18 +6,18 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from laufruhe.solvers.uneven_program import rides_of
 
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_gas import LEFT_OUT
 from laufruhe.load_models.uneven_model import Symbols, UnevenModel
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.solvers import solve
 from laufruhe.solvers.uneven import local_optimum
-from laufruhe.solvers.uneven_program import rides_of
 from phasing import engines
 
 GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "8 bar"\n'
@@ -114,7 +114,7 @@ def test_neither_the_origin_of_the_angle_nor_the_numbering_matters(tmp_path):
     phasing, start, moves = scene(tmp_path, "four-stroke five")
     model = model_of(phasing, start, 1e-2)
     at, exact = moved(moves, np.random.default_rng(6).uniform(-0.2, 0.2, moves.size))
-    rms = replace(exact.objective[0].quantity, norm=Norm.RMS)
+    rms = replace(exact.objective[0].quantity, norm=NORMS["rms"])
     own = float(model.norm(rms, at, 1e-9))
     turned = replace(at, throws=[angle + 0.7 for angle in at.throws])
     assert float(model.norm(rms, turned, 1e-9)) == pytest.approx(own, rel=1e-12)

@@ -14,26 +14,28 @@ from hypothesis import strategies as st
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.machine import OperatingPoint
-from laufruhe.numerics.mixed_norms import Norm, lengths
+from laufruhe.numerics.norms import NORMS, Norm, lengths
+from laufruhe.problem import channels
+from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import MASSES, Quantity, Subject
-from laufruhe.problem.problem import Drive, Limit, Problem, Term, UnbalanceDecision
+from laufruhe.problem.measure import Limit, Measure, Term
+from laufruhe.problem.problem import Problem
 from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 
 # travel needs elastic mounts, and is tested with them
-LOADS = tuple(subject for subject in Subject if subject not in (*MASSES, Subject.MOUNT_TRAVEL))
-HALF_ORDERS = Quantity(Subject.ROLL_MOMENT, Norm.RMS, orders=(0.5, 1.5), points=("slow",))
+LOADS = tuple(subject for subject in Subject if subject not in (*MASSES, channels.MOUNT_TRAVEL))
+HALF_ORDERS = Measure(channels.ROLL_MOMENT, NORMS["rms"], orders=(0.5, 1.5), points=("slow",))
 QUANTITIES = (
-    *(Quantity(subject, norm) for subject in LOADS for norm in Norm),
-    *(Quantity(subject, Norm.SUM) for subject in MASSES),
-    Quantity(Subject.ADDED_MASS, Norm.SUM, rotors=("rear", "left")),
-    Quantity(Subject.MOUNT_FORCE, Norm.SUM, mounts=("rear left", "front right")),
-    Quantity(Subject.MOUNT_FORCE, Norm.RMS, direction_weights=(1.0, 1.0, 0.5)),
-    Quantity(Subject.MOUNT_FORCE, Norm.SUM, orders=(1.0,)),
-    Quantity(Subject.SHAKING_FORCE, Norm.MAXIMUM, orders=(2.0, 4.0)),
+    *(Measure(subject, norm) for subject in LOADS for norm in Norm),
+    *(Measure(subject, NORMS["mean"]) for subject in MASSES),
+    Measure(channels.ADDED_MASS, NORMS["mean"], rotors=("rear", "left")),
+    Measure(channels.MOUNT_FORCE, NORMS["mean"], mounts=("rear left", "front right")),
+    Measure(channels.MOUNT_FORCE, NORMS["rms"], direction_weights=(1.0, 1.0, 0.5)),
+    Measure(channels.MOUNT_FORCE, NORMS["mean"], orders=(1.0,)),
+    Measure(channels.SHAKING_FORCE, NORMS["maximum"], orders=(2.0, 4.0)),
     HALF_ORDERS,
-    Quantity(Subject.MOUNT_FORCE, Norm.SUM, points=("motored",)),
-    Quantity(Subject.ROCKING_COUPLE, Norm.SUM, points=("rated", "motored")),
+    Measure(channels.MOUNT_FORCE, NORMS["mean"], points=("motored",)),
+    Measure(channels.ROCKING_COUPLE, NORMS["mean"], points=("rated", "motored")),
 )
 
 
@@ -49,14 +51,14 @@ def scene(cylinders: int) -> Problem:
     ]
     starts = {"left": cmath.rect(0.004, 0.5), "slow shaft": cmath.rect(-0.003, 0.7), "front": cmath.rect(0.01, 2.0)}
     decisions = (
-        UnbalanceDecision(
+        Decision(
             "pair", "kg m", 0.0, 0.02, (0.0, math.tau), starts["left"],
             (Drive("left", 1.0), Drive("right", -1.0, mirrored=True)),
         ),
-        UnbalanceDecision(
+        Decision(
             "shaft", "kg m", -0.01, 0.01, (0.7, 0.7), starts["slow shaft"], (Drive("slow shaft", 1.0),),
         ),
-        UnbalanceDecision(
+        Decision(
             "webs", "kg", 0.0, 0.5, (1.0, 2.5), starts["front"] / 0.08,
             (Drive("front", 0.08j), Drive("rear", -0.08, mirrored=True)),
         ),
@@ -112,7 +114,7 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
         size = float(
             np.abs(expected.vectors).max() + np.abs(norm.constant).max() + np.abs(norm.slope @ affine.scales).max()
         )
-        again = 1 if quantity.subject in MASSES else periods
+        again = 1 if quantity.is_mass else periods
         whole = expected.vectors.reshape(
             -1, again, len(norm.weights) if again == 1 else samples, expected.vectors.shape[1]
         )
@@ -143,7 +145,7 @@ def test_objective_and_limits_keep_their_weights() -> None:
     weighted = replace(
         p,
         objective=(Term(QUANTITIES[0], 2.0), Term(QUANTITIES[3], 0.25)),
-        limits=(Limit("mass", Quantity(Subject.BALANCER_MASS, Norm.SUM), 1.5),),
+        limits=(Limit("mass", Measure(channels.BALANCER_MASS, NORMS["mean"]), 1.5),),
     )
     affine = AffineModel(weighted).at(24)
     x = 0.3 * affine.scales

@@ -12,10 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
-from laufruhe.load_models.domain import Domain, domains_of
-from laufruhe.numerics import mixed_norms
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.problem import UnbalanceDecision
+from laufruhe.numerics.norms import Norm
+from laufruhe.problem.decision import Decision, Domain, domains_of
 from laufruhe.prove.certificate import Multipliers, best_bound, kkt_residual, lower_bound
 
 Array = NDArray[np.float64]
@@ -38,7 +36,7 @@ def random_domains(rng: np.random.Generator) -> tuple[Domain, ...]:
         width = (0.0, math.tau, float(rng.uniform(0.1, math.pi)))[kind]
         lower = float(rng.uniform(-2, 1)) if kind == 0 else 0.0
         upper = max(lower, 0.0) + float(rng.uniform(0.1, 3))
-        decisions.append(UnbalanceDecision(f"d{k}", "kg m", lower, upper, (low, low + width), 0j, ()))
+        decisions.append(Decision(f"d{k}", "kg m", lower, upper, (low, low + width), 0j, ()))
     return domains_of(tuple(decisions))
 
 
@@ -113,8 +111,8 @@ class TestBound:
 
     def test_is_tight_where_it_can_be(self) -> None:
         """|x - 1| on [2, 3]: the bound is 1, the objective at 2, and nothing more is to be won."""
-        norm = AffineNorm(Norm.SUM, np.array([[-1.0]]), np.array([[[1.0]]]), np.array([1.0]))
-        domains = domains_of((UnbalanceDecision("d", "kg m", 2.0, 3.0, (0.0, 0.0), 0j, ()),))
+        norm = AffineNorm(NORMS["mean"], np.array([[-1.0]]), np.array([[[1.0]]]), np.array([1.0]))
+        domains = domains_of((Decision("d", "kg m", 2.0, 3.0, (0.0, 0.0), 0j, ()),))
         problem = AffineProblem(((1.0, norm),), (), domains, 1)
         bound = lower_bound(problem, Multipliers((np.array([[1.0]]),), ()))
         assert bound.value == problem.objective(np.array([2.0])) == 1.0
@@ -126,9 +124,9 @@ class TestBound:
     def test_limits_raise_it(self) -> None:
         """|x - 3| with |x| <= 1 on a disc: the price of the limit is the slope, and the bound is 2."""
         unit = np.eye(2)[None]
-        far = AffineNorm(Norm.SUM, np.array([[-3.0, 0.0]]), unit, np.array([1.0]))
-        near = AffineNorm(Norm.MAXIMUM, np.zeros((1, 2)), unit, np.array([1.0]))
-        domains = domains_of((UnbalanceDecision("d", "kg m", 0.0, 5.0, (0.0, math.tau), 0j, ()),))
+        far = AffineNorm(NORMS["mean"], np.array([[-3.0, 0.0]]), unit, np.array([1.0]))
+        near = AffineNorm(NORMS["maximum"], np.zeros((1, 2)), unit, np.array([1.0]))
+        domains = domains_of((Decision("d", "kg m", 0.0, 5.0, (0.0, math.tau), 0j, ()),))
         problem = AffineProblem(((1.0, far),), ((1.0, near),), domains, 1)
         multipliers = Multipliers((np.array([[-1.0, 0.0]]),), (np.array([[1.0, 0.0]]),))
         bound = lower_bound(problem, multipliers)
@@ -178,6 +176,6 @@ class TestPrices:
         v = rng.standard_normal((3, 2))
         z = mixed_norms.subgradient(norm, weights, v)
         limit = AffineNorm(norm, v, np.zeros((3, 2, 1)), weights)
-        domains = domains_of((UnbalanceDecision("d", "kg m", 0.0, 1.0, (0.0, 0.0), 0j, ()),))
+        domains = domains_of((Decision("d", "kg m", 0.0, 1.0, (0.0, 0.0), 0j, ()),))
         problem = AffineProblem((), ((1.0, limit),), domains, 1)
         assert Multipliers((), (7.0 * z,)).shadow_prices(problem) == (pytest.approx(7.0),)

@@ -14,9 +14,9 @@ import pytest
 
 from laufruhe.machine import Cycle, Engine
 from laufruhe.machine.layouts import Mechanism, build, vee
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.problem import Drive, Term
+from laufruhe.numerics.norms import NORMS
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from tractor import LAMBDA, MASS, RADIUS, SPACING, engine, free_unbalance, problem, shaft_rotor, web
@@ -25,7 +25,7 @@ HALF = 0.5 * MASS * RADIUS
 
 
 def first_order_couple() -> tuple[Term, ...]:
-    return (Term(Quantity(Subject.ROCKING_COUPLE, Norm.SUM, orders=(1.0,))),)
+    return (Term(Measure(channels.ROCKING_COUPLE, NORMS["mean"], orders=(1.0,))),)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_lanchester_pair() -> None:
     Four cylinders make 4 m r lambda w^2; two shafts make 2 U (2 w)^2.
     """
     rotors = [shaft_rotor("left", 2, 0.0, 0.1), shaft_rotor("right", -2, 0.0, -0.1)]
-    force = (Term(Quantity(Subject.SHAKING_FORCE, Norm.SUM)),)
+    force = (Term(Measure(channels.SHAKING_FORCE, NORMS["mean"])),)
     result = solve(problem(engine([0, 180, 180, 0], rotors), ["left", "right"], objective=force))
     assert result.objective is not None
     assert result.objective.value <= 1e-6 * result.objective.initial
@@ -95,8 +95,8 @@ def test_moment_pair() -> None:
     apart = 0.2
     rotors = [shaft_rotor("left", 2, 0.0, 0.5 * apart), shaft_rotor("right", 2, 0.0, -0.5 * apart)]
     machine = engine([0, 180, 180, 0], rotors)
-    roll = Quantity(Subject.ROLL_MOMENT, Norm.SUM, orders=(2.0,))
-    force = Quantity(Subject.SHAKING_FORCE, Norm.SUM, orders=(2.0,))
+    roll = Measure(channels.ROLL_MOMENT, NORMS["mean"], orders=(2.0,))
+    force = Measure(channels.SHAKING_FORCE, NORMS["mean"], orders=(2.0,))
     pure = problem(machine, ["left"], objective=[Term(roll)])
     drives = (Drive("left", 1.0), Drive("right", -1.0))
     coupled = replace(pure, decisions=(replace(free_unbalance("left"), drives=drives),))
@@ -110,7 +110,9 @@ def test_moment_pair() -> None:
 def test_half_balance_of_a_single() -> None:
     """Fig. 10: with equal weight on both directions the best balance fraction of a single is one half."""
     rotor = web("web", 0.0)
-    result = solve(problem(engine([0], [rotor]), ["web"], objective=[Term(Quantity(Subject.SHAKING_FORCE, Norm.RMS))]))
+    result = solve(
+        problem(engine([0], [rotor]), ["web"], objective=[Term(Measure(channels.SHAKING_FORCE, NORMS["rms"]))])
+    )
     unbalance = result.final.engine.rotors[0].unbalance
     assert unbalance.real == pytest.approx(-0.5 * MASS * RADIUS, rel=1e-5)
     assert abs(unbalance.imag) < 1e-9
@@ -124,7 +126,7 @@ def test_ninety_degree_vee_needs_no_shaft() -> None:
         Cycle.FOUR_STROKE, vee(2, 1.0, math.pi / 2), Mechanism(RADIUS, RADIUS / LAMBDA, MASS), [math.pi / 4]
     )
     machine = Engine("vee", Cycle.FOUR_STROKE, cylinders, (web("web", 0.0),))
-    first = (Term(Quantity(Subject.SHAKING_FORCE, Norm.MAXIMUM, orders=(1.0,))),)
+    first = (Term(Measure(channels.SHAKING_FORCE, NORMS["maximum"], orders=(1.0,))),)
     result = solve(problem(machine, ["web"], objective=first))
     assert result.objective is not None
     assert result.objective.value <= 1e-6 * result.objective.initial

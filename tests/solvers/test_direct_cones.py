@@ -10,9 +10,10 @@ import pytest
 
 from laufruhe import load
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.problem import Limit, Problem
+from laufruhe.numerics.norms import NORMS, Norm
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import lower_bound
 from laufruhe.solvers import solve
 from laufruhe.solvers.conic import ConicProgram
@@ -26,7 +27,7 @@ NAMES = ("tractor-single", "tractor-two", "tractor-four-lanchester", "tractor-fo
 def measured_by(problem: Problem, norm: Norm) -> Problem:
     return replace(
         problem,
-        objective=tuple(replace(t, quantity=replace(t.quantity, norm=norm)) for t in problem.objective),
+        objective=tuple(replace(t, quantity=replace(t.measure, norm=norm)) for t in problem.objective),
     )
 
 
@@ -47,7 +48,7 @@ def test_same_optimum_and_bound_as_cvxpy(name: str, norm: Norm) -> None:
 
 
 def limited(maximum: float) -> Problem:
-    limit = Limit("mass", Quantity(Subject.BALANCER_MASS, Norm.SUM), maximum)
+    limit = Limit("mass", Measure(channels.BALANCER_MASS, NORMS["mean"]), maximum)
     return replace(load(PROBLEMS / "tractor-four-lanchester.toml"), limits=(limit,))
 
 

@@ -11,15 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from laufruhe.load_models.domain import Domain, domains_of
-from laufruhe.problem.problem import UnbalanceDecision
+from laufruhe.problem.decision import Decision, Domain, domains_of
 
 Array = NDArray[np.float64]
 OFFSET = 3  # columns of others before this one
 
 
 def domain(lower: float, upper: float, low: float, high: float) -> Domain:
-    return Domain(UnbalanceDecision("d", "kg m", lower, upper, (low, high), 0j, ()), OFFSET)
+    return Domain(Decision("d", "kg m", lower, upper, (low, high), 0j, ()), OFFSET)
 
 
 INTERVALS = st.tuples(st.floats(-5.0, 5.0), st.floats(0.0, 5.0), st.floats(-7.0, 7.0)).map(

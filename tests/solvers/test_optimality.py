@@ -10,11 +10,13 @@ import pytest
 from scipy.optimize import minimize
 
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.problem import channels
+from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Quantity, Subject
-from laufruhe.problem.problem import Limit, Problem, Term, UnbalanceDecision
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Limit, Measure, Term
+from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, best_bound, kkt_residual
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.conic import ConicProgram
@@ -22,14 +24,14 @@ from laufruhe.solvers.direct_cones import TIGHT
 from tractor import GAS, engine, free_unbalance, problem, shaft_rotor, web
 
 EXACT = Fidelity("exact", 720)
-PEAK = Quantity(Subject.MOUNT_FORCE, Norm.MAXIMUM)
-RMS = Quantity(Subject.MOUNT_FORCE, Norm.RMS)
-BALANCER_MASS = Quantity(Subject.BALANCER_MASS, Norm.SUM)
+PEAK = Measure(channels.MOUNT_FORCE, NORMS["maximum"])
+RMS = Measure(channels.MOUNT_FORCE, NORMS["rms"])
+BALANCER_MASS = Measure(channels.BALANCER_MASS, NORMS["mean"])
 FOUR = [0.0, 180.0, 180.0, 0.0]
 
 
 def four(
-    objective: Quantity = MEAN_MOUNT_FORCE, limits: tuple[Limit, ...] = (), upper: float = 0.02, tolerance: float = 1e-4
+    objective: Measure = MEAN_MOUNT_FORCE, limits: tuple[Limit, ...] = (), upper: float = 0.02, tolerance: float = 1e-4
 ) -> Problem:
     """The study's four-cylinder with two shafts at its front end, gas on."""
     rotors = [shaft_rotor("left", 2, 0.25, 0.1, -0.1), shaft_rotor("right", -2, 0.25, -0.1, -0.1)]
@@ -48,7 +50,7 @@ OBJECTIVES = pytest.mark.parametrize("objective", [MEAN_MOUNT_FORCE, PEAK, RMS],
 
 
 @OBJECTIVES
-def test_no_feasible_design_is_better(objective: Quantity) -> None:
+def test_no_feasible_design_is_better(objective: Measure) -> None:
     """Random designs, near and far, lie above the optimum and above its bound."""
     p = four(objective, upper=0.008)
     result = solve(p)
@@ -72,7 +74,7 @@ def test_no_feasible_design_is_better(objective: Quantity) -> None:
 
 
 @OBJECTIVES
-def test_scipy_does_not_find_better(objective: Quantity) -> None:
+def test_scipy_does_not_find_better(objective: Measure) -> None:
     """SLSQP on the exact model, from the design as given and from the optimum."""
     p = four(objective)
     result = solve(p)
@@ -99,10 +101,10 @@ def test_gap_is_computed_from_the_exact_model() -> None:
 
 
 @pytest.mark.parametrize("samples", [48, 96, 360])
-@pytest.mark.parametrize("subject", [Subject.MOUNT_FORCE, Subject.ROLL_MOMENT, Subject.SHAKING_FORCE])
+@pytest.mark.parametrize("subject", [channels.MOUNT_FORCE, channels.ROLL_MOMENT, channels.SHAKING_FORCE])
 def test_bound_of_a_mean_holds_over_the_whole_cycle(subject: Subject, samples: int) -> None:
     """However few the angles: the mean over the cycle of the design found, and of any near it, is not below (P7)."""
-    p = replace(four(Quantity(subject, Norm.SUM), tolerance=0.3), fidelity=Fidelity("exact", samples))
+    p = replace(four(Measure(subject, NORMS["mean"]), tolerance=0.3), fidelity=Fidelity("exact", samples))
     result = solve(p)
     assert result.certificate is not None
     model = AffineModel(p)
@@ -205,7 +207,7 @@ def test_a_limit_that_only_finer_angles_contradict_is_told(samples: int) -> None
 
     The limit in conflict is named alone, and one at the peak itself is met.
     """
-    roll = Quantity(Subject.ROLL_MOMENT, Norm.MAXIMUM)
+    roll = Measure(channels.ROLL_MOMENT, NORMS["maximum"])
     rotors = [shaft_rotor("left", 2, 0.25, 0.0, 0.0)]
     machine = engine(FOUR, rotors, firing_order=[1, 3, 4, 2])
     p = problem(machine, ["left"], GAS, fidelity=Fidelity("exact", samples), upper=0.02)
@@ -311,7 +313,7 @@ def test_brute_force_over_size_and_angle() -> None:
 def test_bounds_far_from_the_answer(magnitude: float) -> None:
     """Huge and tiny bounds beside each other leave the program solvable and the proof honest."""
     p = four()
-    odd = UnbalanceDecision("x", "kg m", 0.0, 0.01 * magnitude, (0.0, math.tau), 0j, p.decisions[1].drives)
+    odd = Decision("x", "kg m", 0.0, 0.01 * magnitude, (0.0, math.tau), 0j, p.decisions[1].drives)
     result = solve(replace(p, decisions=(p.decisions[0], odd)))
     assert result.objective is not None
     assert result.certificate is not None

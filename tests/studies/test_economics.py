@@ -13,10 +13,11 @@ import xarray as xr
 from laufruhe import load
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.machine.similarity import equal_power_scale
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import NORMS
+from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.problem import Limit, Problem
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from laufruhe.studies.economics import Build, Claim, Standing, best, compared, front
 from laufruhe.studies.equal_power import at_equal_power, check_comparable
@@ -81,7 +82,7 @@ def test_front_falls_is_proven_and_convex() -> None:
 def test_points_of_a_front_are_designs_of_the_exact_model() -> None:
     """The force of a point is what an engine built so makes, evaluated from its parts."""
     problem = load(FOUR)
-    limit = Limit("all shafts", Quantity(Subject.BALANCER_MASS, Norm.SUM), 0.5)
+    limit = Limit("all shafts", Measure(channels.BALANCER_MASS, NORMS["mean"]), 0.5)
     result = solve(replace(problem, limits=(*problem.limits, limit)))
     built = evaluate(problem, result.final.engine, 4 * result.final.samples)
     assert front(problem, (0.5,)).points[0].force == pytest.approx(objective_value(problem, built), rel=1e-6)
@@ -112,7 +113,7 @@ def test_front_without_shafts_still_sizes_the_counterweights() -> None:
 
 def test_limits_that_cannot_be_met_are_named() -> None:
     problem = load(FOUR)
-    quiet = Limit("quiet", Quantity(Subject.MOUNT_FORCE, Norm.MAXIMUM), 1.0)
+    quiet = Limit("quiet", Measure(channels.MOUNT_FORCE, NORMS["maximum"]), 1.0)
     with pytest.raises(SolverError, match="has no design: "):
         front(replace(problem, limits=(quiet,)), (0.5,))
     with pytest.raises(SolverError, match=r"no design with 0\.5 kg on the shafts"):
@@ -226,10 +227,10 @@ def test_unlike_objectives_and_unknown_shafts_are_refused() -> None:
     problem = load(FOUR)
     with pytest.raises(ModelError, match="no balancer shaft"):
         with_shafts(problem, ("third",))
-    peak = replace(problem.objective[0], quantity=Quantity(Subject.MOUNT_FORCE, Norm.MAXIMUM))
+    peak = replace(problem.objective[0], quantity=Measure(channels.MOUNT_FORCE, NORMS["maximum"]))
     other: Problem = replace(problem, objective=(peak,))
     with pytest.raises(ModelError, match="minimise different things"):
         compared([Build("a"), Build("b")], [front(problem, (1.0,)), front(other, (1.0,))])
-    mass = replace(problem.objective[0], quantity=Quantity(Subject.BALANCER_MASS, Norm.SUM))
+    mass = replace(problem.objective[0], quantity=Measure(channels.BALANCER_MASS, NORMS["mean"]))
     with pytest.raises(ModelError, match="against a load"):
         front(replace(problem, objective=(mass,)), (1.0,))

@@ -9,9 +9,9 @@ import pytest
 
 from laufruhe import load
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.problem import Limit
+from laufruhe.numerics.norms import NORMS
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Limit, Measure
 from laufruhe.solvers import solve
 from laufruhe.studies.speed_sweep import speed_sweep
 
@@ -31,7 +31,7 @@ def test_sweep_meets_single_solves() -> None:
 
 def test_limit_holds_at_every_speed() -> None:
     problem = load(PROBLEM)
-    mass = Quantity(Subject.BALANCER_MASS, Norm.SUM)
+    mass = Measure(channels.BALANCER_MASS, NORMS["mean"])
     limited = replace(problem, limits=(Limit("mass", mass, 0.5),))
     rated = problem.points[0].speed
     tight, free = (speed_sweep(p, [0.7 * rated, rated]) for p in (limited, replace(problem, limits=())))

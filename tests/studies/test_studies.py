@@ -24,7 +24,7 @@ from laufruhe.cli import study as cli_study
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.files.study_parts import CaseTable
-from laufruhe.problem.problem import Limit
+from laufruhe.problem.measure import Limit
 from laufruhe.report.tractor_study import FIGURES, figure_files
 from laufruhe.solvers import solve
 from laufruhe.studies import Point, Scenes, kinds, run, work

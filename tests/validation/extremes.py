@@ -17,13 +17,13 @@ import numpy as np
 import tractor
 from laufruhe.machine import Block, Cycle, Engine, Mount, OperatingPoint, PressureTrace
 from laufruhe.machine.layouts import Mechanism, boxer, build, inline, vee
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError, elastic_mounting
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import gas_torque, reciprocating_loads, shaking_loads
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.problem import Term
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.solvers import solve
 from many_digits import acceleration_orders
 
@@ -292,7 +292,7 @@ def _bounded(big: float, small: float) -> tuple[float, float]:
     """Error of the unbalances of a free shaft and a bounded one; by how much the true gap exceeds the stated one."""
     rotors = [tractor.shaft_rotor("plus", 2.0, 0.0), tractor.shaft_rotor("minus", -2.0, 0.0)]
     machine = replace(tractor.engine([0, 180, 180, 0], rotors), mounts=())
-    force = Term(Quantity(Subject.SHAKING_FORCE, Norm.SUM))
+    force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"]))
     problem = tractor.problem(machine, ["plus", "minus"], objective=(force,))
     free = replace(problem.decisions[0], upper=big), replace(problem.decisions[1], upper=small)
     problem = replace(problem, decisions=free)
@@ -374,7 +374,7 @@ def many_optima() -> Entry:
     rotors = [tractor.shaft_rotor(f"{name}.{k}", ratio, 0.0) for k, (name, ratio) in enumerate(
         [("plus", 2.0), ("again", 2.0), ("minus", -2.0), ("more", -2.0)])]  # fmt: skip
     machine = replace(tractor.engine([0, 180, 180, 0], rotors), mounts=())
-    force = Term(Quantity(Subject.SHAKING_FORCE, Norm.SUM))
+    force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"]))
     found = solve(tractor.problem(machine, [r.name for r in rotors], objective=(force,)))
     total = sum(abs(rotor.unbalance) for rotor in found.final.engine.rotors)
     least = tractor.MASS * tractor.RADIUS * tractor.LAMBDA

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from laufruhe.errors import Complaint, InputError
+from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -50,11 +51,10 @@ def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
 def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
     """Milliseconds of what is asked of mounts, with the loads that it needs and with all."""
     from laufruhe.problem.evaluation import evaluate
-    from laufruhe.problem.mount_values import whole_objective
     from laufruhe.studies.trade import seconds
 
     needed = problem if choice.numbers[0] else replace(problem, points=())
-    times = [1e3 * seconds(lambda p=p: whole_objective(p, evaluate(p))) for p in (needed, problem)]  # type: ignore[misc]
+    times = [1e3 * seconds(lambda p=p: objective_value(p, evaluate(p))) for p in (needed, problem)]  # type: ignore[misc]
     return times[0], times[1]
 
 
@@ -90,7 +90,7 @@ def _with_objective(path: Path) -> Problem:
     from laufruhe.files.reader import load
 
     problem = load(path)
-    if not problem.objective and not problem.mount_design.terms:
+    if not problem.objective and not problem.mount_terms:
         rule, remedy = "is missing: accuracy is that of an objective", "add [objective] or mounts"
         raise InputError(str(path), (Complaint("objective", "", rule, remedy),))
     return problem

@@ -55,7 +55,7 @@ def written(request: Request, answer: Answer, say: Callable[[str], None]) -> tup
         option, folder = ("--out", request.out) if request.out is not None else ("results", _default_folder(problem))
         stage = places.enter_context(files.staged(folder, option))
         copy = json_file(request, places)
-        open_numbers = len(problem.decisions) + len(problem.mount_design.decisions)
+        open_numbers = len(problem.decisions)
         what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
         say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
         result = answer(problem, say)

@@ -78,7 +78,7 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
         chosen = replace(chosen, gas_samples=None)
     if not chosen.is_uneven:
         chosen = _first(chosen, "orders", (*ORDERS, None), lambda f: scale.loses(f) <= PHYSICS_SHARE * room)
-    if not problem.mount_design.decisions:
+    if not problem.mount_decisions:
         chosen = _fewest_modes(scale, chosen, room)
     lost = scale.loses(chosen)
     if not chosen.is_uneven:
@@ -177,7 +177,7 @@ def _numbers(problem: Problem, scale: Scale, chosen: Fidelity) -> tuple[int, int
     """Force components sampled in one evaluation, pruned and not."""
     pruned = whole = 0
     for term in scale.terms:
-        found = signals(term.quantity, scale.best)
+        found = signals(term.measure, scale.best)
         directions = sum(int(np.any(np.abs(s.coefficients) > 0.0, axis=(0, 1)).sum()) for s in found)
         mounts, width = found[0].coefficients.shape[1:]
         pruned += max(chosen.samples // repeats(scale), 24) * mounts * directions

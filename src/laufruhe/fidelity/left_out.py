@@ -21,9 +21,8 @@ from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import WRENCH, rotor_wrench
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.measure import MASSES
-from laufruhe.problem.mount_design import mounting_in
 from laufruhe.problem.problem import Problem
 
 
@@ -52,10 +51,10 @@ class Scale:
 
     def __init__(self, problem: Problem, best: Evaluation) -> None:
         self.problem, self.best = problem, best
-        self.terms = [term for term in problem.objective if term.quantity.subject not in MASSES]
-        self.value = sum(term.weight * best.value(term.quantity) for term in problem.objective)
+        self.terms = [term for term in problem.objective if not term.measure.is_mass]
+        self.value = sum(term.weight * best.value(term.measure) for term in problem.objective)
         half = half_gas(problem, best)
-        doubt = sum(term.weight * gas_doubt(term.quantity, best, half) for term in self.terms)
+        doubt = sum(term.weight * gas_doubt(term.measure, best, half) for term in self.terms)
         self.doubt = relative(doubt, self.value) + ROUNDING
 
     def evaluation(self, fidelity: Fidelity) -> Evaluation:
@@ -65,7 +64,7 @@ class Scale:
     def loses(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
         """What a fidelity leaves out at most, relative, of the reference or of another evaluation (F6)."""
         ours, theirs = self.evaluation(fidelity), than or self.best
-        lost = sum(term.weight * left_out(term.quantity, ours, theirs) for term in self.terms)
+        lost = sum(term.weight * left_out(term.measure, ours, theirs) for term in self.terms)
         return relative(lost, self.value)
 
     @cached_property
@@ -84,7 +83,7 @@ class Scale:
     @cached_property
     def decided_modes(self) -> tuple[int, ...]:
         """Modes that an open rotor drives, counted from 0: what is small now may not stay so."""
-        names = {drive.rotor for decision in self.problem.decisions for drive in decision.drives}
+        names = {drive.rotor for decision in self.problem.decisions for drive in decision.rotor_drives}
         rotors = [replace(rotor, unbalance=1.0) for rotor in self.problem.engine.rotors if rotor.name in names]
         if self.mounting is None or not rotors:
             return ()
@@ -101,7 +100,7 @@ class Scale:
     def misses(self, fidelity: Fidelity) -> float:
         """What its samples miss at most, relative (F7, F8)."""
         ours = self.evaluation(fidelity)
-        missed = sum(term.weight * sampling_bound(term.quantity, ours) for term in self.terms)
+        missed = sum(term.weight * sampling_bound(term.measure, ours) for term in self.terms)
         return relative(missed, self.value)
 
 
@@ -196,7 +195,7 @@ def repeats(scale: Scale) -> int:
     ratios = tuple(
         as_order(abs(rotor.shaft.ratio))
         for rotor in scale.problem.engine.rotors
-        if rotor.unbalance != 0 or any(d.rotor == rotor.name for c in scale.problem.decisions for d in c.drives)
+        if rotor.unbalance != 0 or any(d.rotor == rotor.name for c in scale.problem.decisions for d in c.rotor_drives)
     )
     cycle = scale.problem.engine.cycle.base_order
     bases = [loads.wrench.reduced(ratios).base for loads in scale.best.loads]

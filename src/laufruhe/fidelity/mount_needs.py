@@ -19,9 +19,10 @@ from laufruhe.machine import Engine
 from laufruhe.machine.mount import Matrix3
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.modes import weight_wrench
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.mount_design import MountMeasure, MountQuantity, mounting_in
-from laufruhe.problem.mount_values import mount_value
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -57,21 +58,17 @@ def needs(problem: Problem) -> Choice:
     return Choice(problem.fidelity, 0.0, tuple(kept), tuple(left), _numbers(problem, bool(parts)))
 
 
-def _asked(problem: Problem) -> list[MountQuantity]:
+def _asked(problem: Problem) -> list[Measure]:
     """Quantities of the objective and of the limits."""
-    design = problem.mount_design
-    return [*(quantity for quantity, _ in design.terms), *(limit.quantity for limit in design.limits)]
+    return [measure for measure in problem.measures if measure.is_mounting]
 
 
-def _values(problem: Problem, wanted: list[MountQuantity]) -> Array:
+def _values(problem: Problem, wanted: list[Measure]) -> Array:
     """All that is asked; of natural frequencies all six."""
     evaluation = evaluate(problem)
     found: list[float] = []
     for quantity in wanted:
-        if quantity.measure is MountMeasure.FREQUENCIES:
-            found += mounting_in(evaluation.engine).modes.frequencies.tolist()
-        else:
-            found.append(mount_value(quantity, evaluation))
+        found += evaluation.values(quantity)
     return np.array(found)
 
 
@@ -113,9 +110,9 @@ def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
         yield "loss and damping of the mounts", _with(problem, replace(engine, mounts=firm))
 
 
-def _modes_of_the_sag(problem: Problem, wanted: list[MountQuantity]) -> list[LeftOut]:
+def _modes_of_the_sag(problem: Problem, wanted: list[Measure]) -> list[LeftOut]:
     """Modes that weight does not move, where sag alone is asked of them."""
-    if {quantity.measure for quantity in wanted} != {MountMeasure.SAG}:
+    if {quantity.channel for quantity in wanted} != {channels.SAG}:
         return []
     mounting = mounting_in(problem.engine)
     drive = np.abs(mounting.modes.shapes.T @ weight_wrench(mounting.block))

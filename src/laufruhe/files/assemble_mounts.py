@@ -12,16 +12,15 @@ from laufruhe.files.file_models import BlockTable, MountsTable, MountTable, Stop
 from laufruhe.machine import Block, Mount
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.modes import free_motion
-from laufruhe.problem.mount_design import (
+from laufruhe.problem.decision import (
     DAMPING,
     LOSS,
-    NOTHING_ASKED,
     NUMBERS_OF_MOUNT,
     POSITION,
     STIFFNESS,
     TURNED,
-    MountDecision,
-    MountDesign,
+    Decision,
+    Interval,
     MountDrive,
     mount_of,
 )
@@ -42,7 +41,8 @@ class MountsFound:
 
     mounts: tuple[Mount, ...] = ()
     block: Block | None = None
-    design: MountDesign = NOTHING_ASKED
+    numbers: tuple[tuple[float, ...], ...] = ()
+    decisions: tuple[Decision, ...] = ()
 
 
 def mounts_of(table: MountsTable | None, block: BlockTable | None) -> MountsFound:
@@ -114,7 +114,7 @@ def _elastic(table: MountsTable, block: Block) -> MountsFound:
         raise Refused("mounts.relative_stiffness", None, 'goes with kind = "rigid"', "give stiffness instead")
     places, names = _places(table)
     rows: list[list[float]] = []
-    decisions: list[MountDecision] = []
+    decisions: list[Decision] = []
     for k, (name, place) in enumerate(zip(names, places, strict=True)):
         where = f"mounts.places[{k + 1}]"
         if place.relative_stiffness is not None:
@@ -131,7 +131,7 @@ def _elastic(table: MountsTable, block: Block) -> MountsFound:
     bare = [_stopped(Mount(name, (0.0, 0.0, 0.0)), stop) for name, stop in zip(names, stops, strict=True)]
     mounts = tuple(mount_of(mount, row) for mount, row in zip(bare, rows, strict=True))
     _check_held(block, mounts)
-    return MountsFound(mounts, block, MountDesign(tuple(tuple(row) for row in rows), tuple(decisions)))
+    return MountsFound(mounts, block, tuple(tuple(row) for row in rows), tuple(decisions))
 
 
 def _stopped(mount: Mount, stop: StopTable | None) -> Mount:
@@ -162,7 +162,7 @@ def _followed(place: MountTable) -> tuple[str, ...]:
 
 def _follow(
     rows: list[list[float]],
-    decisions: list[MountDecision],
+    decisions: list[Decision],
     leader: int,
     k: int,
     followed: Sequence[str],
@@ -175,7 +175,7 @@ def _follow(
         for d, decision in enumerate(decisions):
             new = tuple(
                 MountDrive(k, number, gain * drive.gain)
-                for drive in decision.drives
+                for drive in decision.mount_drives
                 if drive.mount == leader and drive.number == number
             )
             decisions[d] = replace(decision, drives=(*decision.drives, *new))
@@ -195,7 +195,7 @@ def _read(
     name: str,
     k: int,
     row: list[float],
-    decisions: list[MountDecision],
+    decisions: list[Decision],
 ) -> None:
     """One field of one mount into its row, open numbers into decisions as well."""
     value = getattr(place, key)
@@ -209,7 +209,7 @@ def _read(
         if isinstance(number, Open) and number.lower < number.upper:
             label = f"{name}.{key}" + ("" if key == "loss_factor" else f".{_AXES[j]}")
             drive = (MountDrive(k, first + j, 1.0),)
-            decisions.append(MountDecision(label, unit, number.lower, number.upper, number.start, drive))
+            decisions.append(Decision(label, unit, Interval(number.lower, number.upper), number.start, drive))
 
 
 def _check_held(block: Block, mounts: tuple[Mount, ...]) -> None:

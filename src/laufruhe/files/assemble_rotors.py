@@ -14,7 +14,7 @@ from laufruhe.files.file_models import BalancerShaftTable, CounterweightTable, C
 from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.numerics.turns import as_turn, cis
-from laufruhe.problem.problem import Drive, UnbalanceDecision
+from laufruhe.problem.decision import Decision, Interval, RotorDrive, Sector, Set
 
 _HOW = {"equal": (1.0, False), "opposite": (-1.0, False), "mirrored": (1.0, True), "mirrored opposite": (-1.0, True)}
 
@@ -24,7 +24,7 @@ class RotorList:
     """Rotors and decisions as they are collected from a file."""
 
     rotors: list[Rotor] = field(default_factory=list)
-    decisions: list[UnbalanceDecision] = field(default_factory=list)
+    decisions: list[Decision] = field(default_factory=list)
 
     def add(self, rotor: Rotor, where: str) -> None:
         """A rotor whose name is not yet used."""
@@ -35,10 +35,10 @@ class RotorList:
     def drive(self, rotor: str, source: str, gain: float, mirrored: bool) -> None:
         """Let a rotor follow whatever decides another one."""
         for k, decision in enumerate(self.decisions):
-            for drive in decision.drives:
+            for drive in decision.rotor_drives:
                 if drive.rotor == source:
                     followed = drive.gain.conjugate() if mirrored else drive.gain
-                    new = Drive(rotor, gain * followed, drive.mirrored != mirrored)
+                    new = RotorDrive(rotor, gain * followed, drive.mirrored != mirrored)
                     self.decisions[k] = replace(decision, drives=(*decision.drives, new))
                     break
 
@@ -102,15 +102,13 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
         gain = -pin.reciprocating * cis(as_turn(pin.angle))
         name = f"{table.name}.{number}"
         into.add(Rotor(name, pin.x, -pin.rotating + start * gain, radius=table.radius), f"{where}.name")
-        drives.append(Drive(name, gain))
+        drives.append(RotorDrive(name, gain))
     if isinstance(given, Open) and given.lower < given.upper:
         into.decisions.append(
-            UnbalanceDecision(
+            Decision(
                 f"{table.name}.balance_fraction",
                 "",
-                given.lower,
-                given.upper,
-                (0.0, 0.0),
+                Interval(given.lower, given.upper),
                 complex(start),
                 tuple(drives),
             )
@@ -187,11 +185,13 @@ def _place(
     start = size.start * _direction(start_angle)
     into.add(Rotor(name, x, size.gain * direction * start, shaft, role, table.radius), f"{where}.name")
     if size.open:
-        drive = Drive(name, size.gain * direction)
+        drive = RotorDrive(name, size.gain * direction)
         noun = "mass" if size.unit == "kg" else "unbalance"
-        into.decisions.append(
-            UnbalanceDecision(f"{name}.{noun}", size.unit, size.lower, size.upper, (low, high), start, (drive,))
-        )
+        into.decisions.append(Decision(f"{name}.{noun}", size.unit, _set(size, low, high), start, (drive,)))
+
+
+def _set(size: _Size, low: float, high: float) -> Set:
+    return Interval(size.lower, size.upper, low) if low == high else Sector(size.upper, (low, high))
 
 
 def _direction(angle: float) -> complex:

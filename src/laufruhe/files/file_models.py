@@ -8,12 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from laufruhe.files import fields as f
 from laufruhe.machine.layouts import LAYOUTS
-from laufruhe.problem.measure import MASSES, MEASURES, Subject
-from laufruhe.problem.mount_design import MOUNT_NAMES
+from laufruhe.problem.measure import MEASURES
 
-LOAD_NAMES = tuple(f"{measure} {s}" for s in Subject if s not in MASSES for measure in MEASURES)
-MASS_NAMES = tuple(str(s) for s in MASSES)
-QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": [*LOAD_NAMES, *MASS_NAMES, *MOUNT_NAMES]})]
+QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": list(MEASURES)})]
 Count: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]

@@ -60,7 +60,7 @@ def _check_mounts(problem: Problem, table: FidelityTable) -> None:
         name = f"fidelity.{key}"
         if problem.engine.block is None:
             raise Refused(name, value, "is a choice of elastic mounts", 'leave it out, or add mounts of kind "elastic"')
-        if problem.mount_design.decisions:
+        if problem.mount_decisions:
             raise Refused(name, value, "would change with the mounts that are open", "leave it out, or fix the mounts")
     modes = table.modes
     if modes is not None and table.mounts in ("rigid", "time"):

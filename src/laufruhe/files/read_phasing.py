@@ -311,5 +311,5 @@ def _without(problem: Problem, shafts: Sequence[str]) -> Problem:
         return problem
     gone = {rotor.name for rotor in problem.engine.rotors if rotor.shaft.name in shafts}
     rotors = tuple(rotor for rotor in problem.engine.rotors if rotor.name not in gone)
-    kept = tuple(d for d in problem.decisions if not any(drive.rotor in gone for drive in d.drives))
+    kept = tuple(d for d in problem.decisions if not any(drive.rotor in gone for drive in d.rotor_drives))
     return replace(problem, engine=replace(problem.engine, rotors=rotors), decisions=kept)

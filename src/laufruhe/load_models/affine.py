@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.domain import Domain, domains_of
 from laufruhe.machine import Engine, OperatingPoint, Rotor
-from laufruhe.numerics import mixed_norms
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
-from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_rotor_loads
+from laufruhe.problem.channels import LoadChannel
+from laufruhe.problem.decision import Decision, Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.measure import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Measure, Rows, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ FEASIBLE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class AffineNorm:
-    """N(V0 + B x) with weights of its rows.
+    """N(V0 + B x) on a grid.
 
     Attributes
     ----------
@@ -41,14 +41,14 @@ class AffineNorm:
         V0, shape (k, d).
     slope
         B, shape (k, d, n).
-    weights
-        Shape (k,).
+    grid
+        Weights of the rows, and how they follow each other.
     """
 
     norm: Norm
     constant: Array
     slope: Array
-    weights: Array
+    grid: Grid
 
     def rows(self, x: Array) -> Array:
         """V0 + B x, shape (k, d)."""
@@ -57,7 +57,19 @@ class AffineNorm:
 
     def value(self, x: Array) -> float:
         """The norm at x."""
-        return mixed_norms.value(self.norm, self.weights, self.rows(x))
+        return self.norm.value(self.grid, self.rows(x))
+
+    def subgradient(self, x: Array) -> Array:
+        """Dual rows along the rows at x (P2)."""
+        return self.norm.subgradient(self.grid, self.rows(x))
+
+    def dual_norm(self, z: Array) -> float:
+        """Of dual rows (P3)."""
+        return self.norm.dual_norm(self.grid, z)
+
+    def dual_feasible(self, z: Array) -> Array:
+        """Dual rows brought into the unit ball (P3)."""
+        return self.norm.dual_feasible(self.grid, z)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,27 +156,17 @@ class AffineModel:
         self.problem = problem
         # components that are zero are dropped, unless models are to be added up
         self._keep_all = keep_all
-        self.domains = domains_of(problem.decisions)
-        bare = evaluate(problem, problem.design([0.0] * len(problem.decisions)))
+        self.domains = domains_of(problem.unbalances)
+        bare = evaluate(problem, problem.design([0.0] * len(problem.unbalances), problem.unbalances))
         if problem.fidelity.mounts == "time" and problem.engine.block is not None:
             raise ModelError(NO_MAP)
         mounting = mounting_of(problem.engine, problem.fidelity)
-        changes = [_change(problem, k, direction) for k, d in enumerate(self.domains) for direction in d.directions]
+        changes = [_change(problem, d.decision, direction) for d in self.domains for direction in d.set.directions]
         self.bare, self._changes = bare, changes
         orders = [as_order(abs(r.shaft.ratio)) for rotors in changes for r in rotors]
-        self._slopes = {
-            subject: [
-                [_slope(rotors, point, problem.engine, mounting, subject, problem.fidelity) for rotors in changes]
-                for point in problem.points
-            ]
-            for subject in self._subjects(mounting)
-        }
+        # loads of every column alone, at every operating point
+        self._slopes = [[_loads(rotors, point, problem, mounting) for rotors in changes] for point in problem.points]
         self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
-
-    def _subjects(self, mounting: Mounting | None) -> tuple[Subject, ...]:
-        travels = self.problem.engine.block is not None
-        return (Subject.SHAKING_FORCE, *((Subject.MOUNT_FORCE,) if mounting else ()),
-                *((Subject.MOUNT_TRAVEL,) if mounting and travels else ()))  # fmt: skip
 
     def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
         used = [loads.wrench.reduced(tuple(orders)).base for loads in bare.loads]
@@ -183,39 +185,40 @@ class AffineModel:
         whole cycle (P7).
         """
         problem = self.problem
-        terms = tuple((term.weight, self.norm(term.quantity, samples, averaged)) for term in problem.objective)
-        limits = tuple((limit.maximum, self.norm(limit.quantity, samples, averaged)) for limit in problem.limits)
+        terms = tuple((term.weight, self.norm(term.measure, samples, averaged)) for term in problem.load_terms)
+        limits = tuple((limit.maximum, self.norm(limit.measure, samples, averaged)) for limit in problem.load_limits)
         return AffineProblem(terms, limits, self.domains, samples)
 
     def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
         """Per operating point the wrench of the bare design, and of one unit of every column."""
-        slopes = self._slopes[Subject.SHAKING_FORCE]
-        return [(loads.wrench, tuple(by)) for loads, by in zip(self.bare.loads, slopes, strict=True)]
+        return [
+            (loads.wrench, tuple(each.wrench for each in by))
+            for loads, by in zip(self.bare.loads, self._slopes, strict=True)
+        ]
 
-    def norm(self, quantity: Quantity, samples: int, averaged: bool = False) -> AffineNorm:
-        """A quantity at `samples` steps over the common period, a mean averaged about them where asked."""
-        if quantity.subject in MASSES:
-            bare = mass_rows(quantity, self.bare.engine.rotors)
-            slopes = [mass_rows(quantity, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]
+    def norm(self, measure: Measure, samples: int, averaged: bool = False) -> AffineNorm:
+        """A measure at `samples` steps over the common period, a mean averaged about them where asked."""
+        channel = measure.channel
+        if not isinstance(channel, LoadChannel):
+            bare = mass_rows(measure, self.bare.engine.rotors)
+            slopes = [mass_rows(measure, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]
             return _stacked(bare, slopes, self._keep_all)
-        subject = quantity.subject if quantity.subject in ON_MOUNTS else Subject.SHAKING_FORCE
-        averaged = averaged and quantity.norm is Norm.SUM
-        bare = self._rows(quantity, [loads.signal(quantity.subject) for loads in self.bare.loads], samples, averaged)
-        by_point = self._slopes[subject]
+        averaged = averaged and measure.norm.averages
+        bare = self._rows(measure, self.bare.signals(channel), samples, averaged)
         slopes = [
-            self._rows(quantity, [by_point[p][k] for p in range(len(by_point))], samples, averaged).vectors
+            self._rows(measure, [channel.signal(by[k]) for by in self._slopes], samples, averaged).vectors
             for k in range(len(self._changes))
         ]
         return _stacked(bare, slopes, self._keep_all)
 
-    def _rows(self, quantity: Quantity, signals: Sequence[Spectrum], samples: int, averaged: bool) -> Rows:
+    def _rows(self, measure: Measure, signals: Sequence[Spectrum], samples: int, averaged: bool) -> Rows:
         finest = common_base([self.base, *(signal.base for signal in signals)])
         step = int(self.base / finest)
         period = [Spectrum(self.base, s.rebased(finest).coefficients[::step]) for s in signals]
         if averaged:
             period = [_averaged(signal, samples) for signal in period]
         names = [mount.name for mount in self.problem.engine.mounts]
-        return load_rows(quantity, self.problem.points, period, names, samples)
+        return load_rows(measure, self.problem.points, period, names, samples)
 
 
 def _averaged(signal: Spectrum, samples: int) -> Spectrum:
@@ -225,13 +228,10 @@ def _averaged(signal: Spectrum, samples: int) -> Spectrum:
     return Spectrum(signal.base, c * share.reshape(-1, *(1,) * (c.ndim - 1)))
 
 
-def _change(problem: Problem, k: int, direction: complex) -> tuple[Rotor, ...]:
+def _change(problem: Problem, decision: Decision, direction: complex) -> tuple[Rotor, ...]:
     """The rotors that one unit of one column makes, others left out."""
     by_name = {rotor.name: rotor for rotor in problem.engine.rotors}
-    return tuple(
-        replace(by_name[drive.rotor], unbalance=drive.gain * (direction.conjugate() if drive.mirrored else direction))
-        for drive in problem.decisions[k].drives
-    )
+    return tuple(replace(by_name[d.rotor], unbalance=d.of(direction)) for d in decision.rotor_drives)
 
 
 def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
@@ -240,19 +240,13 @@ def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
     return tuple(replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors)
 
 
-def _slope(
-    rotors: Sequence[Rotor],
-    point: OperatingPoint,
-    engine: Engine,
-    mounting: Mounting | None,
-    subject: Subject,
-    fidelity: Fidelity,
-) -> Spectrum:
-    wrench = added_rotor_loads(rotors, engine, point, fidelity)
-    if subject is Subject.MOUNT_FORCE and mounting is not None:
-        return mounting.forces(wrench, point.speed)
-    travel = travel_of(engine, mounting, wrench, point.speed) if subject is Subject.MOUNT_TRAVEL else None
-    return wrench if travel is None else travel
+def _loads(
+    rotors: Sequence[Rotor], point: OperatingPoint, problem: Problem, mounting: Mounting | None
+) -> PointLoads:  # fmt: skip
+    """What these rotors alone make at an operating point."""
+    wrench = added_rotor_loads(rotors, problem.engine, point, problem.fidelity)
+    forces = mounting.forces(wrench, point.speed) if mounting else None
+    return PointLoads(point, wrench, forces, travel_of(problem.engine, mounting, wrench, point.speed))
 
 
 def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
@@ -261,4 +255,4 @@ def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
     if keep_all or not used.any():
         used[:] = keep_all
         used[:1] = True
-    return AffineNorm(bare.norm, bare.vectors[:, used], np.ascontiguousarray(slope[:, used]), bare.weights)
+    return AffineNorm(bare.norm, bare.vectors[:, used], np.ascontiguousarray(slope[:, used]), bare.grid)

@@ -52,7 +52,7 @@ class Designs:
         for k, domain in enumerate(self.model.domains):
             u = np.asarray(values[:, k])
             if domain.width == 1:
-                features[:, 1 + domain.start] = (u * domain.directions[0].conjugate()).real
+                features[:, 1 + domain.start] = (u * domain.set.directions[0].conjugate()).real
             else:
                 features[:, 1 + domain.start], features[:, 2 + domain.start] = u.real, u.imag
         return self.of_columns(features, threads, cache_bytes)
@@ -99,7 +99,7 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
 
 def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:
     rows = np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
-    weights = norm.weights
+    weights = norm.grid.weights
     if prune:
         rows, weights = _merged(rows, weights)
     return BatchNorm(norm.norm, np.ascontiguousarray(rows), weights)
@@ -123,6 +123,7 @@ def random_decisions(problem: Problem, count: int, seed: int = 0) -> NDArray[np.
     """Decisions spread evenly over their bounds, shape (count, decisions)."""
     rng = np.random.default_rng(seed)
     columns: Sequence[NDArray[np.complex128]] = [
-        rng.uniform(d.lower, d.upper, count) * np.exp(1j * rng.uniform(*d.angle, count)) for d in problem.decisions
+        rng.uniform(d.lower, d.upper, count) * np.exp(1j * rng.uniform(*d.set.angles, count))
+        for d in problem.unbalances
     ]
     return np.stack(columns, axis=1) if columns else np.zeros((count, 0), dtype=complex)

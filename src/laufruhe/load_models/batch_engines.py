@@ -20,7 +20,8 @@ from laufruhe.physics import order_coefficients
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import gas_loads, rotor_loads, unit_star_load
-from laufruhe.problem.measure import Quantity, Subject, load_rows
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Measure, load_rows
 
 Array = NDArray[np.float64]
 
@@ -86,7 +87,7 @@ class EngineFamily:
         If the template is not of that kind.
     """
 
-    def __init__(self, template: Engine, quantity: Quantity, fidelity: Fidelity, gas: GasModel | None = None) -> None:
+    def __init__(self, template: Engine, quantity: Measure, fidelity: Fidelity, gas: GasModel | None = None) -> None:
         self.template, self.fidelity, self.gas = template, fidelity, gas
         first = _alike(template)
         needed = order_coefficients.orders_needed(first.rod_ratio)
@@ -187,9 +188,9 @@ class EngineFamily:
             return force, roll, np.zeros(n)
         return force, roll, order_coefficients.rod_roll_orders(rod_ratio, 0.0, 1.0, n)[1:].imag
 
-    def _batched(self, quantity: Quantity, shapes: list[Spectrum]) -> BatchNorm:
+    def _batched(self, quantity: Measure, shapes: list[Spectrum]) -> BatchNorm:
         engine, samples = self.template, self.fidelity.samples
-        if quantity.subject is Subject.MOUNT_FORCE:
+        if quantity.channel is channels.MOUNT_FORCE:
             maps = rigid_mounting(engine.mounts).maps
             shapes = [Spectrum(s.base, np.einsum("mij,nj->nmi", maps, s.coefficients)) for s in shapes]
         point = (OperatingPoint("all", 1.0),)
@@ -200,7 +201,9 @@ class EngineFamily:
         driven = np.any(stacked != 0.0, axis=(0, 1))
         if not driven.any():
             driven[:1] = True
-        return BatchNorm(quantity.norm, np.ascontiguousarray(stacked[:, :, driven].transpose(2, 0, 1)), rows[0].weights)
+        return BatchNorm(
+            quantity.norm, np.ascontiguousarray(stacked[:, :, driven].transpose(2, 0, 1)), rows[0].grid.weights
+        )
 
 
 def _alike(engine: Engine) -> SliderCrank:

@@ -14,8 +14,9 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_model import Symbols, UnevenModel
 from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import base_of, common_base
-from laufruhe.problem.measure import MASSES, Quantity
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -50,7 +51,7 @@ class Loads(Protocol):
     def wrenches(self, moved: Array) -> list[SymbolicLoads]:
         """Per operating point, times a matrix of shape (6, 6)."""
 
-    def rows(self, quantity: Quantity) -> tuple[Any, Array]:
+    def rows(self, quantity: Measure) -> tuple[Any, Grid]:
         """Vectors whose norm a quantity is that is not one of mounts, shape (k, d), and their weights (P1)."""
 
 
@@ -86,23 +87,21 @@ class FixedThrows:
             total += ca.reshape(ca.DM(flat) @ self._u, 6, count)
         return total
 
-    def rows(self, quantity: Quantity) -> tuple[Any, Array]:
+    def rows(self, quantity: Measure) -> tuple[Any, Grid]:
         """As `AffineModel` has them."""
         affine = self._model.norm(quantity, self._model.full_samples)
         k, d = affine.constant.shape
         rows = ca.MX(ca.DM(affine.constant))
         if len(self._reach):
             rows += ca.reshape(ca.DM(affine.slope.transpose(1, 0, 2).reshape(k * d, -1)) @ self._u, k, d)
-        return rows, affine.weights
+        return rows, affine.grid
 
 
 class MovedThrows:
     """Smooth in throws, bank and split pin as well (S19, S23)."""
 
-    def __init__(
-        self, problem: Problem, fixed: FixedThrows, moves: ThrowMoves, model: UnevenModel, turns: Any, unbalances: Any
-    ) -> None:
-        self._problem, self._fixed, self._moves, self._model = problem, fixed, moves, model
+    def __init__(self, problem: Problem, moves: ThrowMoves, model: UnevenModel, turns: Any, unbalances: Any) -> None:
+        self._problem, self._moves, self._model = problem, moves, model
         self._turns, self._u = turns, unbalances
         self._at = Symbols(*moves.angles(turns), unbalances)
 
@@ -130,9 +129,9 @@ class MovedThrows:
         values = [np.abs(np.array(part, dtype=float)) for pair in drawn for part in sized(*pair)]
         return np.asarray(np.max(values, axis=(0, 1)))
 
-    def rows(self, quantity: Quantity) -> tuple[Any, Array]:
-        """Of masses as with fixed throws, for throws do not change them."""
-        return self._fixed.rows(quantity) if quantity.subject in MASSES else self._model.rows(quantity, self._at)
+    def rows(self, quantity: Measure) -> tuple[Any, Grid]:
+        """As `UnevenModel` has them."""
+        return self._model.rows(quantity, self._at)
 
 
 def _felt(sizes: Array, orders: Array) -> NDArray[np.intp]:

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.mount_symbols import SymbolicResponse, waves
-from laufruhe.problem.measure import Quantity, Subject
+from laufruhe.numerics.norms import Grid
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Measure
 
 Array = NDArray[np.float64]
 
@@ -30,7 +32,7 @@ class PointResponse:
     response: SymbolicResponse
 
 
-def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity: Quantity) -> tuple[Any, Array]:
+def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity: Measure) -> tuple[Any, Grid]:
     """Vectors at samples and their weights, as `load_rows` has them (P1).
 
     Parameters
@@ -42,21 +44,20 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity
 
     Returns
     -------
-    Expression of shape (k, 3), and weights of shape (k,).
+    Expression of shape (k, 3), and where its rows stand.
     """
     chosen = [p for p in points if quantity.points is None or p.name in quantity.points]
-    mounts = [k for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts]
+    mounts = quantity.places(names)
     whole = sum(point.weight for point in chosen)
     blocks: list[Any] = []
     weights: list[float] = []
+    steps = 1
     for point in chosen:
-        signal = point.response.force if quantity.subject is Subject.MOUNT_FORCE else point.response.travel
-        counted = [
-            k for k, order in enumerate(point.orders)
-            if quantity.orders is None or any(abs(order - o) < 5e-4 for o in quantity.orders)
-        ]  # fmt: skip
+        signal = point.response.force if quantity.channel is channels.MOUNT_FORCE else point.response.travel
+        counted = np.flatnonzero(quantity.counted(point.orders)).tolist()
         highest = float(point.orders.max(initial=0.0))
         samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * highest / point.base))
+        steps = samples
         cosine, sine = waves(point.orders[counted].tolist(), point.base, samples)
         values = signal[0][:, counted] @ cosine - signal[1][:, counted] @ sine
         for k in mounts:
@@ -65,4 +66,4 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity
                 rows = rows @ ca.diag(ca.DM(list(quantity.direction_weights)))
             blocks.append(rows)
             weights += [point.weight / whole / len(mounts) / samples] * samples
-    return ca.vertcat(*blocks), np.array(weights)
+    return ca.vertcat(*blocks), Grid(np.array(weights), steps)

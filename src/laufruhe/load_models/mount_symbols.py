@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from laufruhe.machine.block import Block
 from laufruhe.numerics.namespaces import symbols
 from laufruhe.physics.rigid_body import along_axes, carried, point_motion, turned_axes
-from laufruhe.problem.mount_design import DAMPING, LOSS, POSITION, STIFFNESS, TURNED, MountDesign
+from laufruhe.problem.decision import DAMPING, LOSS, POSITION, STIFFNESS, TURNED
+from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -46,14 +47,15 @@ class SymbolicMounts:
     dampers: Any
 
 
-def mount_matrices(design: MountDesign, block: Block) -> Any:
+def mount_matrices(problem: Problem, block: Block) -> Any:
     """A CasADi function from the decisions to the matrices of `SymbolicMounts`, in that order."""
     lib = symbols()
-    decisions = ca.SX.sym("mounts", len(design.decisions))
+    decisions = ca.SX.sym("mounts", len(problem.mount_decisions))
     root = ca.DM(np.linalg.inv(np.linalg.cholesky(block.mass_matrix)))
     totals = [ca.SX(6, 6) for _ in range(3)]
     maps: list[list[Any]] = [[], [], [], []]
-    for numbers in design.numbers_at([decisions[k] for k in range(len(design.decisions))]):
+    found = problem.numbers([decisions[k] for k in range(len(problem.mount_decisions))], problem.mount_decisions)
+    for numbers in found.mounts or problem.mount_numbers:
         axes = turned_axes(lib, numbers[TURNED])
         arm = [p - c for p, c in zip(numbers[POSITION], block.centre_of_gravity, strict=True)]
         motion = ca.SX(point_motion(lib, arm))
@@ -67,9 +69,9 @@ def mount_matrices(design: MountDesign, block: Block) -> Any:
     return ca.Function("mounts", [decisions], [*(root @ total @ root.T for total in totals), *stacked])
 
 
-def symbolic_mounts(design: MountDesign, block: Block, decisions: Any) -> SymbolicMounts:
+def symbolic_mounts(problem: Problem, block: Block, decisions: Any) -> SymbolicMounts:
     """Matrices at symbolic decisions."""
-    return SymbolicMounts(*mount_matrices(design, block)(decisions))
+    return SymbolicMounts(*mount_matrices(problem, block)(decisions))
 
 
 def elimination() -> Any:

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
-from laufruhe.load_models.domain import Domain
 from laufruhe.machine.firing import star_throws
 from laufruhe.machine.layouts import Layout
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.phasing import Candidate, Phasing
-from laufruhe.problem.problem import Problem, UnbalanceDecision
+from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -40,8 +40,8 @@ class StarNorm:
     slope, turns
         B and E, shapes (k, d, n) and (throws, steps, k, d, n); no E where unbalances act
         alike in every star.
-    weights
-        Shape (k,).
+    grid
+        Weights of the rows.
     """
 
     norm: Norm
@@ -49,14 +49,14 @@ class StarNorm:
     moves: Array
     slope: Array
     turns: Array | None
-    weights: Array
+    grid: Grid
 
     def at(self, star: Sequence[int]) -> AffineNorm:
         """The norm of one star."""
         chosen = np.arange(len(star)), np.asarray(star, dtype=np.intp)
         constant = self.constant + self.moves[chosen].sum(axis=0)
         slope = self.slope if self.turns is None else self.slope + self.turns[chosen].sum(axis=0)
-        return AffineNorm(self.norm, constant, slope, self.weights)
+        return AffineNorm(self.norm, constant, slope, self.grid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +155,9 @@ class StarModel:
                 turns[k, p] = norms[number][1].slope - rest.slope
             alike = np.abs(turns).max(initial=0.0) <= _SAME_SLOPE * np.abs(rest.slope).max(initial=0.0)
             norm = StarNorm(
-                all_of.norm, all_of.constant, moves, all_of.slope, None if alike else turns, all_of.weights
+                all_of.norm, all_of.constant, moves, all_of.slope, None if alike else turns, all_of.grid
             )  # fmt: skip
-            out.append((weight, _compressed(norm) if norm.norm is Norm.RMS else norm))
+            out.append((weight, _compressed(norm) if norm.norm.is_euclidean else norm))
         return tuple(out)
 
 
@@ -169,14 +169,17 @@ def _normalised(problem: Problem) -> Problem:
     return replace(problem, decisions=tuple(_upright(decision) for decision in problem.decisions))
 
 
-def _upright(decision: UnbalanceDecision) -> UnbalanceDecision:
-    gain = decision.drives[0].gain
-    if not decision.free_angle or gain == 0.0:
+def _upright(decision: Decision) -> Decision:
+    if not decision.rotor_drives:
+        return decision
+    gain = decision.rotor_drives[0].gain
+    if not decision.set.free_angle or gain == 0.0:
         return decision
     turn = gain / abs(gain)
-    turn = turn.conjugate() if decision.drives[0].mirrored else turn
+    turn = turn.conjugate() if decision.rotor_drives[0].mirrored else turn
     drives = tuple(
-        replace(drive, gain=drive.gain * (turn if drive.mirrored else turn.conjugate())) for drive in decision.drives
+        replace(drive, gain=drive.gain * (turn if drive.mirrored else turn.conjugate()))
+        for drive in decision.rotor_drives
     )
     return replace(decision, drives=drives, start=decision.start * turn)
 
@@ -186,7 +189,7 @@ def _compressed(norm: StarNorm) -> StarNorm:
     k, d = norm.constant.shape
     throws, steps = norm.moves.shape[:2]
     columns = norm.slope.shape[-1]
-    scaled = np.sqrt(norm.weights)[:, None]
+    scaled = np.sqrt(norm.grid.weights)[:, None]
     parts = [
         (norm.constant * scaled).reshape(1, -1),
         (norm.moves * scaled).reshape(throws * steps, -1),
@@ -204,10 +207,10 @@ def _compressed(norm: StarNorm) -> StarNorm:
     if norm.turns is not None:
         turns = np.moveaxis(small[:, cut[2] :].T.reshape(throws, steps, columns, rows, 1), 2, -1)
     return StarNorm(
-        Norm.RMS,
+        norm.norm,
         small[:, :1],
         small[:, 1 : cut[1]].T.reshape(throws, steps, rows, 1),
         small[:, None, cut[1] : cut[2]],
         turns,
-        np.ones(rows),
+        Grid(np.ones(rows), rows),
     )

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 from laufruhe.machine import Engine, Role
 from laufruhe.machine.firing import even_patterns
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.measure import Subject
-from laufruhe.problem.problem import Problem, Term
+from laufruhe.problem.measure import Term
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm
 
 NEGLIGIBLE = 1e-13
@@ -55,21 +56,21 @@ def amplitude_objective(problem: Problem) -> AmplitudeObjective | None:
 
 def _limits_idle(problem: Problem) -> bool:
     """Whether only forces are limited, and met: of even stars the counts on the steps fix them."""
-    forces = all(limit.quantity.subject is Subject.SHAKING_FORCE for limit in problem.limits)
+    forces = all(limit.measure.channel is channels.SHAKING_FORCE for limit in problem.limits)
     if not problem.limits or not forces or problem.phasing is None:
         return not problem.limits
     layout = problem.phasing.layout(*problem.phasing.geometries[0])
     if len(even_patterns(problem.phasing.cycle, layout)) > 1:
         return False
     given = evaluate(problem)
-    return all(given.value(limit.quantity) <= limit.maximum for limit in problem.limits)
+    return all(given.value(limit.measure) <= limit.maximum for limit in problem.limits)
 
 
 def _is_amplitude(term: Term) -> bool:
-    q = term.quantity
-    if q.subject not in (Subject.SHAKING_FORCE, Subject.ROCKING_COUPLE):
+    q = term.measure
+    if q.channel not in (channels.SHAKING_FORCE, channels.ROCKING_COUPLE):
         return False
-    return q.norm is Norm.RMS or (q.orders is not None and len(q.orders) == 1)
+    return q.norm is NORMS["rms"] or (q.orders is not None and len(q.orders) == 1)
 
 
 def _one_throw(engine: Engine) -> Engine | None:
@@ -85,19 +86,19 @@ def _one_throw(engine: Engine) -> Engine | None:
 def _orders(problem: Problem, highest: int) -> list[int]:
     wanted: set[int] = set()
     for term in problem.objective:
-        given = term.quantity.orders
+        given = term.measure.orders
         wanted |= set(range(1, highest)) if given is None else {int(h) for h in given if h == int(h) and h > 0}
     return sorted(wanted)
 
 
 def _factors(term: Term, alone: Evaluation, orders: Sequence[int], x: float) -> AmplitudeTerm:
     """Value of one throw's load of every order; a couple for its lever."""
-    counted = term.quantity.orders
+    counted = term.measure.orders
     values = []
     for h in orders:
         counts = counted is None or any(float(h) == order for order in counted)
-        values.append(alone.value(replace(term.quantity, orders=(float(h),))) if counts else 0.0)
+        values.append(alone.value(replace(term.measure, orders=(float(h),))) if counts else 0.0)
     none = (0.0,) * len(orders)
-    if term.quantity.subject is Subject.SHAKING_FORCE:
+    if term.measure.channel is channels.SHAKING_FORCE:
         return AmplitudeTerm(term.weight, tuple(values), none)
     return AmplitudeTerm(term.weight, none, tuple(v / x for v in values))

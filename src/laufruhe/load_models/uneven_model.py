@@ -17,26 +17,27 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.domain import Domain, domains_of
 from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
 from laufruhe.load_models.mount_symbols import waves
 from laufruhe.load_models.uneven_gas import LEFT_OUT, GasMoments
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, as_order, base_of
 from laufruhe.physics.mount_forces import RigidMounting
 from laufruhe.physics.mounting import mount_maps, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import inertia_coefficients, rotor_wrench
-from laufruhe.problem.measure import MASSES, ON_MOUNTS, Quantity, Subject, counted_rotors, radius_of
+from laufruhe.problem import channels
+from laufruhe.problem.channels import LoadChannel
+from laufruhe.problem.decision import Domain, domains_of
+from laufruhe.problem.measure import Measure, counted_rotors, radius_of
+from laufruhe.problem.phasing import Candidate, Phasing
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.nonlinear import softened_lengths
 
 Array = NDArray[np.float64]
 
 LEAST_SAMPLES = 72
 NEGLIGIBLE = 1e-9
-_PARTS = {Subject.SHAKING_FORCE: slice(0, 3), Subject.ROLL_MOMENT: slice(3, 4), Subject.ROCKING_COUPLE: slice(4, 6)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,74 +77,55 @@ class UnevenModel:
 
     def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int], left_out: float = LEFT_OUT) -> None:
         self.problem, self.layout, self.rides = problem, layout, rides
-        self.domains: tuple[Domain, ...] = domains_of(problem.decisions)
+        self.domains: tuple[Domain, ...] = domains_of(problem.unbalances)
         self._mounting = mounting_of(problem.engine, problem.fidelity)
         self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
         self._gas = GasMoments(problem, left_out)
 
-    def squares(self, quantity: Quantity, at: Symbols) -> Any:
-        """Squares that must all stay under that of a limit: smooth even where the quantity is zero."""
-        if quantity.subject in MASSES or quantity.norm is Norm.SUM:
-            return None
-        if quantity.norm is Norm.RMS:
-            return self._mean_square(quantity, at)
-        rows = [row for point in self._points(quantity) for row in self._vectors(quantity, point, at)]
-        return ca.vertcat(*(ca.sum2(row * row) for row in rows))
-
-    def _points(self, quantity: Quantity) -> list[OperatingPoint]:
+    def _points(self, quantity: Measure) -> list[OperatingPoint]:
         return [p for p in self.problem.points if quantity.points is None or p.name in quantity.points]
 
-    def _mean_square(self, quantity: Quantity, at: Symbols) -> Any:
-        """By Parseval: no angles are needed."""
-        chosen = self._points(quantity)
+    def rows(self, measure: Measure, at: Symbols) -> tuple[Any, Grid]:
+        """Vectors whose norm a measure is, and where they stand (P1).
+
+        Of a norm that knows nothing but squares these are the orders' own (Parseval); of
+        others the values at angles over a period.
+        """
+        if measure.is_mass:
+            counted = counted_rotors(measure, self.problem.engine.rotors)
+            rows = [(self._unbalance(r, at) / radius_of(r)).T for r in counted]
+            return ca.vertcat(*rows), Grid(np.ones(len(rows)), 1)
+        chosen = self._points(measure)
         whole = sum(point.weight for point in chosen)
-        total = 0.0
+        blocks: list[Any] = []
+        weights: list[Array] = []
         for point in chosen:
-            for h, mounts in self._signal(quantity, point, at):
-                half = 1.0 if h == 0.0 else 0.5
-                total = total + point.weight / whole * half * sum(ca.sumsqr(c) for c in mounts) / len(mounts)
-        return total
+            share = point.weight / whole
+            if measure.norm.is_euclidean:
+                for h, places in self._signal(measure, point, at):
+                    half = 1.0 if h == 0.0 else 0.5
+                    blocks += [c.T for c in places]
+                    weights.append(np.full(2 * len(places), share * half / len(places)))
+            else:
+                found = self._vectors(measure, point, at)
+                blocks += found
+                weights.append(np.full(len(found) * found[0].shape[0], share / len(found) / found[0].shape[0]))
+        return ca.vertcat(*blocks), Grid(np.concatenate(weights), blocks[0].shape[0])
 
-    def norm(self, quantity: Quantity, at: Symbols, softness: Any) -> Any:
-        """A quantity as one smooth expression; `softness` in its own unit (N3)."""
-        if quantity.subject in MASSES:
-            rows = [self._unbalance(r, at) / radius_of(r) for r in counted_rotors(quantity, self.problem.engine.rotors)]
-            return ca.sum1(softened_lengths(ca.vertcat(*(row.T for row in rows)), softness))
-        if quantity.norm is Norm.RMS:
-            return ca.sqrt(self._mean_square(quantity, at) + softness**2) - softness
-        chosen = self._points(quantity)
-        whole = sum(point.weight for point in chosen)
-        parts = [(point.weight / whole, self._vectors(quantity, point, at)) for point in chosen]
-        lengths = [(share, softened_lengths(rows, softness)) for share, vectors in parts for rows in vectors]
-        if quantity.norm is Norm.SUM:
-            return sum(share * ca.sum1(v) / v.numel() for share, v in lengths) / len(parts[0][1])
-        # the largest of many, smooth from above by less than the softness times their logarithm
-        stacked = ca.vertcat(*(v for _, v in lengths))
-        top = ca.mmax(stacked)
-        return top + softness * ca.log(ca.sum1(ca.exp((stacked - top) / softness)))
-
-    def rows(self, quantity: Quantity, at: Symbols) -> tuple[Any, Array]:
-        """Vectors at angles over a period whose norm a load on the block is, and their weights (P1)."""
-        chosen = self._points(quantity)
-        whole = sum(point.weight for point in chosen)
-        blocks = [self._vectors(quantity, p, at)[0] for p in chosen]
-        weights = [np.full(b.shape[0], p.weight / whole / b.shape[0]) for p, b in zip(chosen, blocks, strict=True)]
-        return ca.vertcat(*blocks), np.concatenate(weights)
-
-    def _vectors(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[Any]:
+    def _vectors(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Any]:
         """Values at equal steps of a period, shape (samples, d), of each mount or of the block."""
-        if quantity.subject is Subject.MOUNT_FORCE and isinstance(self._mounting, RigidMounting):
+        if quantity.channel is channels.MOUNT_FORCE and isinstance(self._mounting, RigidMounting):
             # one map for all orders: the wrench alone is sampled
             values = _sampled(self._counted(quantity, point, at))
             return [values @ ca.DM(m.real).T for m in self._maps(quantity, 0.0, point)]
         signal = self._signal(quantity, point, at)
         return [_sampled([(h, parts[m]) for h, parts in signal]) for m in range(len(signal[0][1]))]
 
-    def _signal(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[tuple[float, list[Any]]]:
+    def _signal(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[tuple[float, list[Any]]]:
         """Per order, the vectors (re, im), shape (d, 2), of each mount or of the block."""
         counted = self._counted(quantity, point, at)
-        if quantity.subject not in ON_MOUNTS:
-            return [(h, [wrench[_PARTS[quantity.subject], :]]) for h, wrench in counted]
+        if isinstance(quantity.channel, LoadChannel) and quantity.channel.part is not None:
+            return [(h, [wrench[quantity.channel.part, :]]) for h, wrench in counted]
         out = []
         for h, wrench in counted:
             turned = ca.horzcat(-wrench[:, 1], wrench[:, 0])
@@ -151,28 +133,25 @@ class UnevenModel:
             out.append((h, [ca.DM(m.real) @ wrench + ca.DM(m.imag) @ turned for m in maps]))
         return out
 
-    def _counted(self, quantity: Quantity, point: OperatingPoint, at: Symbols) -> list[tuple[float, Any]]:
+    def _counted(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[tuple[float, Any]]:
         """Wrench coefficients of the orders that count."""
         # a block on soft mounts feels the first orders of its gas alone
-        gain = self._gain(quantity, point) if quantity.subject in ON_MOUNTS else None
+        gain = self._gain(quantity, point) if quantity.on_mounts else None
         found = sorted(self.wrench(point, at, gain).items())
-        counted = [(h, wrench) for h, wrench in found if quantity.orders is None or h in quantity.orders]
+        counted = [(h, wrench) for h, wrench in found if quantity.counted([h])[0]]
         return counted or [(1.0, ca.DM.zeros(6, 2))]
 
-    def _maps(self, quantity: Quantity, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
+    def _maps(self, quantity: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
         """Force per wrench of every mount that counts, its directions weighted."""
         weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
-        names = [mount.name for mount in self.problem.engine.mounts]
         every = self._map(quantity, order, point.speed)
-        return [
-            weights @ every[k] for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts
-        ]
+        return [weights @ every[k] for k in quantity.places([mount.name for mount in self.problem.engine.mounts])]
 
-    def _map(self, quantity: Quantity, order: float, speed: float) -> NDArray[np.complex128]:
+    def _map(self, quantity: Measure, order: float, speed: float) -> NDArray[np.complex128]:
         """Forces or travels of all mounts per wrench, shape (mounts, 3, 6)."""
         if self._mounting is None:
             raise ValueError("an engine without mounts has no mount forces")
-        if quantity.subject is Subject.MOUNT_FORCE:
+        if quantity.channel is channels.MOUNT_FORCE:
             return mount_maps(self._mounting, order, speed)
         base = as_order(order)
         units = np.stack([np.zeros((6, 6)), np.eye(6)]).astype(complex)
@@ -180,7 +159,7 @@ class UnevenModel:
         travels = [travel_of(self.problem.engine, self._mounting, unit, speed) for unit in spectra]
         return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
 
-    def _gain(self, quantity: Quantity, point: OperatingPoint) -> Callable[[float], float] | None:
+    def _gain(self, quantity: Measure, point: OperatingPoint) -> Callable[[float], float] | None:
         """How much of a roll moment of an order mounts feel; None where that is the same for all."""
         if isinstance(self._mounting, RigidMounting):
             return None
@@ -245,17 +224,16 @@ class UnevenModel:
         real: Any = rotor.unbalance.real
         imaginary: Any = rotor.unbalance.imag
         for domain in self.domains:
-            for drive in domain.decision.drives:
+            for drive in domain.decision.rotor_drives:
                 if drive.rotor != rotor.name:
                     continue
                 columns = at.unbalances[domain.columns]
-                for j, direction in enumerate(domain.directions):
-                    d = drive.gain * (direction.conjugate() if drive.mirrored else direction)
+                for j, direction in enumerate(domain.set.directions):
+                    d = drive.of(direction)
                     real = real + d.real * columns[j]
                     imaginary = imaginary + d.imag * columns[j]
                 # the rotor stands at the decision's start in the design as given
-                start = domain.decision.start
-                given = drive.gain * (start.conjugate() if drive.mirrored else start)
+                given = drive.of(domain.decision.start)
                 real, imaginary = real - given.real, imaginary - given.imag
         if rotor.name not in self.rides:
             return ca.vertcat(real, imaginary)
@@ -289,3 +267,23 @@ def _sampled(signal: Sequence[tuple[float, Any]]) -> Any:
     cosine, sine = waves(orders, base, samples)
     real, imaginary = (ca.horzcat(*(c[:, side] for _, c in signal)) for side in (0, 1))
     return (real @ cosine - imaginary @ sine).T
+
+
+def rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
+    """The throw that each rotor turns with: found by moving one throw at a time."""
+    out = {}
+    still = replace(candidate, firing_order=None, without_gas=True)
+    before = _rotor_states(phasing.realise(still))
+    for k in range(len(candidate.throws)):
+        throws = tuple(angle + (0.1 if j == k else 0.0) for j, angle in enumerate(candidate.throws))
+        after = _rotor_states(phasing.realise(replace(still, throws=throws)))
+        out.update({name: k for name, state in after.items() if state != before[name]})
+    return out
+
+
+def _rotor_states(problem: Problem) -> dict[str, tuple[complex, ...]]:
+    gains: dict[str, list[complex]] = {rotor.name: [] for rotor in problem.engine.rotors}
+    for decision in problem.decisions:
+        for drive in decision.rotor_drives:
+            gains[drive.rotor].append(drive.gain)
+    return {rotor.name: (rotor.unbalance, *gains[rotor.name]) for rotor in problem.engine.rotors}

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import Norm
 
 Array = NDArray[np.float64]
 
@@ -106,13 +106,7 @@ class BatchNorm:
 
     def _together(self, lengths: Array) -> Array:
         """One number for each design."""
-        if self.norm is Norm.MAXIMUM:
-            return np.asarray(lengths.max(axis=-1))
-        if self.norm is Norm.SUM:
-            total: Array = np.dot(lengths, self.weights)
-            return total
-        squares: Array = np.dot(np.multiply(lengths, lengths, out=lengths), self.weights)
-        return np.sqrt(squares)
+        return self.norm.of_lengths(lengths, self.weights)
 
     @property
     def operations(self) -> int:

@@ -31,6 +31,11 @@ def as_order(order: float) -> Fraction:
     return Fraction(order).limit_denominator(MAX_ORDER_DENOMINATOR)
 
 
+def same_order(orders: NDArray[np.float64], order: float) -> NDArray[np.bool_]:
+    """Which of these are one and the same order: they are told apart to a thousandth."""
+    return np.asarray(np.round(orders * MAX_ORDER_DENOMINATOR) == np.round(order * MAX_ORDER_DENOMINATOR))
+
+
 @dataclass(frozen=True, eq=False)
 class Spectrum:
     """f(phi) = Re sum_j c_j e^{i j b phi}, b the lowest order (C8).
@@ -153,3 +158,20 @@ def spectrum_of(samples: NDArray[np.float64], base: Fraction) -> Spectrum:
     if count % 2 == 0:
         coefficients[-1] /= 2.0
     return Spectrum(base, coefficients)
+
+
+def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Largest magnitude of a vector that turns on its ellipse, Re c e^{i h phi} (M5).
+
+    Parameters
+    ----------
+    coefficient
+        Shape (..., components).
+
+    Returns
+    -------
+    Shape (...): the semi-major axis.
+    """
+    total = np.sum(np.abs(coefficient) ** 2, axis=-1)
+    alternating = np.abs(np.sum(coefficient**2, axis=-1))
+    return np.asarray(np.sqrt(0.5 * (total + alternating)))

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 
 from laufruhe.plots.style import FAINT, VERMILION, entry
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of
-from laufruhe.problem.mount_design import MountLimit, MountMeasure
+from laufruhe.problem.channels import Channel
+from laufruhe.problem.measure import Limit
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
@@ -42,9 +43,9 @@ def order_entries(facts: MountingFacts, colour: str) -> list[Artist]:
     return [entry(f"order {o:g}", color=colour, linestyle=STYLES[k]) for k, o in enumerate(facts.orders)]
 
 
-def limits_on(result: Result, measure: MountMeasure) -> list[MountLimit]:
-    """Limits of the problem on one measure of the mounts."""
-    return [limit for limit in result.problem.mount_design.limits if limit.quantity.measure is measure]
+def limits_on(result: Result, channel: Channel) -> list[Limit]:
+    """Limits of the problem on one channel."""
+    return [limit for limit in result.problem.mount_limits if limit.measure.channel is channel]
 
 
 def mark_points(axes: Axes, result: Result, share: float) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.metrics import order_amplitude
-from laufruhe.problem.evaluation import Evaluation, PointLoads
-from laufruhe.problem.problem import Limit, Problem
+from laufruhe.numerics.spectrum import Spectrum, order_amplitude
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Limit
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.mount_result import mount_limits
 from laufruhe.solvers.ranking import PhasingResult
 from laufruhe.solvers.result import LimitValue, Result
@@ -60,9 +61,9 @@ def _limits_at(problem: Problem, evaluation: Evaluation) -> tuple[LimitValue, ..
 
 
 def _stated(limit: Limit, evaluation: Evaluation) -> LimitValue:
-    value = evaluation.value(limit.quantity)
+    value = evaluation.value(limit.measure)
     active = value >= limit.maximum * (1.0 - 1e-5)
-    return LimitValue(limit.name, value, limit.maximum, limit.quantity.unit, active, 0.0)
+    return LimitValue(limit.name, value, limit.maximum, limit.measure.unit, active, 0.0)
 
 
 def is_met(limit: LimitValue) -> bool:

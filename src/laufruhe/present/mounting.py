@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import (
     Modes,
@@ -17,8 +18,8 @@ from laufruhe.physics.modes import (
     weight_wrench,
 )
 from laufruhe.present.measures import has_mounts
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.mount_design import mounting_in, sag_of
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -77,7 +78,7 @@ def facts_of(evaluation: Evaluation) -> MountingFacts:
         modes=mounting.modes,
         excited=tuple(excited),
         orders=main_orders(evaluation, mounting),
-        sag=sag_of(mounting),
+        sag=mount_numbers.sag(mounting),
         mount_sag=np.asarray(-(mounting.motions @ weight)[:, 2]),
         torque_travel=float(max(travels, default=0.0)),
         torque_roll_axis=torque_roll_axis(mounting.block),

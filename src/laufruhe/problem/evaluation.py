@@ -13,48 +13,21 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
-from laufruhe.numerics.mixed_norms import Norm, lengths
+from laufruhe.numerics.norms import NORMS, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.problem.measure import MASSES, ON_MOUNTS, Quantity, Rows, Subject, load_rows, mass_rows
+from laufruhe.problem.channels import LoadChannel, MountChannel
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Limit, Measure, Rows, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
-PEAK_REFINEMENT = 8
-"""Times as many samples as are asked for, among which maxima are sought (M6)."""
-
-
-@dataclass(frozen=True, eq=False)
-class PointLoads:
-    """Loads at one operating point.
-
-    Attributes
-    ----------
-    wrench
-        On the block, shape (n, 6) (C7).
-    mount_forces
-        Of the engine on its mounts, shape (n, mounts, 3); None without mounts.
-    mount_travel
-        Displacement of the engine at them, shape (n, mounts, 3) [m]; None where rigid.
-    """
-
-    point: OperatingPoint
-    wrench: Spectrum
-    mount_forces: Spectrum | None
-    mount_travel: Spectrum | None = None
-
-    def signal(self, subject: Subject) -> Spectrum:
-        """The signal that a load is measured on."""
-        if subject not in ON_MOUNTS:
-            return self.wrench
-        signal = self.mount_forces if subject is Subject.MOUNT_FORCE else self.mount_travel
-        if signal is None:
-            raise ValueError(f"this mounting has no {subject}")
-        return signal
+BETWEEN = NORMS["maximum"].refinement
+"""Times as many samples as are asked for, among which maxima of mounts are sought (M6)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,27 +59,57 @@ class Evaluation:
         """In the order of the engine."""
         return [mount.name for mount in self.engine.mounts]
 
-    def rows(self, quantity: Quantity, samples: int | None = None) -> Rows:
-        """Rows whose norm a quantity is, over the whole cycle."""
-        if quantity.subject in MASSES:
-            return mass_rows(quantity, self.engine.rotors)
-        signals = [loads.signal(quantity.subject) for loads in self.loads]
+    def rows(self, measure: Measure, samples: int | None = None) -> Rows:
+        """Rows whose norm a measure is, over the whole cycle."""
+        if not isinstance(measure.channel, LoadChannel):
+            return mass_rows(measure, self.engine.rotors)
         return load_rows(
-            quantity,
+            measure,
             [loads.point for loads in self.loads],
-            over(self.engine.cycle.base_order, signals),
+            over(self.engine.cycle.base_order, self.signals(measure.channel)),
             self.mount_names,
             samples or self.samples,
         )
 
-    def value(self, quantity: Quantity) -> float:
-        """A quantity of this design [SI]; a maximum is sought between the samples too. Infinite on a resonance."""
-        finer = PEAK_REFINEMENT if quantity.norm is Norm.MAXIMUM else 1
-        if not self.resonance:
-            return self.rows(quantity, finer * self.samples).value
-        with np.errstate(invalid="ignore"):
-            value = self.rows(quantity, finer * self.samples).value
-        return value if math.isfinite(value) else math.inf
+    def signals(self, channel: LoadChannel) -> list[Spectrum]:
+        """What a channel measures at every operating point, shape (n, places, d)."""
+        return [channel.signal(loads) for loads in self.loads]
+
+    def values(self, measure: Measure) -> Sequence[float]:
+        """All numbers that a measure has of this design [SI]; the first one is its value."""
+        if isinstance(measure.channel, MountChannel):
+            return measure.channel.values(measure, self)
+        finer = 1 if measure.is_mass else measure.norm.refinement
+        with np.errstate(invalid="ignore" if self.resonance else "warn"):
+            value = self.rows(measure, finer * self.samples).value
+        return (value if math.isfinite(value) else math.inf,) if self.resonance else (value,)
+
+    def value(self, measure: Measure) -> float:
+        """A measure of this design [SI]; a maximum is sought between the samples too. Infinite on a resonance."""
+        return self.values(measure)[0]
+
+    def standing(self, limit: Limit) -> Standing:
+        """How this design stands to a limit (E15)."""
+        pairs = ((value, *limit.room(value)) for value in self.values(limit.measure))
+        value, room, edge, side = min(pairs, key=lambda found: found[1])
+        return Standing(value, edge, side, -room)
+
+    def excess(self, limits: Sequence[Limit]) -> float:
+        """Largest relative excess over a limit, negative where all have room; zero without limits."""
+        return max((self.standing(limit).excess for limit in limits), default=0.0)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A measured value, the side of its limit that it is nearest to breaking, or breaks, and by what share.
+
+    Of several values, as natural frequencies, it is the one with the least room.
+    """
+
+    value: float
+    edge: float
+    side: str
+    excess: float
 
 
 def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
@@ -171,7 +174,7 @@ def _on_mounts(
 
 def objective_value(problem: Problem, evaluation: Evaluation) -> float:
     """The weighted sum that the problem minimises."""
-    return sum(term.weight * evaluation.value(term.quantity) for term in problem.objective)
+    return sum(term.weight * evaluation.value(term.measure) for term in problem.objective)
 
 
 def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
@@ -187,8 +190,8 @@ def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
     forces = evaluation.loads[k].mount_forces
     if forces is not None and not np.all(np.isfinite(forces.coefficients)):
         return [CycleMeasures(math.inf, math.inf, math.inf)] * len(evaluation.engine.mounts)
-    fine = _one_period(evaluation, k, PEAK_REFINEMENT)
-    coarse = fine[::PEAK_REFINEMENT]
+    fine = _one_period(evaluation, k, BETWEEN)
+    coarse = fine[::BETWEEN]
     most = lengths(fine).max(axis=0)
     return [replace(cycle_measures(coarse[:, m]), max=float(most[m])) for m in range(fine.shape[1])]
 

@@ -1,101 +1,69 @@
-"""Quantities that a problem minimises or limits: a measure of a load, or a mass.
+"""Measures: what a problem minimises and limits, a norm of a channel (P1).
 
-Every one is a norm of rows that are affine in the unbalances (P1), so the same few
-lines evaluate it, optimise it and prove it.
+Objective and limits are the same thing. A measure of loads or masses is a norm of rows
+that are affine in the unbalances, so the same few lines evaluate it, optimise it and
+prove it.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import OperatingPoint, Role, Rotor
-from laufruhe.numerics import mixed_norms
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.machine import OperatingPoint, Rotor
+from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
+from laufruhe.numerics.spectrum import Spectrum, same_order
+from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel, MountChannel
 
 Array = NDArray[np.float64]
 
 
-class Subject(StrEnum):
-    """What is measured."""
-
-    MOUNT_FORCE = "mount force"
-    MOUNT_TRAVEL = "mount travel"
-    SHAKING_FORCE = "shaking force"
-    ROCKING_COUPLE = "rocking couple"
-    ROLL_MOMENT = "roll moment"
-    COUNTERWEIGHT_MASS = "counterweight mass"
-    BALANCER_MASS = "balancer mass"
-    ADDED_MASS = "added mass"
-
-    @property
-    def unit(self) -> str:
-        """SI unit."""
-        if self in MASSES:
-            return "kg"
-        if self is Subject.MOUNT_TRAVEL:
-            return "m"
-        return "N" if self in (Subject.MOUNT_FORCE, Subject.SHAKING_FORCE) else "N m"
-
-
-MASSES: Mapping[Subject, tuple[Role, ...]] = {
-    Subject.COUNTERWEIGHT_MASS: (Role.COUNTERWEIGHT,),
-    Subject.BALANCER_MASS: (Role.BALANCER,),
-    Subject.ADDED_MASS: (Role.COUNTERWEIGHT, Role.BALANCER),
-}
-ON_MOUNTS = (Subject.MOUNT_FORCE, Subject.MOUNT_TRAVEL)
-COMPONENTS: Mapping[Subject, slice] = {
-    Subject.SHAKING_FORCE: slice(0, 3),
-    Subject.ROLL_MOMENT: slice(3, 4),
-    Subject.ROCKING_COUPLE: slice(4, 6),
-}
-# orders are told apart to a thousandth
-_PER_ORDER = 1000
-MEASURES: Mapping[str, Norm] = {"mean": Norm.SUM, "maximum": Norm.MAXIMUM, "rms": Norm.RMS}
-
-
 @dataclass(frozen=True)
-class Quantity:
+class Measure:
     """One number of a design.
 
     Attributes
     ----------
-    subject
+    channel
         What is measured.
     norm
-        How it is put together over angle, mounts and operating points: the mean over
-        all, the largest, or the root mean square over all.
+        How a load is put together over angle, places and operating points: the mean
+        over all, the largest, or the root mean square over all.
     mounts, points, rotors
         Names of those that count; all when None.
     orders
         Orders of crank speed that count; all when None.
     direction_weights
         Factors on the components of a force before its length is taken.
+    motions
+        That are to have a mode of their own; all when None.
+    frequency
+        Natural frequency about the torque-roll axis that is wanted [Hz].
     """
 
-    subject: Subject
-    norm: Norm
+    channel: Channel
+    norm: Norm = MEAN
     mounts: tuple[str, ...] | None = None
     points: tuple[str, ...] | None = None
     rotors: tuple[str, ...] | None = None
     orders: tuple[float, ...] | None = None
     direction_weights: tuple[float, float, float] | None = None
+    motions: tuple[str, ...] | None = None
+    frequency: float = 0.0
 
     @property
     def name(self) -> str:
         """As a report prints it."""
-        if self.subject in MASSES:
-            return str(self.subject)
-        measure = next(text for text, norm in MEASURES.items() if norm is self.norm)
-        text = f"{measure} {self.subject}"
+        text = f"{self.norm.name} {self.channel}" if self.is_load else str(self.channel)
         if self.orders is not None:
             text += " of order " + ", ".join(f"{order:g}" for order in self.orders)
+        if self.motions is not None:
+            text += " of " + ", ".join(self.motions)
         if self.mounts is not None:
             text += " on " + ", ".join(self.mounts)
         if self.points is not None:
@@ -105,62 +73,118 @@ class Quantity:
     @property
     def unit(self) -> str:
         """SI unit."""
-        return self.subject.unit
+        return self.channel.unit
+
+    @property
+    def is_load(self) -> bool:
+        """Whether it is of a signal over the cycle."""
+        return isinstance(self.channel, LoadChannel)
+
+    @property
+    def is_mass(self) -> bool:
+        """Whether it adds up masses."""
+        return isinstance(self.channel, MassChannel)
+
+    @property
+    def is_mounting(self) -> bool:
+        """Whether it is a number of a block on its mounts and no norm."""
+        return isinstance(self.channel, MountChannel)
+
+    @property
+    def on_mounts(self) -> bool:
+        """Whether it is of a signal at the mounts."""
+        return isinstance(self.channel, LoadChannel) and self.channel.part is None
+
+    @property
+    def feels_gas(self) -> bool:
+        """Whether gas loads it."""
+        return isinstance(self.channel, LoadChannel) and self.channel.feels_gas
+
+    def counts_point(self, point: OperatingPoint) -> bool:
+        """Whether an operating point counts."""
+        return self.points is None or point.name in self.points
 
     def shares(self, points: Sequence[OperatingPoint]) -> Array:
         """Weight of every operating point, shape (points,); zero where it does not count, one in all."""
-        weights = np.array([p.weight if self.points is None or p.name in self.points else 0.0 for p in points])
+        weights = np.array([p.weight if self.counts_point(p) else 0.0 for p in points])
         return np.asarray(weights / weights.sum())
 
-    def counted(self, orders: Array) -> NDArray[np.bool_]:
+    def counted(self, orders: Sequence[float] | Array) -> NDArray[np.bool_]:
         """Which orders of crank speed count, shape of `orders`."""
+        found = np.asarray(orders, dtype=float)
         if self.orders is None:
-            return np.ones(np.shape(orders), dtype=bool)
-        return np.isin(np.round(orders * _PER_ORDER), np.round(np.array(self.orders) * _PER_ORDER))
+            return np.ones(found.shape, dtype=bool)
+        return np.asarray(np.any([same_order(found, order) for order in self.orders], axis=0)).reshape(found.shape)
+
+    def places(self, mount_names: Sequence[str]) -> list[int]:
+        """Of the mounts that count."""
+        return [k for k, name in enumerate(mount_names) if self.mounts is None or name in self.mounts]
 
 
-MEAN_MOUNT_FORCE = Quantity(Subject.MOUNT_FORCE, Norm.SUM)
+@dataclass(frozen=True)
+class Term:
+    """One weighted part of the objective."""
+
+    measure: Measure
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Bounds of a measure [SI]; `outside` keeps every value out of a band."""
+
+    name: str
+    measure: Measure
+    maximum: float = math.inf
+    minimum: float = -math.inf
+    outside: tuple[float, float] | None = None
+
+    def room(self, value: float) -> tuple[float, float, str]:
+        """Relative distance inside the nearest side, negative outside; that side, and its sense (E15)."""
+        sides = []
+        if self.minimum > -math.inf:
+            sides.append((value - self.minimum, self.minimum, "at least"))
+        if self.maximum < math.inf:
+            sides.append((self.maximum - value, self.maximum, "at most"))
+        if self.outside is not None:
+            low, high = self.outside
+            sides.append(max((low - value, low, "at most"), (value - high, high, "at least")))
+        return min(((room / (abs(edge) or 1.0), edge, side) for room, edge, side in sides), default=(math.inf, 0.0, ""))
+
+
+MEAN_MOUNT_FORCE = Measure(MOUNT_FORCE)
+
+MEASURES: Mapping[str, tuple[Channel, Norm]] = {
+    **{f"{norm} {c}": (c, NORMS[norm]) for c in CHANNELS.values() if isinstance(c, LoadChannel) for norm in NORMS},
+    **{name: (channel, MEAN) for name, channel in CHANNELS.items() if not isinstance(channel, LoadChannel)},
+}
+"""Every measure by the name that files and reports call it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The vectors whose norm a quantity is (P1).
-
-    Attributes
-    ----------
-    vectors
-        Shape (k, d).
-    weights
-        Shape (k,).
-    """
+    """The vectors whose norm a measure is (P1), shape (k, d), and where they stand."""
 
     norm: Norm
     vectors: Array
-    weights: Array
+    grid: Grid
 
     @property
     def value(self) -> float:
-        """The quantity [SI]."""
-        return mixed_norms.value(self.norm, self.weights, self.vectors)
+        """The measure [SI]."""
+        return self.norm.value(self.grid, self.vectors)
 
 
 def load_rows(
-    quantity: Quantity,
-    points: Sequence[OperatingPoint],
-    signals: Sequence[Spectrum],
-    mount_names: Sequence[str],
+    measure: Measure, points: Sequence[OperatingPoint], signals: Sequence[Spectrum], mount_names: Sequence[str],
     samples: int,
-) -> Rows:
+) -> Rows:  # fmt: skip
     """Rows of a load at equal steps of its period.
 
     Parameters
     ----------
-    quantity
-        Of a load.
-    points
-        Operating points, in the order of `signals`.
     signals
-        Per point, mount forces or travels (n, mounts, 3) or the wrench (n, 6), all of one base.
+        Per point what the channel measures, shape (n, places, d), all of one base.
     mount_names
         In the order of the second axis.
     samples
@@ -168,46 +192,45 @@ def load_rows(
 
     Returns
     -------
-    Rows of (points, mounts, samples) in that order; weights add up to one.
+    Rows of (points, places, samples) in that order; weights add up to one.
     """
     blocks, weights = [], []
-    for signal, share in zip(signals, quantity.shares(points), strict=True):
+    for signal, share in zip(signals, measure.shares(points), strict=True):
         if share == 0.0:
             continue
-        values = selected(quantity, signal, mount_names).sample(samples)
+        values = selected(measure, signal, mount_names).sample(samples)
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
         blocks.append(rows)
         weights.append(np.full(len(rows), share / len(rows)))
-    return Rows(quantity.norm, np.concatenate(blocks), np.concatenate(weights))
+    return Rows(measure.norm, np.concatenate(blocks), Grid(np.concatenate(weights), samples))
 
 
-def selected(quantity: Quantity, signal: Spectrum, mount_names: Sequence[str]) -> Spectrum:
-    """The components, mounts and orders that count, shape (n, mounts or 1, d)."""
+def selected(measure: Measure, signal: Spectrum, mount_names: Sequence[str]) -> Spectrum:
+    """The places and orders of a signal (n, places, d) that count, its directions weighted."""
     c = signal.coefficients
-    if quantity.subject in ON_MOUNTS:
-        if quantity.mounts is not None:
-            c = c[:, [mount_names.index(name) for name in quantity.mounts], :]
-        if quantity.direction_weights is not None:
-            c = c * np.array(quantity.direction_weights)
-    else:
-        c = c[:, None, COMPONENTS[quantity.subject]]
-    if quantity.orders is not None:
-        c = np.where(quantity.counted(signal.orders)[:, None, None], c, 0.0)
+    if measure.mounts is not None:
+        c = c[:, measure.places(mount_names), :]
+    if measure.direction_weights is not None:
+        c = c * np.array(measure.direction_weights)
+    if measure.orders is not None:
+        c = np.where(measure.counted(signal.orders)[:, None, None], c, 0.0)
     return Spectrum(signal.base, c)
 
 
-def counted_rotors(quantity: Quantity, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
-    """The rotors whose masses a mass quantity adds up."""
-    roles = MASSES[quantity.subject]
-    return tuple(r for r in rotors if (r.role in roles if quantity.rotors is None else r.name in quantity.rotors))
+def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
+    """The rotors whose masses a measure adds up."""
+    if not isinstance(measure.channel, MassChannel):
+        raise TypeError(f"{measure.name} is no mass")
+    roles = measure.channel.roles
+    return tuple(r for r in rotors if (r.role in roles if measure.rotors is None else r.name in measure.rotors))
 
 
-def mass_rows(quantity: Quantity, rotors: Sequence[Rotor]) -> Rows:
+def mass_rows(measure: Measure, rotors: Sequence[Rotor]) -> Rows:
     """Rows U / radius of the counted rotors, shape (rotors, 2) [kg]."""
-    counted = counted_rotors(quantity, rotors)
+    counted = counted_rotors(measure, rotors)
     vectors = np.array([[r.unbalance.real, r.unbalance.imag] for r in counted]).reshape(-1, 2)
     radii = np.array([radius_of(r) for r in counted]).reshape(-1, 1)
-    return Rows(Norm.SUM, vectors / radii, np.ones(len(counted)))
+    return Rows(MEAN, vectors / radii, Grid(np.ones(len(counted)), 1))
 
 
 def radius_of(rotor: Rotor) -> float:

@@ -9,9 +9,9 @@ import numpy as np
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.problem.evaluation import Evaluation, PointLoads, evaluate
-from laufruhe.problem.mount_design import mounting_in
-from laufruhe.problem.mount_values import whole_objective
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
 
 # of the way between the bounds of what is open: places that no two resonances share
@@ -29,7 +29,7 @@ def evaluate_start(problem: Problem) -> Evaluation:
     try:
         return evaluate(problem)
     except ResonanceError:
-        if not problem.mount_design.decisions:
+        if not problem.mount_decisions:
             raise
     engine, mounting = problem.engine, mounting_in(problem.engine)
     loads, words = [], ""
@@ -56,10 +56,10 @@ def off_resonance(problem: Problem) -> Problem:
     """
     if not evaluate_start(problem).resonance:
         return problem
-    decisions = problem.mount_design.decisions
+    decisions = problem.mount_decisions
     for place in _PLACES:
         values = [d.lower + place * (d.upper - d.lower) for d in decisions]
-        moved = replace(problem, engine=problem.mount_design.applied(problem.engine, values))
+        moved = replace(problem, engine=problem.design(values, decisions))
         try:
             evaluate(moved)
         except ResonanceError as error:
@@ -72,4 +72,4 @@ def off_resonance(problem: Problem) -> Problem:
 def objective_size(problem: Problem) -> float:
     """Size of what is minimised, for scales: that of the design as given if it has one; never zero."""
     moved = off_resonance(problem)
-    return abs(whole_objective(moved, evaluate(moved))) or 1.0
+    return abs(objective_value(moved, evaluate(moved))) or 1.0

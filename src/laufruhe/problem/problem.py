@@ -2,97 +2,33 @@
 
 from __future__ import annotations
 
-import cmath
 import html
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.problem.measure import ON_MOUNTS, Quantity, Subject
-from laufruhe.problem.mount_design import NOTHING_ASKED, MountDesign
+from laufruhe.problem.decision import Decision, Numbers, Value, moved_numbers
+from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.phasing import Phasing
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
-class Drive:
-    """How a decision acts on one rotor: U += gain u, or gain conj(u) when mirrored."""
-
-    rotor: str
-    gain: complex
-    mirrored: bool = False
-
-
-@dataclass(frozen=True)
-class UnbalanceDecision:
-    """A size, and an angle where that is open, that rotors' unbalances follow (C4).
-
-    The decision is u = size e^{i angle}. With the angle fixed it is one real number
-    between bounds; else it lies in the disc or the sector of the largest size.
+class Search:
+    """How searches go about what is not convex.
 
     Attributes
     ----------
-    name
-        As in the problem file.
-    unit
-        Of the size: "kg m", "kg", or "" for a balance fraction.
-    lower, upper
-        Bounds of the size; the lower one is zero unless the angle is fixed.
-    angle
-        Bounds of the angle [rad]: equal when fixed, a whole turn apart when free.
-    start
-        u of the design as given.
-    drives
-        The rotors that follow.
+    starts, seed
+        Points that a search starts from.
+    boxes
+        That bounds of stiffness may be divided into for a proof; as is worth it when None.
     """
 
-    name: str
-    unit: str
-    lower: float
-    upper: float
-    angle: tuple[float, float]
-    start: complex
-    drives: tuple[Drive, ...]
-
-    @property
-    def fixed_angle(self) -> bool:
-        """Whether the size alone is open."""
-        return self.angle[0] == self.angle[1]
-
-    @property
-    def free_angle(self) -> bool:
-        """Whether every angle is allowed."""
-        return self.angle[1] - self.angle[0] >= math.tau * (1.0 - 1e-12)
-
-    def split(self, u: complex) -> tuple[float, float]:
-        """Size and angle [rad] of a value, the angle within the bounds' own turn."""
-        if self.fixed_angle:
-            return (u * cmath.exp(-1j * self.angle[0])).real, self.angle[0]
-        low = self.angle[0]
-        return abs(u), low + (cmath.phase(u) - low) % math.tau if u != 0 else low
-
-
-@dataclass(frozen=True)
-class Term:
-    """One weighted part of the objective."""
-
-    quantity: Quantity
-    weight: float = 1.0
-
-
-@dataclass(frozen=True)
-class Limit:
-    """A quantity that may not exceed a value [SI]."""
-
-    name: str
-    quantity: Quantity
-    maximum: float
+    starts: int = 16
+    seed: int = 0
+    boxes: int | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,17 +46,19 @@ class Problem:
     points
         Operating points.
     decisions
-        What is open.
+        Open numbers, unbalances before those of the mounts.
     objective
-        Weighted sum of quantities to be least.
+        Weighted sum of measures to be least.
     limits
         What is forbidden.
     fidelity
         What of the physics is kept.
     tolerance
         Relative gap at which an optimum counts as proven.
-    mount_design
-        What of elastic mounts is open and asked.
+    mount_numbers
+        Of elastic mounts as given: stiffness, loss factor, damping, position, turned angles (E13).
+    search
+        How searches go about what is not convex.
     phasing
         What of throws, firing order and the choice of shafts is open; None if nothing is.
     """
@@ -129,14 +67,15 @@ class Problem:
     title: str
     engine: Engine
     points: tuple[OperatingPoint, ...]
-    decisions: tuple[UnbalanceDecision, ...] = ()
+    decisions: tuple[Decision, ...] = ()
     objective: tuple[Term, ...] = ()
     limits: tuple[Limit, ...] = ()
     source: str = ""
     assumptions: tuple[str, ...] = ()
     fidelity: Fidelity = EXACT
     tolerance: float = 1e-4
-    mount_design: MountDesign = NOTHING_ASKED
+    mount_numbers: tuple[tuple[float, ...], ...] = ()
+    search: Search = Search()
     phasing: Phasing | None = None
 
     def __repr__(self) -> str:
@@ -154,40 +93,82 @@ class Problem:
             f"{len(engine.cylinders)} cylinder(s), {engine.cycle}",
             f"{len(engine.mounts)} mount(s)",
             f"{len(self.points)} operating point(s)",
-            f"{len(self.limits) + len(self.mount_design.limits)} constraint(s)",
+            f"{len(self.limits)} constraint(s)",
         ]
         names = list(self.phasing.open_names) if self.phasing is not None else []
-        names += [decision.name + ("" if decision.fixed_angle else " and angle") for decision in self.decisions]
-        names += [decision.name for decision in self.mount_design.decisions]
+        names += [decision.name + (" and angle" if decision.set.width > 1 else "") for decision in self.decisions]
         return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
 
     @property
-    def start(self) -> tuple[complex, ...]:
+    def unbalances(self) -> tuple[Decision, ...]:
+        """Decisions that loads are affine in."""
+        return tuple(decision for decision in self.decisions if decision.is_affine)
+
+    @property
+    def mount_decisions(self) -> tuple[Decision, ...]:
+        """Decisions about the mounts."""
+        return tuple(decision for decision in self.decisions if decision.mount_drives)
+
+    @property
+    def start(self) -> tuple[Value, ...]:
         """Decisions of the design as given."""
         return tuple(decision.start for decision in self.decisions)
 
     @property
+    def measures(self) -> tuple[Measure, ...]:
+        """All that is minimised or limited."""
+        return (*(term.measure for term in self.objective), *(limit.measure for limit in self.limits))
+
+    @property
+    def load_terms(self) -> tuple[Term, ...]:
+        """Terms that are norms of loads or masses."""
+        return tuple(term for term in self.objective if not term.measure.is_mounting)
+
+    @property
+    def mount_terms(self) -> tuple[Term, ...]:
+        """Terms that are numbers of a block on its mounts."""
+        return tuple(term for term in self.objective if term.measure.is_mounting)
+
+    @property
+    def load_limits(self) -> tuple[Limit, ...]:
+        """Limits on norms of loads and masses."""
+        return tuple(limit for limit in self.limits if not limit.measure.is_mounting)
+
+    @property
+    def mount_limits(self) -> tuple[Limit, ...]:
+        """Limits on numbers of a block on its mounts."""
+        return tuple(limit for limit in self.limits if limit.measure.is_mounting)
+
+    @property
+    def asks_mounts(self) -> bool:
+        """Whether anything of elastic mounts is open or asked."""
+        return bool(self.mount_decisions) or any(measure.is_mounting for measure in self.measures)
+
+    @property
+    def balance(self) -> Problem:
+        """The problem on its mounts as they stand: what is open, wanted and forbidden of loads and masses alone."""
+        return replace(
+            self, decisions=self.unbalances, objective=self.load_terms, limits=self.load_limits, mount_numbers=()
+        )
+
+    @property
     def feels_gas(self) -> bool:
         """Whether gas loads what is minimised or limited: its roll moment alone, and all where it drives the speed."""
-        asked = [term.quantity for term in self.objective] + [limit.quantity for limit in self.limits]
-        felt = any(quantity.subject in (*ON_MOUNTS, Subject.ROLL_MOMENT) for quantity in asked)
         has_gas = self.fidelity.gas and any(point.gas is not None for point in self.points)
-        return has_gas and (felt or self.fidelity.is_uneven)
+        return has_gas and (any(measure.feels_gas for measure in self.measures) or self.fidelity.is_uneven)
 
     @property
     def objective_name(self) -> str:
         """What is minimised, in words; empty where nothing is."""
-        parts = [(term.weight, term.quantity.name) for term in self.objective]
-        parts += [(weight, quantity.name) for quantity, weight in self.mount_design.terms]
-        if len(parts) == 1 and parts[0][0] == 1.0:
-            return parts[0][1]
-        return " + ".join(f"{weight:g} x {name}" for weight, name in parts)
+        terms = self.objective
+        if len(terms) == 1 and terms[0].weight == 1.0:
+            return terms[0].measure.name
+        return " + ".join(f"{term.weight:g} x {term.measure.name}" for term in terms)
 
     @property
     def objective_unit(self) -> str | None:
         """SI unit of what is minimised, empty where its terms have several; None where nothing is."""
-        units = {term.quantity.unit for term in self.objective}
-        units |= {quantity.unit for quantity, _ in self.mount_design.terms}
+        units = {term.measure.unit for term in self.objective}
         if not units:
             return None
         return units.pop() if len(units) == 1 else ""
@@ -200,13 +181,16 @@ class Problem:
         phasing = replace(self.phasing, realise=lambda candidate: realise(candidate).at(fidelity))
         return replace(self, fidelity=fidelity, phasing=phasing)
 
-    def design(self, values: Sequence[complex], mount_values: Sequence[float] | None = None) -> Engine:
-        """The engine with these decisions in place of those it was given with."""
-        unbalances = {rotor.name: rotor.unbalance for rotor in self.engine.rotors}
-        for decision, value in zip(self.decisions, values, strict=True):
-            change = value - decision.start
-            for drive in decision.drives:
-                unbalances[drive.rotor] += drive.gain * (change.conjugate() if drive.mirrored else change)
-        rotors = tuple(replace(rotor, unbalance=unbalances[rotor.name]) for rotor in self.engine.rotors)
-        engine = replace(self.engine, rotors=rotors)
-        return engine if mount_values is None else self.mount_design.applied(engine, mount_values)
+    def design(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Engine:
+        """The engine with decisions, all of them unless some are named, in place of those it was given with."""
+        return self.numbers(values, decisions).engine(self.engine)
+
+    def numbers(self, values: Sequence[Any], decisions: Sequence[Decision] | None = None) -> Numbers:
+        """The numbers of the engine with decisions at these values; symbols do as well."""
+        moved = self.decisions if decisions is None else decisions
+        on_mounts = any(decision.mount_drives for decision in moved)
+        given = Numbers(
+            {rotor.name: rotor.unbalance for rotor in self.engine.rotors},
+            [list(row) for row in self.mount_numbers] if on_mounts else [],
+        )
+        return moved_numbers(given, moved, values)

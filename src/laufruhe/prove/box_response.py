@@ -17,14 +17,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import weight_wrench
+from laufruhe.physics.mount_numbers import total_stiffness
 from laufruhe.physics.rigid_body import moved_wrench
+from laufruhe.problem import channels
+from laufruhe.problem.channels import Channel, mounting_in
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.mount_design import mounting_in, total_stiffness
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -137,7 +139,7 @@ class BoxModel:
 
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
         self.problem, self._evaluation = problem, evaluation
-        decisions = problem.mount_design.decisions
+        decisions = problem.mount_decisions
         self.lower, self.upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
         base = self.mounting(self.lower)
         self._root = np.linalg.inv(np.linalg.cholesky(base.block.mass_matrix))
@@ -158,7 +160,7 @@ class BoxModel:
 
     def mounting(self, x: Array) -> ElasticMounting:
         """At these stiffnesses."""
-        return mounting_in(self.problem.mount_design.applied(self.problem.engine, [float(v) for v in x]))
+        return mounting_in(self.problem.design([float(v) for v in x], self.problem.mount_decisions))
 
     def _parts(self, mounting: ElasticMounting) -> _Parts:
         seen = mounting.motions @ self._root.T
@@ -170,7 +172,7 @@ class BoxModel:
     def _each(mounting: ElasticMounting) -> tuple[Array, Array, Array]:
         return mounting.springs, mounting.losses, mounting.dampers
 
-    def lines(self, quantity: Quantity | None = None) -> Lines:
+    def lines(self, quantity: Measure | None = None) -> Lines:
         """Every order with a load; of a quantity, those that it counts."""
         moved = self._root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
         found: list[tuple[int, int, float, float, ComplexArray]] = []
@@ -187,9 +189,7 @@ class BoxModel:
         if quantity is None:
             return lines
         keep = np.isin(lines.points, self.counted(quantity.points))
-        if quantity.orders is not None:
-            keep &= np.isin(np.round(1000 * lines.orders), np.round(1000 * np.array(quantity.orders)))
-        return lines.kept(keep)
+        return lines.kept(keep & quantity.counted(lines.orders))
 
     def samples_fully(self, lines: Lines) -> bool:
         """Whether each of these orders has more than two samples, over a period that is that of the loads."""
@@ -218,9 +218,9 @@ class BoxModel:
 
     def total_stiffness(self, x: Array) -> Array:
         """Sum over mounts and axes at many designs, shape (boxes,) [N/m]."""
-        decisions = self.problem.mount_design.decisions
-        gains = np.array([sum(drive.gain for drive in decision.drives) for decision in decisions])
-        lowest = self.problem.mount_design.applied(self.problem.engine, [float(v) for v in self.lower])
+        decisions = self.problem.mount_decisions
+        gains = np.array([sum(drive.gain for drive in decision.mount_drives) for decision in decisions])
+        lowest = self.problem.design([float(v) for v in self.lower], self.problem.mount_decisions)
         return np.asarray(total_stiffness(lowest.mounts) + (x - self.lower) @ gains)
 
     def _at(self, name: str, x: Array) -> Array:
@@ -246,9 +246,9 @@ class BoxModel:
         rest = np.where(size > 0.0, share * np.where(size > 0.0, size, 1.0), np.where(rho < 1.0, 0.0, np.inf))
         return Expansion(centres, halves, motion, first, second, size, rest, pull)
 
-    def answer(self, lines: Lines, at: Expansion, subject: Subject, rows: Indices, factors: Array) -> Answer:
+    def answer(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices, factors: Array) -> Answer:
         """Forces or travel, the rows of the mounts that count, with factors on them (E37)."""
-        value, slopes = self._maps(lines, at, subject, rows)
+        value, slopes = self._maps(lines, at, channel, rows)
         value, slopes = value * factors[:, None], slopes * factors[:, None]
         first = np.einsum("bknri,bki->bknr", slopes, at.motion) - np.einsum("bkri,bkni->bknr", value, at.first)
         second = np.einsum("bkri,bkmni->bkmnr", value, at.second) - np.einsum("bkmri,bkni->bkmnr", slopes, at.first)
@@ -258,10 +258,10 @@ class BoxModel:
         rest = rest + np.where(turned > 0.0, turned * np.where(turned > 0.0, at.rest, 0.0), 0.0)
         return Answer(np.einsum("bkri,bki->bkr", value, at.motion), first, rest)
 
-    def _maps(self, lines: Lines, at: Expansion, subject: Subject, rows: Indices) -> tuple[ComplexArray, ComplexArray]:
+    def _maps(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices) -> tuple[ComplexArray, ComplexArray]:
         """From motion to forces or travel at the centres, (boxes, lines, r, 6), and by side, (..., n, r, 6)."""
         boxes, count, open_numbers = len(at.centres), len(lines.omegas), len(self.lower)
-        if subject is Subject.MOUNT_TRAVEL:
+        if channel is channels.MOUNT_TRAVEL:
             flat = np.broadcast_to(self.travels[rows].astype(complex), (boxes, count, len(rows), 6))
             return flat, np.zeros((boxes, count, open_numbers, len(rows), 6), dtype=complex)
         moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
@@ -270,35 +270,35 @@ class BoxModel:
         by_side = self._slopes["springs"][:, rows] + 1j * moving[:, None] * self._slopes["losses"][:, rows]
         return value, by_side * at.halves[:, None, :, None, None]
 
-    def felt_at_most(self, lines: Lines, subject: Subject) -> Array:
+    def felt_at_most(self, lines: Lines, channel: Channel) -> Array:
         """What an order above all natural frequencies can do to all mounts anywhere in the bounds, (lines,) (E41)."""
         room = lines.omegas**2 - self.highest
         motion = np.linalg.norm(lines.loads, axis=1) / np.where(room > 0.0, room, 1.0)
         motion = np.where(room > 0.0, motion, np.inf)
-        if subject is Subject.MOUNT_TRAVEL:
+        if channel is channels.MOUNT_TRAVEL:
             return motion * float(np.linalg.norm(self.travels))
         top = self._parts(self.mounting(self.upper))
         still = float(np.linalg.norm(top.springs + 1j * top.losses))
         return np.asarray(motion * (still + lines.omegas * float(np.linalg.norm(top.dampers))))
 
-    def under(self, quantity: Quantity, lines: Lines, at: Expansion) -> Under:
+    def under(self, quantity: Measure, lines: Lines, at: Expansion) -> Under:
         """A linear function under a mean, maximum or root mean square of forces or travel, for every box (E38)."""
         names = [mount.name for mount in self.problem.engine.mounts]
-        chosen = [k for k, name in enumerate(names) if quantity.mounts is None or name in quantity.mounts]
+        chosen = quantity.places(names)
         rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
         factors = np.tile(np.array(quantity.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
-        answer = self.answer(lines, at, quantity.subject, rows, factors)
+        answer = self.answer(lines, at, quantity.channel, rows, factors)
         counted = self.counted(quantity.points)
         whole = sum(self.problem.points[k].weight for k in counted)
         share = np.array([point.weight for point in self.problem.points]) / whole
         weights = share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen)
-        if quantity.norm is Norm.RMS:
+        if quantity.norm is NORMS["rms"]:
             return root_under(answer, weights)
         found = [self._sampled(quantity, answer, lines, p, len(chosen)) for p in counted if np.any(lines.points == p)]
         if not found:
             nothing = np.zeros(len(at.centres))
             return Under(nothing, np.zeros_like(at.centres), nothing)
-        if quantity.norm is Norm.MAXIMUM:
+        if quantity.norm is NORMS["maximum"]:
             best = np.argmax([each.value for each in found], axis=0)
             pick = np.arange(len(best))
             value, slopes, rest = (np.array([getattr(e, part) for e in found]) for part in ("value", "slopes", "rest"))
@@ -311,7 +311,7 @@ class BoxModel:
         rest = np.sqrt(np.einsum("k,bk->b", weights, answer.rest**2))
         return Under(np.asarray(value), np.asarray(slopes), rest)
 
-    def _sampled(self, quantity: Quantity, answer: Answer, lines: Lines, p: int, mounts: int) -> Under:
+    def _sampled(self, quantity: Measure, answer: Answer, lines: Lines, p: int, mounts: int) -> Under:
         """Mean or maximum over the samples of one period at one operating point."""
         own = np.flatnonzero(lines.points == p)
         wrench = self._evaluation.loads[p].wrench
@@ -327,7 +327,7 @@ class BoxModel:
         rows = np.einsum("tk,bkr->btr", turns, value).real.reshape(len(value), samples, mounts, 3)
         size = np.linalg.norm(rows, axis=-1)
         along = rows / np.where(size > 0.0, size, 1.0)[..., None]
-        if quantity.norm is Norm.SUM:
+        if quantity.norm is NORMS["mean"]:
             share = 1.0 / (samples * mounts)
             duals = np.einsum("tk,btr->bkr", turns, along.reshape(len(value), samples, -1))
             slope = share * np.einsum("bkr,bknr->bn", duals, slopes).real

@@ -16,8 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
-from laufruhe.numerics import mixed_norms
-from laufruhe.numerics.mixed_norms import Norm
 
 Array = NDArray[np.float64]
 
@@ -76,10 +74,7 @@ class Multipliers:
 
     def shadow_prices(self, problem: AffineProblem) -> tuple[float, ...]:
         """Fall of the objective per unit by which a limit is relaxed (P5)."""
-        return tuple(
-            mixed_norms.dual_norm(norm.norm, norm.weights, z)
-            for (_, norm), z in zip(problem.limits, self.limits, strict=True)
-        )
+        return tuple(norm.dual_norm(z) for (_, norm), z in zip(problem.limits, self.limits, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +99,12 @@ def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
     gradient, constant = np.zeros(problem.size), 0.0
     terms = []
     for (weight, norm), given in zip(problem.terms, multipliers.terms, strict=True):
-        z = mixed_norms.dual_feasible(norm.norm, norm.weights, given)
+        z = norm.dual_feasible(given)
         terms.append(z)
         constant += weight * float(np.vdot(z, norm.constant))
         gradient += weight * np.einsum("kd,kdn->n", z, norm.slope)
     for (maximum, norm), z in zip(problem.limits, multipliers.limits, strict=True):
-        price = mixed_norms.dual_norm(norm.norm, norm.weights, z)
+        price = norm.dual_norm(z)
         constant += float(np.vdot(z, norm.constant)) - price * maximum
         gradient += np.einsum("kd,kdn->n", z, norm.slope)
     least = constant + sum(domain.least(gradient) for domain in problem.domains)
@@ -128,42 +123,18 @@ def best_bound(fine: AffineProblem, coarse: AffineProblem, x: Array, found: Mult
         tuple(_spread(norm, coarse.samples, z) for (_, norm), z in zip(fine.limits, found.limits, strict=True)),
     )
     direct = Multipliers(
-        tuple(_along(norm, x, z) for (_, norm), z in zip(fine.terms, spread.terms, strict=True)), spread.limits
+        tuple(
+            norm.norm.aligned(norm.grid, norm.rows(x), z) for (_, norm), z in zip(fine.terms, spread.terms, strict=True)
+        ),
+        spread.limits,
     )
     return max((lower_bound(fine, m) for m in (spread, direct)), key=lambda bound: bound.value)
 
 
-def _along(norm: AffineNorm, x: Array, z: Array) -> Array:
-    if norm.norm is Norm.MAXIMUM:
-        return z
-    rows = norm.rows(x)
-    own = mixed_norms.subgradient(norm.norm, norm.weights, rows)
-    if norm.norm is Norm.RMS:
-        return own
-    size = mixed_norms.lengths(rows)
-    small = size <= 1e-6 * float(size.max(initial=0.0))
-    return np.where(small[:, None], z, own)
-
-
 def _spread(fine: AffineNorm, samples: int, z: Array) -> Array:
-    """Dual rows at `samples` angles on a finer grid: in between for means, in place for peaks.
-
-    Rows come in groups of one mount at one operating point, as many rows as angles;
-    masses have no angles and stay.
-    """
-    times = len(fine.weights) // len(z) if len(z) else 1
-    if times <= 1:
-        return z
-    blocks = z.reshape(-1, samples, z.shape[-1])
-    groups = len(blocks)
-    if fine.norm is Norm.MAXIMUM:
-        out = np.zeros((groups, blocks.shape[1] * times, z.shape[-1]))
-        out[:, ::times] = blocks
-        return out.reshape(-1, z.shape[-1])
-    share = np.arange(times) / times
-    following = np.roll(blocks, -1, axis=1)
-    mixed = blocks[:, :, None] * (1.0 - share[:, None]) + following[:, :, None] * share[:, None]
-    return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)
+    """Dual rows at `samples` angles on a finer grid; masses have no angles and stay."""
+    times = len(fine.grid.weights) // len(z) if len(z) else 1
+    return z if times <= 1 else fine.norm.spread(z, samples, times)
 
 
 def kkt_residual(problem: AffineProblem, x: Array, bound: Bound, whole: float | None = None) -> float:

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.measure import ON_MOUNTS, Quantity, Subject
-from laufruhe.problem.mount_design import MountLimit, MountMeasure, MountQuantity
+from laufruhe.numerics.norms import NORMS
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.box_response import BoxModel, Expansion, Lines, Under, root_under
@@ -56,12 +56,9 @@ class Divided:
 
 def divides(problem: Problem) -> bool:
     """Whether stiffness alone is open, and some of the objective is known over boxes."""
-    design = problem.mount_design
-    stiffness = all(d.is_stiffness and all(drive.gain > 0.0 for drive in d.drives) for d in design.decisions)
-    if problem.decisions or not design.decisions or not stiffness:
-        return False
-    known = any(term.quantity.subject in ON_MOUNTS for term in problem.objective)
-    return known or any(quantity.measure is MountMeasure.TRANSMISSIBILITY for quantity, _ in design.terms)
+    stiffness = all(d.is_stiffness and all(drive.gain > 0.0 for drive in d.mount_drives) for d in problem.decisions)
+    known = any(term.measure.on_mounts or _is_ratio(term.measure) for term in problem.objective)
+    return bool(problem.decisions) and stiffness and known
 
 
 def divided_bound(problem: Problem, value: float, room: float, floor: float = 0.0) -> Divided:
@@ -110,13 +107,13 @@ class _Search:
     def __init__(self, problem: Problem, left_out: float) -> None:
         self.problem = problem
         self.model = BoxModel(problem, evaluate_start(problem))
-        terms = [term for term in problem.objective if term.quantity.subject in ON_MOUNTS]
+        terms = [term for term in problem.objective if term.measure.on_mounts]
         share = left_out / max(sum(term.weight for term in terms), 1e-300)
-        self._terms = [(term.weight, term.quantity, *_felt(self.model, term.quantity, share)) for term in terms]
+        self._terms = [(term.weight, term.measure, *_felt(self.model, term.measure, share)) for term in terms]
         self._limits = [
-            (limit.maximum * (1.0 + SLACK), limit.quantity, *_felt(self.model, limit.quantity, SLACK * limit.maximum))
+            (limit.maximum * (1.0 + SLACK), limit.measure, *_felt(self.model, limit.measure, SLACK * limit.maximum))
             for limit in problem.limits
-            if limit.quantity.subject in ON_MOUNTS
+            if limit.measure.on_mounts
         ]
 
     @property
@@ -127,11 +124,11 @@ class _Search:
     @property
     def _cost(self) -> int:
         """Of one box, in numbers."""
-        design, mounts = self.problem.mount_design, len(self.problem.engine.mounts)
+        mounts = len(self.problem.engine.mounts)
         lines = sum(len(lines.omegas) for _, _, lines, _ in (*self._terms, *self._limits))
-        ratios = [quantity for quantity, _ in design.terms]
+        ratios = [term.measure for term in self.problem.mount_terms]
         lines += sum(2 * len(self._ratio_lines(q).omegas) for q in ratios if _is_ratio(q))
-        return max(lines, 1) * len(design.decisions) ** 2 * max(mounts, 2)
+        return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2)
 
     @property
     def at_once(self) -> int:
@@ -141,10 +138,10 @@ class _Search:
     @property
     def most_boxes(self) -> int:
         """As many as asked for, or as a few seconds allow."""
-        asked = self.problem.mount_design.boxes
+        asked = self.problem.search.boxes
         if asked is not None:
             return asked
-        if len(self.problem.mount_design.decisions) > MOST_OPEN:
+        if len(self.problem.mount_decisions) > MOST_OPEN:
             return 0
         return int(min(WORK / self._cost, MOST_BOXES))
 
@@ -162,7 +159,7 @@ class _Search:
             slopes += weight * under.slopes
             pull = np.maximum(pull, _pull(at))
         found = _known(total - np.abs(slopes).sum(axis=1))
-        for asked, weight in self.problem.mount_design.terms:
+        for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
             if _is_ratio(asked):
                 ratio, pulled = self._ratio(asked, lower, upper)
                 found, pull = np.asarray(found + weight * ratio), np.maximum(pull, pulled)
@@ -178,27 +175,27 @@ class _Search:
             at = self.model.expanded(lines, lower, upper)
             under = self.model.under(quantity, lines, at)
             out |= _known(under.value - under.rest - left_out - np.abs(under.slopes).sum(axis=1)) > maximum
-        for limit in self.problem.mount_design.limits:
-            if _is_ratio(limit.quantity):
-                out |= self._ratio(limit.quantity, lower, upper)[0] > (limit.maximum or math.inf) * (1.0 + SLACK)
+        for limit in self.problem.mount_limits:
+            if _is_ratio(limit.measure):
+                out |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
             else:
                 out |= breaks(self.model, limit, lower, upper)
         return out
 
     # transmissibility
 
-    def _ratio_lines(self, quantity: MountQuantity) -> Lines:
-        counted = Quantity(Subject.MOUNT_FORCE, Norm.RMS, points=quantity.points, orders=quantity.orders)
+    def _ratio_lines(self, quantity: Measure) -> Lines:
+        counted = Measure(channels.MOUNT_FORCE, NORMS["rms"], points=quantity.points, orders=quantity.orders)
         lines = self.model.lines(counted)
         return lines.kept(lines.omegas > 0.0)
 
-    def _ratio(self, quantity: MountQuantity, lower: Array, upper: Array) -> tuple[Array, Array]:
+    def _ratio(self, quantity: Measure, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Least transmissibility on every box (E40)."""
         lines = self._ratio_lines(quantity)
         rows = np.arange(3 * len(self.problem.engine.mounts), dtype=np.intp)
         at, still = (self.model.expanded(each, lower, upper) for each in (lines, lines.still()))
         over, under = (
-            self.model.answer(each, expansion, Subject.MOUNT_FORCE, rows, np.ones(len(rows)))
+            self.model.answer(each, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
             for each, expansion in ((lines, at), (lines.still(), still))
         )
         best = np.zeros(len(lower))
@@ -213,11 +210,11 @@ class _Search:
         return best, _pull(at)
 
 
-def _is_ratio(quantity: MountQuantity) -> bool:
-    return quantity.measure is MountMeasure.TRANSMISSIBILITY
+def _is_ratio(quantity: Measure) -> bool:
+    return quantity.channel is channels.TRANSMISSIBILITY
 
 
-def _groups(quantity: MountQuantity, lines: Lines) -> list[Mask]:
+def _groups(quantity: Measure, lines: Lines) -> list[Mask]:
     """Lines that make one ratio: of each operating point every order named, or all together."""
     out = []
     for p in np.unique(lines.points):
@@ -239,11 +236,11 @@ def _least_ratio(top: Under, bottom: Under) -> Array:
     return low
 
 
-def _felt(model: BoxModel, quantity: Quantity, budget: float) -> tuple[Lines, float]:
+def _felt(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, float]:
     """Lines without those that together do less than a budget anywhere, and what they do (E41)."""
     lines = model.lines(quantity)
     factor = max(quantity.direction_weights or (1.0,))
-    felt = factor * model.felt_at_most(lines, quantity.subject)
+    felt = factor * model.felt_at_most(lines, quantity.channel)
     order = np.argsort(felt, kind="stable")
     # the sum is over any root of squares, so it serves every norm
     together = np.cumsum(felt[order])
@@ -263,25 +260,24 @@ def _known(bound: Array) -> Array:
     return np.maximum(np.where(np.isfinite(bound), bound, 0.0), 0.0)
 
 
-def _least(model: BoxModel, quantity: MountQuantity, lower: Array, upper: Array) -> Array:
+def _least(model: BoxModel, quantity: Measure, lower: Array, upper: Array) -> Array:
     """Least sag or total stiffness on every box: at its stiffest or softest corner; zero for all else."""
-    if quantity.measure is MountMeasure.SAG:
+    if quantity.channel is channels.SAG:
         return model.sag(upper)
-    if quantity.measure is MountMeasure.TOTAL_STIFFNESS:
+    if quantity.channel is channels.TOTAL_STIFFNESS:
         return model.total_stiffness(lower)
     return np.zeros(len(lower))
 
 
-def breaks(model: BoxModel, limit: MountLimit, lower: Array, upper: Array) -> Mask:
+def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:
     """Whether a limit is broken all over a box; more stiffness lowers sag and raises every frequency (E39)."""
-    least = -math.inf if limit.minimum is None else limit.minimum * (1.0 - SLACK)
-    most = math.inf if limit.maximum is None else limit.maximum * (1.0 + SLACK)
-    measure = limit.quantity.measure
-    if measure is MountMeasure.SAG:
+    least, most = limit.minimum * (1.0 - SLACK), limit.maximum * (1.0 + SLACK)
+    measure = limit.measure.channel
+    if measure is channels.SAG:
         return np.asarray((model.sag(upper) > most) | (model.sag(lower) < least))
-    if measure is MountMeasure.TOTAL_STIFFNESS:
+    if measure is channels.TOTAL_STIFFNESS:
         return np.asarray((model.total_stiffness(lower) > most) | (model.total_stiffness(upper) < least))
-    if measure is not MountMeasure.FREQUENCIES:
+    if measure is not channels.FREQUENCIES:
         return np.zeros(len(lower), dtype=bool)
     low, high = (np.sqrt(np.maximum(np.linalg.eigvalsh(model.stiffness(x)), 0.0)) / math.tau for x in (lower, upper))
     out = (high[:, 0] < least) | (low[:, -1] > most)

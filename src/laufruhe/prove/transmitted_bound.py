@@ -20,20 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.load_models.domain import Domain
-from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.rigid_body import carried, moved_wrench, point_motion
-from laufruhe.problem.measure import Quantity, Subject
-from laufruhe.problem.mount_design import (
-    POSITION,
-    STIFFNESS,
-    TURNED,
-    MountMeasure,
-    mounting_in,
-)
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import POSITION, STIFFNESS, TURNED, Domain
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 
@@ -94,7 +89,7 @@ class Softest:
 
     def metric(self, norm: Norm, loads: ComplexArray) -> Array:
         """P of E32: for squares of forces their sum, for the forces themselves a matrix that covers each."""
-        if norm is not Norm.SUM:
+        if not norm.sums_lengths:
             return np.asarray(self.squares.sum(axis=0))
         from laufruhe.solvers.mount_cones import covering
 
@@ -110,15 +105,15 @@ def transmitted_bound(problem: Problem) -> float:
     Means, maxima and root mean squares of mount forces are bounded, all mounts counted;
     whatever else is minimised counts as zero, which no norm goes under.
     """
-    bounded = [(term.weight, term.quantity) for term in problem.objective if _is_bounded(term.quantity)]
+    bounded = [(term.weight, term.measure) for term in problem.objective if _is_bounded(term.measure)]
     if not bounded or not problem.points:
         return 0.0
     softest, model = softest_of(problem), AffineModel(off_resonance(problem))
     return sum(weight * _of_quantity(problem, quantity, softest, model) for weight, quantity in bounded)
 
 
-def _is_bounded(quantity: Quantity) -> bool:
-    return quantity.subject is Subject.MOUNT_FORCE and quantity.mounts is None
+def _is_bounded(quantity: Measure) -> bool:
+    return quantity.channel is channels.MOUNT_FORCE and quantity.mounts is None
 
 
 def softest_of(problem: Problem) -> Softest:
@@ -153,11 +148,11 @@ def softest_of(problem: Problem) -> Softest:
 
 def _ranges(problem: Problem) -> tuple[Array, Array]:
     """Least and largest values of the numbers of every mount, shape (mounts, 13) each."""
-    low = np.array(problem.mount_design.numbers, dtype=float)
+    low = np.array(problem.mount_numbers, dtype=float)
     high = low.copy()
-    for decision in problem.mount_design.decisions:
-        for drive in decision.drives:
-            ends = [drive.gain * (edge - decision.start) for edge in (decision.lower, decision.upper)]
+    for decision in problem.mount_decisions:
+        for drive in decision.mount_drives:
+            ends = [drive.gain * (edge - decision.start_number) for edge in (decision.lower, decision.upper)]
             low[drive.mount, drive.number] += min(ends)
             high[drive.mount, drive.number] += max(ends)
     return low, high
@@ -167,16 +162,16 @@ def _limited_floors(problem: Problem, root: Array) -> list[Array]:
     """L from limits: a lowest natural frequency, and the largest sag (E31)."""
     found = []
     weight = weight_wrench(mounting_in(problem.engine).block)
-    for limit in problem.mount_design.limits:
-        if limit.quantity.measure is MountMeasure.FREQUENCIES and limit.minimum:
+    for limit in problem.mount_limits:
+        if limit.measure.channel is channels.FREQUENCIES and limit.minimum > 0.0:
             found.append((math.tau * limit.minimum) ** 2 * np.eye(6))
-        if limit.quantity.measure is MountMeasure.SAG and limit.maximum:
+        if limit.measure.channel is channels.SAG and 0.0 < limit.maximum < math.inf:
             pull = root @ weight
             found.append(np.outer(pull, pull) / (limit.maximum * -weight[2]))
     return found
 
 
-def _of_quantity(problem: Problem, quantity: Quantity, softest: Softest, model: AffineModel) -> float:
+def _of_quantity(problem: Problem, quantity: Measure, softest: Softest, model: AffineModel) -> float:
     chosen = [
         (point, spectra)
         for point, spectra in zip(problem.points, model.wrenches(), strict=True)
@@ -185,27 +180,23 @@ def _of_quantity(problem: Problem, quantity: Quantity, softest: Softest, model: 
     # no direction counts less than the least weight
     least = min(quantity.direction_weights or (1.0,))
     whole = sum(point.weight for point, _ in chosen)
-    total, largest = 0.0, 0.0
+    squares: list[list[float]] = []
+    roots: list[list[float]] = []
     for point, (bare, slopes) in chosen:
         base = common_base([bare.base, *(slope.base for slope in slopes)])
         coefficients = [s.rebased(base).coefficients for s in (bare, *slopes)]
-        squares, means = [0.0], [0.0]
-        for k in range(max(len(c) for c in coefficients)):
-            order = k * float(base)
-            if quantity.orders is not None and not any(abs(order - o) < 5e-4 for o in quantity.orders):
-                continue
+        squares.append([0.0])
+        roots.append([0.0])
+        for k in np.flatnonzero(quantity.counted([k * float(base) for k in range(max(len(c) for c in coefficients))])):
             loads = np.array([softest.load @ c[k] if k < len(c) else np.zeros(6) for c in coefficients])
             half = 0.5 if k else 1.0
             metric = softest.metric(quantity.norm, loads)
-            least_square = least_transmitted(loads, order * point.speed, metric, softest.floors, model.domains)
-            squares.append(half * least_square / len(softest.squares))
-            means.append(half * math.sqrt(least_square) / len(softest.squares))
-        share = point.weight / whole
-        total += share * (max(means) if quantity.norm is Norm.SUM else sum(squares))
-        largest = max(largest, sum(squares))
-    if quantity.norm is Norm.SUM:
-        return least * total
-    return least * math.sqrt(largest if quantity.norm is Norm.MAXIMUM else total)
+            omega = k * float(base) * point.speed
+            least_square = least_transmitted(loads, omega, metric, softest.floors, model.domains)
+            squares[-1].append(half * least_square / len(softest.squares))
+            roots[-1].append(half * math.sqrt(least_square) / len(softest.squares))
+    shares = np.array([point.weight / whole for point, _ in chosen])
+    return least * quantity.norm.least_of_orders(squares, roots, shares)
 
 
 def least_transmitted(
@@ -290,7 +281,7 @@ def _disc_limits(domains: Sequence[Domain], before: int) -> list[Quadratic]:
         matrix[own, own] = 1.0
         constant = -(domain.scale**2)
         if domain.width == 1:
-            low, high = domain.decision.lower, domain.decision.upper
+            low, high = domain.set.lower, domain.set.upper
             vector[own], constant = -0.5 * (low + high), low * high
         found.append(Quadratic(matrix, vector, constant))
     return found

@@ -21,7 +21,6 @@ from laufruhe.machine.firing import firing_lattice
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import MASSES
 from laufruhe.problem.phasing import Intervals, Phasing
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.star_search import AmplitudeObjective, directions
@@ -64,8 +63,8 @@ def steady_bound(problem: Problem) -> float:
     """What the mean of the loads over the cycle leaves of the objective, on mounts as given (S24) [SI]."""
     given, total = evaluate(problem), 0.0
     for term in problem.objective:
-        quantity = term.quantity
-        if quantity.subject in MASSES or (quantity.orders is not None and 0.0 not in quantity.orders):
+        quantity = term.measure
+        if quantity.is_mass or (quantity.orders is not None and 0.0 not in quantity.orders):
             continue
         total += term.weight * given.value(replace(quantity, orders=(0.0,)))
     return total

@@ -39,17 +39,15 @@ def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many
     ModelError
         If the engine as given cannot be evaluated.
     """
-    if problem.mount_design.decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
+    if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
-    if problem.phasing is None and not (problem.decisions or problem.mount_design.decisions):
-        return state(problem)
-    if problem.phasing is not None and problem.mount_design.asked:
+    if problem.phasing is not None and problem.asks_mounts:
         from laufruhe.solvers.mount_stars import solve_star_mounts
 
         return solve_star_mounts(problem, say)
-    if problem.phasing is None and not problem.decisions and not problem.mount_design.decisions:
+    if problem.phasing is None and not problem.decisions:
         return state(problem)
-    if problem.mount_design.asked:
+    if problem.asks_mounts:
         from laufruhe.solvers.mounts import solve_mounts
 
         return solve_mounts(problem)

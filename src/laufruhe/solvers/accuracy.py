@@ -33,7 +33,7 @@ def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
     if samples % 2 or not whole:
         return 0.0
     half = sum(
-        term.weight * evaluation.rows(term.quantity, samples // 2).value
+        term.weight * evaluation.rows(term.measure, samples // 2).value
         for term in problem.objective
     )  # fmt: skip
     return abs(half - whole) / whole

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
 from laufruhe.load_models.affine import AffineNorm, AffineProblem, reach
-from laufruhe.load_models.domain import Domain
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import Cones
+from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.solvers.direct_cones import TIGHT, ConicSolution
 
@@ -82,9 +82,9 @@ class ConicProgram:
         constant = self._number(norm.constant / unit)
         slope = (norm.slope * (self._problem.units / unit)).reshape(k * d, -1)
         rows = cp.reshape(slope @ self._y, (k, d), order="C") + constant
-        value, cone = held_norm(norm.norm, norm.weights, rows)
-        factors = np.sqrt(norm.weights) if norm.norm is Norm.RMS else np.ones(k)
-        return _Cone(constant, value, cone, unit, (k, d), factors)
+        cones = norm.norm.cones(norm.grid)
+        value, cone = held_norm(cones, rows)
+        return _Cone(constant, value, cone, unit, (k, d), cones.factors)
 
     def _number(self, value: Array) -> Any:
         return cp.Parameter(value.shape, value=value) if self._reusable else cp.Constant(value)
@@ -141,25 +141,23 @@ class ConicProgram:
         return ConicSolution(x, Multipliers(terms, limits), seconds, iterations)
 
 
-def held_norm(norm: Norm, weights: Array, rows: Any) -> tuple[Any, Any]:
-    """A norm of rows (k, d) as a linear expression, and the cones that hold it: one a row, or one for all (P1)."""
-    if norm is Norm.RMS:
-        head = cp.Variable()
-        return head, cp.SOC(head, cp.vec(cp.multiply(np.sqrt(weights)[:, None], rows), order="C"))
-    count = len(weights)
-    heads = cp.Variable(count) if norm is Norm.SUM else cp.Variable()
-    tops = heads if norm is Norm.SUM else heads * np.ones(count)
-    return weights @ heads if norm is Norm.SUM else heads, cp.SOC(tops, rows, axis=1)
+def held_norm(cones: Cones, rows: Any) -> tuple[Any, Any]:
+    """A norm of rows (k, d) as a linear expression, and the cones that hold it (P1)."""
+    heads = cp.Variable(len(cones.value))
+    if cones.whole:
+        return heads[0], cp.SOC(heads[0], cp.vec(cp.multiply(cones.factors[:, None], rows), order="C"))
+    tops = heads if len(cones.value) == len(cones.head) else heads[cones.head]
+    return cones.value @ heads, cp.SOC(tops, rows, axis=1)
 
 
 def membership(domain: Domain, y: Any, unit: float, on: Any = 1.0) -> list[Any]:
     """The decision's own set, in units of a size (P4), shrunk to nothing where `on` is zero (S10)."""
-    low, high = domain.decision.lower / unit, domain.decision.upper / unit
+    low, high = domain.set.lower / unit, domain.set.upper / unit
     if domain.width == 1:
         return [y >= low * on, y <= high * on]
     inside: list[Any] = [cp.SOC(high * cp.Constant(1.0) * on, y)]
-    if len(domain.edges):
-        (ax, ay), (bx, by) = domain.edges
+    if len(domain.set.edges):
+        (ax, ay), (bx, by) = domain.set.edges
         inside += [ax * y[1] - ay * y[0] >= 0.0, bx * y[1] - by * y[0] <= 0.0]
     return inside
 
@@ -194,10 +192,10 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
     held = [c for d, unit in zip(problem.domains, units, strict=True) for c in membership(d, y[d.columns], unit)]
     for maximum, norm in problem.limits:
         moves = np.einsum("kdn,nm->kdm", norm.slope, step)
-        if np.any(moves != 0.0) and norm.norm is Norm.SUM:
+        if np.any(moves != 0.0) and norm.norm.sums_lengths:
             k, d = norm.constant.shape
             rows = norm.rows(x) + cp.reshape(moves.reshape(k * d, -1) @ z, (k, d), order="C")
-            held.append(norm.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
+            held.append(norm.grid.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
     program = cp.Problem(cp.Minimize(cp.sum(cp.hstack(sizes))), held)
     with warnings.catch_warnings():
         # the loads stay what they are however accurate this is

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
 from laufruhe.load_models.affine import AffineNorm, AffineProblem, reach
-from laufruhe.load_models.domain import Domain
-from laufruhe.numerics.mixed_norms import Norm
+from laufruhe.numerics.norms import Cones
+from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers
 
 Array = NDArray[np.float64]
@@ -54,26 +54,23 @@ class _Block:
 
     Attributes
     ----------
+    cones
+        Its form.
     unit
         Rows are counted in it.
-    heads
-        First column, and how many follow.
+    first
+        First column of its heads.
     """
 
     norm: AffineNorm
+    cones: Cones
     unit: float
-    heads: tuple[int, int]
+    first: int
 
     @property
-    def factors(self) -> Array:
-        """What each row is multiplied by inside its cone."""
-        rms = self.norm.norm is Norm.RMS
-        return np.sqrt(self.norm.weights) if rms else np.ones(len(self.norm.weights))
-
-    @property
-    def value(self) -> Array:
-        """The norm as a linear function of its heads."""
-        return self.norm.weights if self.norm.norm is Norm.SUM else np.ones(1)
+    def heads(self) -> slice:
+        """Columns of the heads."""
+        return slice(self.first, self.first + len(self.cones.value))
 
 
 class _Rows:
@@ -118,19 +115,18 @@ def solve_direct(problem: AffineProblem) -> ConicSolution:
         *((norm, unit) for _, norm in problem.terms),
         *((norm, reach(problem, [norm])) for _, norm in problem.limits),
     ]:
-        heads = len(norm.weights) if norm.norm is Norm.SUM else 1
-        blocks.append(_Block(norm, size, (columns, heads)))
-        columns += heads
+        blocks.append(_Block(norm, norm.norm.cones(norm.grid), size, columns))
+        columns = blocks[-1].heads.stop
     rows = _Rows(columns)
     for domain in problem.domains:
         _add_domain(rows, domain, float(problem.units[domain.start]))
     for (maximum, _), block in zip(problem.limits, blocks[len(problem.terms) :], strict=True):
-        rows.add(0, np.arange(*_span(block)), block.value, np.array([maximum / block.unit]))
+        rows.add(0, np.arange(columns)[block.heads], block.cones.value, np.array([maximum / block.unit]))
         rows.cones.append(clarabel.NonnegativeConeT(1))
     starts = [_add_norm(rows, block, problem) for block in blocks]
     cost = np.zeros(columns)
     for (weight, _), block in zip(problem.terms, blocks, strict=False):
-        cost[slice(*_span(block))] = weight * block.value
+        cost[block.heads] = weight * block.cones.value
     found = _solved(rows, cost, TIGHT)
     if not _is_told(found):
         # limits that all but contradict each other
@@ -171,21 +167,17 @@ def _answer(problem: AffineProblem, blocks: list[_Block], starts: list[int], fou
     return ConicSolution(x, Multipliers(terms, tuple(rows[len(terms) :])), seconds, iterations)
 
 
-def _span(block: _Block) -> tuple[int, int]:
-    return block.heads[0], block.heads[0] + block.heads[1]
-
-
 def _add_domain(rows: _Rows, domain: Domain, unit: float) -> None:
     """The decision's own set, in units of a size (P4)."""
     import clarabel
 
-    upper, lower = domain.decision.upper / unit, domain.decision.lower / unit
+    upper, lower = domain.set.upper / unit, domain.set.lower / unit
     if domain.width == 1:
         rows.add([0, 1], domain.start, [1.0, -1.0], np.array([upper, -lower]))
         rows.cones.append(clarabel.NonnegativeConeT(2))
         return
-    if len(domain.edges):
-        (ax, ay), (bx, by) = domain.edges
+    if len(domain.set.edges):
+        (ax, ay), (bx, by) = domain.set.edges
         across = np.array([domain.start, domain.start + 1])
         rows.add([[0], [1]], across, [[ay, -ax], [-by, bx]], np.zeros(2))
         rows.cones.append(clarabel.NonnegativeConeT(2))
@@ -197,35 +189,33 @@ def _add_norm(rows: _Rows, block: _Block, problem: AffineProblem) -> int:
     """V0 + B x in a cone a row, or in one cone for a root mean square; returns the first row."""
     import clarabel
 
-    norm, start = block.norm, rows.count
+    norm, cones, start = block.norm, block.cones, rows.count
     k, d = norm.constant.shape
-    slope = norm.slope * (problem.units / block.unit) * block.factors[:, None, None]
-    constant = norm.constant / block.unit * block.factors[:, None]
-    whole = norm.norm is Norm.RMS
+    slope = norm.slope * (problem.units / block.unit) * cones.factors[:, None, None]
+    constant = norm.constant / block.unit * cones.factors[:, None]
     # rows of the program in the order of its cones: a head, then what is under it
-    width = k * d + 1 if whole else d + 1
-    heads = np.zeros(1, dtype=int) if whole else np.arange(k) * width
-    under = (1 + np.arange(k * d).reshape(k, d)) if whole else heads[:, None] + 1 + np.arange(d)
-    right = np.zeros(width if whole else k * width)
+    width = k * d + 1 if cones.whole else d + 1
+    heads = np.arange(len(cones.head)) * width
+    under = (1 + np.arange(k * d).reshape(k, d)) if cones.whole else heads[:, None] + 1 + np.arange(d)
+    right = np.zeros(width * len(heads))
     right[under] = constant
     places = np.broadcast_to(under[:, :, None], slope.shape)
     across = np.broadcast_to(np.arange(problem.size), slope.shape)
-    head_columns = block.heads[0] + (np.arange(k) if norm.norm is Norm.SUM else np.zeros(len(heads), dtype=int))
     rows.add(
         np.concatenate([heads, places.ravel()]),
-        np.concatenate([head_columns, across.ravel()]),
+        np.concatenate([block.first + cones.head, across.ravel()]),
         np.concatenate([np.full(len(heads), -1.0), -slope.ravel()]),
         right,
     )
-    rows.cones += [clarabel.SecondOrderConeT(width)] * (1 if whole else k)
+    rows.cones += [clarabel.SecondOrderConeT(width)] * len(heads)
     return start
 
 
 def _dual_rows(block: _Block, duals: Array, start: int, objective_unit: float) -> Array:
     """mu Z of the rows [SI] (P2), in the objective's own unit."""
     k, d = block.norm.constant.shape
-    if block.norm.norm is Norm.RMS:
+    if block.cones.whole:
         z = -duals[start + 1 : start + 1 + k * d].reshape(k, d)
     else:
         z = -duals[start : start + k * (d + 1)].reshape(k, d + 1)[:, 1:]
-    return np.asarray(z * block.factors[:, None] * (objective_unit / block.unit))
+    return np.asarray(z * block.cones.factors[:, None] * (objective_unit / block.unit))

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
 from laufruhe.load_models.star_model import StarNorm, StarProblem
-from laufruhe.numerics import mixed_norms
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.solvers.conic import held_norm, membership
 
@@ -147,7 +146,7 @@ class _Rows:
         flat = norm.constant.reshape(-1) / unit + moves @ self._steps
         if self._size:
             flat = flat + (norm.slope * (self._scales / unit)).reshape(k * d, -1) @ self._y
-        return held_norm(norm.norm, norm.weights, cp.reshape(flat, (k, d), order="C"))
+        return held_norm(norm.norm.cones(norm.grid), cp.reshape(flat, (k, d), order="C"))
 
 
 def _stars(steps: Any, space: StarSpace) -> list[Any]:
@@ -178,8 +177,6 @@ def _shafts(built: Any, counts: Sequence[int], masses: Sequence[float], most: fl
 
 def _reach(norm: StarNorm) -> float:
     """A size of the norm that is not zero: what one throw, or one unbalance, can make of it."""
-    weights = norm.weights
-    sizes = [mixed_norms.value(norm.norm, weights, norm.constant)]
-    sizes += [mixed_norms.value(norm.norm, weights, rows) for rows in norm.moves.reshape(-1, *norm.constant.shape)]
-    sizes += [mixed_norms.value(norm.norm, weights, norm.slope[..., j]) for j in range(norm.slope.shape[-1])]
-    return max(sizes)
+    parts = [norm.constant, *norm.moves.reshape(-1, *norm.constant.shape)]
+    parts += [norm.slope[..., j] for j in range(norm.slope.shape[-1])]
+    return max(norm.norm.value(norm.grid, rows) for rows in parts)

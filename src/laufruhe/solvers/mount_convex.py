@@ -26,17 +26,13 @@ from numpy.typing import NDArray
 
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import weight_wrench
-from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.mount_design import (
-    STIFFNESS,
-    MountLimit,
-    MountMeasure,
-    MountQuantity,
-    mounting_in,
-    torque_roll_rows,
-)
+from laufruhe.physics.mount_numbers import torque_roll_rows
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import STIFFNESS, Decision
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.mount_resonance import evaluate_start
-from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate, Proof, gap_unit
 from laufruhe.solvers.mount_result import FEASIBLE, infeasible_mounts, mount_result
@@ -44,7 +40,7 @@ from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
 
-CONVEX = (MountMeasure.SAG, MountMeasure.TORQUE_ROLL, MountMeasure.TOTAL_STIFFNESS)
+CONVEX = (channels.SAG, channels.TORQUE_ROLL, channels.TOTAL_STIFFNESS)
 
 
 class ConvexFunction(Protocol):
@@ -196,82 +192,72 @@ class ConvexDuals:
 
 def is_convex(problem: Problem) -> bool:
     """Whether stiffness alone is open, and all that is asked is convex in it."""
-    design = problem.mount_design
-    if problem.objective or problem.limits or problem.decisions or not design.terms:
+    if problem.load_terms or problem.load_limits or not problem.objective:
         return False
-    if not all(decision.is_stiffness for decision in design.decisions):
+    if not all(decision.is_stiffness for decision in problem.decisions):
         return False
-    asked = all(quantity.measure in CONVEX for quantity, _ in design.terms)
-    return asked and all(_convex_sides(limit) for limit in design.limits)
+    asked = all(term.measure.channel in CONVEX for term in problem.objective)
+    return asked and all(_convex_sides(limit) for limit in problem.limits)
 
 
-def _convex_sides(limit: MountLimit) -> bool:
-    measure = limit.quantity.measure
-    if measure is MountMeasure.FREQUENCIES:
+def _convex_sides(limit: Limit) -> bool:
+    channel = limit.measure.channel
+    if channel is channels.FREQUENCIES:
         return limit.outside is None
-    if measure is MountMeasure.TOTAL_STIFFNESS:
+    if channel is channels.TOTAL_STIFFNESS:
         return True
-    return measure in CONVEX and limit.minimum is None
+    return channel in CONVEX and limit.minimum == -math.inf
 
 
 def convex_program(problem: Problem) -> ConvexProgram:
     """The functions of a problem that `is_convex`."""
-    design = problem.mount_design
-    lower, upper = (np.array([getattr(d, side) for d in design.decisions]) for side in ("lower", "upper"))
-
-    def mounting(x: Array) -> ElasticMounting:
-        return mounting_in(design.applied(problem.engine, [float(v) for v in x]))
-
-    given = mounting(np.array([d.start for d in design.decisions]))
+    decisions = problem.decisions
+    lower, upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+    start = np.array([d.start_number for d in decisions])
+    given = mounting_in(problem.design(start.tolist()))
     _, root = torque_roll_rows(given)
-    slopes = np.array([root @ _slope(given, problem, k) @ root.T for k in range(len(design.decisions))])
-    start = np.array([d.start for d in design.decisions])
-    base = root @ given.stiffness @ root.T - np.tensordot(start, slopes.reshape(-1, 6, 6), axes=1)
-    matrices = Matrices(base, slopes.reshape(-1, 6, 6))
-    terms = tuple((weight, _function(q, matrices, given, problem)) for q, weight in design.terms)
-    limits = [part for k, limit in enumerate(design.limits) for part in _limits(limit, k, matrices, given, problem)]
+    slopes = np.array([root @ _slope(given, decision) @ root.T for decision in decisions]).reshape(-1, 6, 6)
+    base = root @ given.stiffness @ root.T - np.tensordot(start, slopes, axes=1)
+    matrices = Matrices(base, slopes)
+    terms = tuple((term.weight, _function(term.measure, matrices, given, problem)) for term in problem.objective)
+    limits = [part for k, limit in enumerate(problem.limits) for part in _limits(limit, k, matrices, given, problem)]
     return ConvexProgram(matrices, lower, upper, terms, tuple(limits))
 
 
-def _slope(mounting: ElasticMounting, problem: Problem, k: int) -> Array:
+def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
     """dK of one decision: exact, for K is linear in it (E3)."""
     total = np.zeros((6, 6))
-    for drive in problem.mount_design.decisions[k].drives:
+    for drive in decision.mount_drives:
         axis = np.array(mounting.mounts[drive.mount].orientation)[drive.number]
         row = axis @ mounting.motions[drive.mount]
         total += drive.gain * np.outer(row, row)
     return total
 
 
-def _function(
-    quantity: MountQuantity, matrices: Matrices, mounting: ElasticMounting, problem: Problem
-) -> ConvexFunction:
+def _function(quantity: Measure, matrices: Matrices, mounting: ElasticMounting, problem: Problem) -> ConvexFunction:
     along, root = torque_roll_rows(mounting)
-    if quantity.measure is MountMeasure.SAG:
+    if quantity.channel is channels.SAG:
         weight = weight_wrench(mounting.block)
         return Compliance(matrices, root @ weight, 1.0 / -weight[2])
-    if quantity.measure is MountMeasure.TORQUE_ROLL:
+    if quantity.channel is channels.TORQUE_ROLL:
         return Residual(matrices, along, (math.tau * quantity.frequency) ** 2)
-    design = problem.mount_design
-    gradient = np.array([sum(drive.gain for drive in d.drives) for d in design.decisions])
-    given = sum(sum(row[STIFFNESS]) for row in design.numbers)
-    return Linear(given - float(gradient @ [d.start for d in design.decisions]), gradient)
+    gradient = np.array([sum(drive.gain for drive in d.mount_drives) for d in problem.decisions])
+    given = sum(sum(row[STIFFNESS]) for row in problem.mount_numbers)
+    return Linear(given - float(gradient @ [d.start_number for d in problem.decisions]), gradient)
 
 
-def _limits(
-    limit: MountLimit, k: int, matrices: Matrices, mounting: ElasticMounting, problem: Problem
-) -> list[ConvexLimit]:
+def _limits(limit: Limit, k: int, matrices: Matrices, mounting: ElasticMounting, problem: Problem) -> list[ConvexLimit]:
     found = []
-    if limit.quantity.measure is MountMeasure.FREQUENCIES:
-        if limit.maximum is not None:
+    if limit.measure.channel is channels.FREQUENCIES:
+        if limit.maximum < math.inf:
             found.append(ConvexLimit(Eigenvalue(matrices, 1.0), (math.tau * limit.maximum) ** 2, k))
-        if limit.minimum is not None:
+        if limit.minimum > -math.inf:
             found.append(ConvexLimit(Eigenvalue(matrices, -1.0), -((math.tau * limit.minimum) ** 2), k))
         return found
-    function = _function(limit.quantity, matrices, mounting, problem)
-    if limit.maximum is not None:
+    function = _function(limit.measure, matrices, mounting, problem)
+    if limit.maximum < math.inf:
         found.append(ConvexLimit(function, limit.maximum, k))
-    if limit.minimum is not None and isinstance(function, Linear):
+    if limit.minimum > -math.inf and isinstance(function, Linear):
         found.append(ConvexLimit(Linear(-function.constant, -function.gradient), -limit.minimum, k))
     return found
 
@@ -304,11 +290,11 @@ def solve_convex_mounts(problem: Problem) -> Result:
         return infeasible_mounts(problem, initial, _conflict(program, problem), timing)
     x, duals = found
     bound, gradient = dual_bound(program, x, duals)
-    final = evaluate(problem, problem.design(problem.start, [float(v) for v in x]))
-    value, given = whole_objective(problem, final), whole_objective(problem, initial)
+    final = evaluate(problem, problem.design([float(v) for v in x]))
+    value, given = objective_value(problem, final), objective_value(problem, initial)
     bound = float(max(bound, 0.0))
     gap = float(max(value - bound, 0.0) / gap_unit(value, given))
-    worst = max((excess(limit, final) for limit in problem.mount_design.limits), default=0.0)
+    worst = final.excess(problem.limits)
     proven = gap <= problem.tolerance and worst <= FEASIBLE
     certificate = Certificate(
         Proof.GLOBAL if proven else Proof.WITHIN_GAP, bound, gap, _residual(program, x, duals, gradient),
@@ -321,11 +307,11 @@ def solve_convex_mounts(problem: Problem) -> Result:
 
 def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> list[float]:
     """Fall of the objective per unit by which each limit is relaxed, in the limit's own unit."""
-    prices = [0.0] * len(problem.mount_design.limits)
+    prices = [0.0] * len(problem.mount_limits)
     for limit, price in zip(program.limits, duals.prices, strict=True):
-        source = problem.mount_design.limits[limit.source]
+        source = problem.mount_limits[limit.source]
         slope = 1.0
-        if source.quantity.measure is MountMeasure.FREQUENCIES:
+        if source.measure.channel is channels.FREQUENCIES:
             # the limit is on the square of 2 pi f
             slope = 2.0 * math.tau * math.sqrt(abs(limit.maximum))
         prices[limit.source] += price * slope
@@ -350,10 +336,10 @@ def _conflict(program: ConvexProgram, problem: Problem) -> tuple[str, ...]:
     """A smallest set of limits that no stiffness within the bounds meets together."""
     from laufruhe.solvers.mount_cones import solve_cones
 
-    kept: Sequence[int] = range(len(problem.mount_design.limits))
-    for k in range(len(problem.mount_design.limits)):
+    kept: Sequence[int] = range(len(problem.mount_limits))
+    for k in range(len(problem.mount_limits)):
         without = [j for j in kept if j != k]
         fewer = replace(program, terms=(), limits=tuple(limit for limit in program.limits if limit.source in without))
         if solve_cones(fewer) is None:
             kept = without
-    return tuple(problem.mount_design.limits[k].name for k in kept)
+    return tuple(problem.mount_limits[k].name for k in kept)

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.domain import domains_of
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.mount_design import NOTHING_ASKED, MountMeasure, MountQuantity
+from laufruhe.problem import channels
+from laufruhe.problem.decision import domains_of
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.mount_resonance import evaluate_start
-from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate, Proof, gap_unit
@@ -23,7 +23,6 @@ from laufruhe.prove.subdivision import Divided, divided_bound, divides
 from laufruhe.prove.transmitted_bound import transmitted_bound
 from laufruhe.solvers.accuracy import sampling_error
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
-from laufruhe.solvers.mount_program import JointProgram
 from laufruhe.solvers.mount_result import (
     FEASIBLE,
     infeasible_mounts,
@@ -34,6 +33,7 @@ from laufruhe.solvers.mount_result import (
 from laufruhe.solvers.mount_starts import columns_of, start_points, unbalances_of
 from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
+from laufruhe.solvers.smooth_program import SmoothProgram
 from laufruhe.solvers.unbalances import decision_values, solve_unbalances
 
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ def solve_joint(problem: Problem, workers: int | None = None) -> Result:
     Parameters
     ----------
     problem
-        On elastic mounts; `mount_design.starts` points are started from.
+        On elastic mounts; `search.starts` points are started from.
     workers
         Processes; as many as processors when left out.
 
@@ -95,8 +95,8 @@ def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tup
     first = None
     if even is not None and even.decisions:
         found = {decision.name: decision.value for decision in even.decisions}
-        domains = domains_of(problem.decisions)
-        mounts = [found[decision.name] for decision in problem.mount_design.decisions]
+        domains = domains_of(problem.unbalances)
+        mounts = [found[decision.name] for decision in problem.mount_decisions]
         first = mounts, columns_of(domains, unbalances_of(problem, even))
     result, turns = _solved(problem, None, moves, first)
     return result, moves.candidate(turns)
@@ -110,7 +110,7 @@ def _solved(
     initial = evaluate_start(problem)
     points = start_points(problem)
     points = points if first is None else [first, *points[1:]]
-    joint = JointProgram(problem, moves=moves)
+    joint = SmoothProgram(problem, moves=moves)
     modelled = time.perf_counter()
     optima = _searched(problem, joint, points, workers)
     best, design = _first_allowed(joint, optima)
@@ -125,16 +125,16 @@ def _solved(
 
 
 def _searched(
-    problem: Problem, joint: JointProgram, points: Sequence[tuple[list[float], Array]], workers: int | None
+    problem: Problem, joint: SmoothProgram, points: Sequence[tuple[list[float], Array]], workers: int | None
 ) -> tuple[LocalOptimum, ...]:
     """Local optima from the points, and from others drawn around the best of them."""
-    generator = np.random.default_rng(problem.mount_design.seed)
+    generator = np.random.default_rng(problem.search.seed)
     starts = [joint.start(mounts, columns, _nudged(joint, generator, k)) for k, (mounts, columns) in enumerate(points)]
     optima = solve_nonlinear(joint.program, starts, workers, ITERATIONS)
     around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
     if not around or len(points) < 2:
         return optima
-    decisions = problem.mount_design.decisions
+    decisions = problem.mount_decisions
     low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
     again = []
     for k in range(max(len(points) // 2, 1)):
@@ -148,7 +148,7 @@ def _searched(
     return tuple(sorted((*optima, *moved), key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
 
 
-def _nudged(joint: JointProgram, generator: np.random.Generator, k: int) -> Array:
+def _nudged(joint: SmoothProgram, generator: np.random.Generator, k: int) -> Array:
     """Throws to start from: on their star first, then beside it, for a star that is its own image may be a saddle."""
     if joint.moves is None or k == 0:
         return joint.turns(np.zeros(joint.program.x.numel()))
@@ -158,17 +158,18 @@ def _nudged(joint: JointProgram, generator: np.random.Generator, k: int) -> Arra
 
 def _judged(problem: Problem, mounts: list[float], unbalances: list[complex]) -> _Design | None:
     try:
-        evaluation = evaluate(problem, problem.design(unbalances, mounts))
+        evaluation = evaluate(
+            problem, problem.design([*unbalances, *mounts], [*problem.unbalances, *problem.mount_decisions])
+        )
     except ModelError:
         # a resonance without damping is no design
         return None
-    worst = max((excess(limit, evaluation) for limit in problem.mount_design.limits), default=0.0)
-    loads = [(evaluation.value(limit.quantity), limit.maximum) for limit in problem.limits]
-    worst = max([worst, *((value - most) / (most or 1.0) for value, most in loads)])
-    return _Design(problem, mounts, unbalances, evaluation, whole_objective(problem, evaluation), worst)
+    return _Design(
+        problem, mounts, unbalances, evaluation, objective_value(problem, evaluation), evaluation.excess(problem.limits)
+    )
 
 
-def _first_allowed(joint: JointProgram, optima: Sequence[LocalOptimum]) -> tuple[LocalOptimum | None, _Design | None]:
+def _first_allowed(joint: SmoothProgram, optima: Sequence[LocalOptimum]) -> tuple[LocalOptimum | None, _Design | None]:
     """The best optimum by the exact model: within limits first, then by value."""
     found = []
     for optimum in optima:
@@ -190,7 +191,7 @@ def _tightened(
         if best is None or design.excess <= FEASIBLE or design.excess > 0.05:
             break
         margin += 1.05 * design.excess
-        joint = JointProgram(problem, margin, moves)
+        joint = SmoothProgram(problem, margin, moves)
         again = solve_nonlinear(joint.program, [best.x], workers=1)
         better, allowed = _first_allowed(joint, again)
         if better is None or allowed is None:
@@ -202,13 +203,13 @@ def _tightened(
 def _rebalanced(design: _Design) -> tuple[_Design, float] | None:
     """Unbalances decided anew on the mounts found, with proof; None where that is not convex."""
     problem = design.problem
-    if not problem.decisions or not problem.objective or problem.mount_design.terms:
+    if not problem.unbalances or not problem.load_terms or problem.mount_terms:
         return None
-    if any(limit.quantity.unit == "" for limit in problem.mount_design.limits):
+    if any(limit.measure.unit == "" for limit in problem.mount_limits):
         # transmissibility depends on what excites
         return None
-    held = problem.mount_design.applied(problem.engine, design.mounts)
-    result = solve_unbalances(replace(problem, engine=held, mount_design=NOTHING_ASKED))
+    held = problem.design(design.mounts, problem.mount_decisions)
+    result = solve_unbalances(replace(problem, engine=held).balance)
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return None
     values = unbalances_of(problem, result)
@@ -218,19 +219,13 @@ def _rebalanced(design: _Design) -> tuple[_Design, float] | None:
 
 def _convex_part(problem: Problem) -> Problem | None:
     """The problem without all that is not convex in the stiffnesses; None where more than these is open."""
-    design = problem.mount_design
-    if not design.decisions or not all(decision.is_stiffness for decision in design.decisions):
+    decisions = problem.mount_decisions
+    if not decisions or not all(decision.is_stiffness for decision in decisions):
         return None
-    alone = replace(problem, objective=(), decisions=(), limits=())
-    terms = tuple(term for term in design.terms if term[0].measure in CONVEX) or (
-        (MountQuantity(MountMeasure.TOTAL_STIFFNESS), 1.0),
-    )
-    limits = tuple(
-        limit
-        for limit in design.limits
-        if is_convex(replace(alone, mount_design=replace(design, terms=terms, limits=(limit,))))
-    )
-    return replace(alone, mount_design=replace(design, terms=terms, limits=limits))
+    terms = tuple(term for term in problem.mount_terms if term.measure.channel in CONVEX)
+    alone = replace(problem, objective=terms or (Term(Measure(channels.TOTAL_STIFFNESS)),), decisions=decisions)
+    limits = tuple(limit for limit in problem.mount_limits if is_convex(replace(alone, limits=(limit,))))
+    return replace(alone, limits=limits)
 
 
 def _proven_conflict(problem: Problem) -> tuple[str, ...]:
@@ -242,21 +237,21 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
 def _bound(problem: Problem) -> float:
     """What no design goes under: by least transmitted forces (E34), or by the convex part alone; zero for neither."""
     convex = _convex_part(problem)
-    if convex is None or problem.objective or convex.mount_design.terms != problem.mount_design.terms:
+    if convex is None or convex.objective != problem.objective:
         return transmitted_bound(problem)
     certificate = solve_convex_mounts(convex).certificate
     return certificate.lower_bound if certificate is not None else 0.0
 
 
 def _unbalance_values(problem: Problem, values: Sequence[complex]) -> tuple[DecisionValue, ...]:
-    domains = domains_of(problem.decisions)
+    domains = domains_of(problem.unbalances)
     x = columns_of(domains, values)
     return tuple(entry for domain in domains for entry in decision_values(domain, x, np.zeros_like(x)))
 
 
 def _result(
     problem: Problem,
-    joint: JointProgram,
+    joint: SmoothProgram,
     initial: Evaluation,
     design: _Design,
     best: LocalOptimum,
@@ -276,7 +271,7 @@ def _result(
         _proof(gap, problem.tolerance, divided), divided.bound, gap, best.kkt_residual,
         _method(optima, scale, proven, divided),
     )  # fmt: skip
-    prices = [joint.price(limit.name, best.multipliers) for limit in problem.mount_design.limits]
+    prices = [joint.price(limit.name, best.multipliers) for limit in problem.mount_limits]
     limits = (*_load_limits(problem, design, joint, best), *mount_limits(problem, design.evaluation, prices))
     status = Status.FAILED if not met else Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     return Result(
@@ -289,7 +284,7 @@ def _result(
         initial=initial,
         final=design.evaluation,
         message="" if met else f"the best design found breaks {_broken_among(limits)}; relax it, or open more",
-        error_estimate=sampling_error(problem, design.evaluation) if problem.objective else 0.0,
+        error_estimate=sampling_error(problem, design.evaluation),
         timing=timing,
     )
 
@@ -326,19 +321,23 @@ def _broken_among(limits: Sequence[LimitValue]) -> str:
     return " and ".join(names) or "a limit"
 
 
-def _load_limits(problem: Problem, design: _Design, joint: JointProgram, best: LocalOptimum) -> tuple[LimitValue, ...]:
+def _load_limits(problem: Problem, design: _Design, joint: SmoothProgram, best: LocalOptimum) -> tuple[LimitValue, ...]:
     """How the design stands to limits on loads and masses."""
     out = []
-    for limit in problem.limits:
-        value = design.evaluation.value(limit.quantity)
+    for limit in problem.load_limits:
+        value = design.evaluation.value(limit.measure)
         active = value >= limit.maximum * (1.0 - 1e-4)
         price = joint.price(limit.name, best.multipliers) if active else 0.0
-        out.append(LimitValue(limit.name, value, limit.maximum, limit.quantity.unit, active, price))
+        out.append(LimitValue(limit.name, value, limit.maximum, limit.measure.unit, active, price))
     return tuple(out)
 
 
 def _none(
-    problem: Problem, joint: JointProgram, initial: Evaluation, optima: Sequence[LocalOptimum], timing: dict[str, float]
+    problem: Problem,
+    joint: SmoothProgram,
+    initial: Evaluation,
+    optima: Sequence[LocalOptimum],
+    timing: dict[str, float],
 ) -> Result:
     """No start ended at a design within the limits: not a proof, unless the convex limits alone contradict."""
     conflict = _proven_conflict(problem)
@@ -354,7 +353,7 @@ def _none(
     return replace(result, status=Status.FAILED, message=message)
 
 
-def _broken(joint: JointProgram, optimum: LocalOptimum) -> str:
+def _broken(joint: SmoothProgram, optimum: LocalOptimum) -> str:
     program = joint.program
     g = optimum.constraints
     if len(g) != len(program.constraint_names):

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.mount_values import excess, limit_value, whole_objective
+from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible
@@ -23,8 +22,8 @@ def objective_of(problem: Problem, initial: Evaluation, final: Evaluation) -> Ob
     """The objective of the design and of the one given; None where nothing is minimised."""
     if problem.objective_unit is None:
         return None
-    value = whole_objective(problem, final)
-    given = value if final is initial else whole_objective(problem, initial)
+    value = objective_value(problem, final)
+    given = value if final is initial else objective_value(problem, initial)
     return ObjectiveValue.of(problem, value, given)
 
 
@@ -33,12 +32,12 @@ def mount_decisions(
 ) -> tuple[DecisionValue, ...]:
     """Decisions about the mounts; the gradient, where known, prices their bounds."""
     out = []
-    for k, (decision, value) in enumerate(zip(problem.mount_design.decisions, values, strict=True)):
+    for k, (decision, value) in enumerate(zip(problem.mount_decisions, values, strict=True)):
         reach = ACTIVE * (decision.upper - decision.lower)
         at_bound = value <= decision.lower + reach or value >= decision.upper - reach
         price = abs(float(gradient[k])) if gradient is not None and at_bound else 0.0
         out.append(
-            DecisionValue(decision.name, value, decision.unit, decision.lower, decision.upper, decision.start,
+            DecisionValue(decision.name, value, decision.unit, decision.lower, decision.upper, decision.start_number,
                           at_bound, price)
         )  # fmt: skip
     return tuple(out)
@@ -49,11 +48,12 @@ def mount_limits(
 ) -> tuple[LimitValue, ...]:
     """How a design stands to the limits on mounts and modes (E15)."""
     out = []
-    prices = [0.0] * len(problem.mount_design.limits) if prices is None else prices
-    for limit, price in zip(problem.mount_design.limits, prices, strict=True):
-        value, edge, side = limit_value(limit, evaluation)
-        active = bool(excess(limit, evaluation) >= -ACTIVE)
-        out.append(LimitValue(limit.name, value, edge, limit.quantity.unit, active, price if active else 0.0, side))
+    prices = [0.0] * len(problem.mount_limits) if prices is None else prices
+    for limit, price in zip(problem.mount_limits, prices, strict=True):
+        found = evaluation.standing(limit)
+        active = found.excess >= -ACTIVE
+        price = price if active else 0.0
+        out.append(LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side))
     return tuple(out)
 
 
@@ -68,7 +68,7 @@ def mount_result(
     optimal: bool,
 ) -> Result:
     """A result whose decisions are about mounts alone."""
-    met = all(excess(limit, final) <= FEASIBLE for limit in problem.mount_design.limits)
+    met = final.excess(problem.mount_limits) <= FEASIBLE
     status = Status.FAILED if not met else Status.OPTIMAL if optimal else Status.FEASIBLE
     return Result(
         problem=problem,

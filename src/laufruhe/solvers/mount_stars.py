@@ -18,13 +18,12 @@ from dataclasses import dataclass, replace
 from laufruhe.errors import ModelError
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.measure import MASSES, Quantity, Subject
-from laufruhe.problem.mount_design import NOTHING_ASKED
-from laufruhe.problem.mount_values import whole_objective
+from laufruhe.numerics.norms import RMS
+from laufruhe.problem import channels
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.phasing import Candidate, Method, Phasing
-from laufruhe.problem.problem import Problem, Term
+from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import FLOOR, Certificate, Proof
 from laufruhe.solvers.mount_nonlinear import solve_moved
 from laufruhe.solvers.mounts import solve_mounts
@@ -129,7 +128,7 @@ def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> t
     """Stars of one geometry with their least objective on the mounts as given (S15)."""
     model = StarModel(phasing, family.space, family.geometry, family.fixed)
     given = model.problem
-    floor = FLOOR * whole_objective(given, evaluate(given))
+    floor = FLOOR * objective_value(given, evaluate(given))
     found = search_designs(model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, floor)
     stars = [(s.value, _Star(family.throws(s.star), s.star, s.built, family.geometry)) for s in found.solved]
     return stars, found.designs
@@ -137,21 +136,21 @@ def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> t
 
 def _on_given_mounts(problem: Problem) -> Problem:
     """What ranks stars: the objective, or else the RMS mount force, under the limits on masses alone."""
-    terms = problem.objective or (Term(Quantity(Subject.MOUNT_FORCE, Norm.RMS)),)
-    masses = tuple(limit for limit in problem.limits if limit.quantity.subject in MASSES)
-    return replace(problem, objective=terms, limits=masses, mount_design=NOTHING_ASKED)
+    terms = problem.load_terms or (Term(Measure(channels.MOUNT_FORCE, RMS)),)
+    masses = tuple(limit for limit in problem.limits if limit.measure.is_mass)
+    return replace(problem.balance, objective=terms, limits=masses)
 
 
 def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts: int) -> Problem:
     """The joint problem of one star, nothing of its phasing open any more."""
     own = phasing.realise(candidate)
-    design = replace(own.mount_design, starts=starts, seed=problem.mount_design.seed)
-    return replace(own, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, mount_design=design)
+    search = replace(problem.search, starts=starts)
+    return replace(own, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=search)
 
 
 def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[_Star], say: Callable[[str], None]) -> list[_Found]:
     """Every star with a quarter of the starts, the best first."""
-    starts = problem.mount_design.starts
+    starts = problem.search.starts
     few = starts if len(stars) == 1 else min(starts, max(SHORTEST_SEARCH, starts // FEWER_STARTS))
     found = []
     for k, star in enumerate(stars):
@@ -177,14 +176,14 @@ def _candidate(phasing: Phasing, star: _Star) -> Candidate | None:
 def _solved_fully(problem: Problem, found: list[_Found], say: Callable[[str], None]) -> list[_Found]:
     """The best few again with all starts; the better of both answers is kept."""
     out = list(found)
-    starts = problem.mount_design.starts
+    starts = problem.search.starts
     for k, each in enumerate(found[:MOST_SEARCHED]):
         own = each.result.problem
-        if own.mount_design.starts >= starts:
+        if own.search.starts >= starts:
             continue
         say(f"mounts of the best stars, {k + 1} of {min(len(found), MOST_SEARCHED)}")
-        design = replace(own.mount_design, starts=starts)
-        again = replace(each, result=solve_mounts(replace(own, mount_design=design)))
+        more = replace(own, search=replace(own.search, starts=starts))
+        again = replace(each, result=solve_mounts(more))
         out[k] = min(again, each, key=lambda f: f.key)
     return sorted(out, key=lambda f: f.key)
 
@@ -198,7 +197,7 @@ def _moved(problem: Problem, phasing: Phasing, found: list[_Found], say: Callabl
     out = []
     for k, (candidate, even) in enumerate(starts):
         say(f"throws that leave star {k + 1} of {len(starts)}")
-        own = _problem_of(problem, phasing, candidate, problem.mount_design.starts)
+        own = _problem_of(problem, phasing, candidate, problem.search.starts)
         layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
         result, moved = solve_moved(own, ThrowMoves(phasing, layout, candidate, phasing.intervals), even)
         if result.objective is not None and not phasing.intervals.holds(firing_intervals(phasing, moved)):
@@ -218,7 +217,7 @@ def _result(problem: Problem, phasing: Phasing, found: list[_Found], designs: in
         return _none(problem, found, given, designs)
     whole = len(found) == designs and not phasing.continuous
     result, objective = best.result, best.result.objective
-    initial = whole_objective(problem, given)
+    initial = objective_value(problem, given)
     details = PhasingResult(
         tuple(_entry(phasing, each, whole and each is best) for each in found if not each.key[0]),
         phasing.layout(*best.star.geometry).throw_positions,

@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.domain import Domain, domains_of
-from laufruhe.problem.evaluation import Evaluation, remounted
-from laufruhe.problem.mount_design import NOTHING_ASKED
+from laufruhe.problem.decision import Domain, Value, domains_of
+from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
 from laufruhe.problem.mount_resonance import evaluate_start, objective_size, off_resonance
-from laufruhe.problem.mount_values import excess, whole_objective
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.nonlinear import spread_starts
 from laufruhe.solvers.result import Result
@@ -30,9 +28,9 @@ POOL_SAMPLES = 72
 
 def _balanced(problem: Problem) -> list[complex] | None:
     """Unbalances that are best on the mounts as given, where that is convex."""
-    if not problem.decisions or not problem.objective:
+    if not problem.unbalances or not problem.load_terms:
         return None
-    result = solve_unbalances(replace(off_resonance(problem), mount_design=NOTHING_ASKED))
+    result = solve_unbalances(off_resonance(problem).balance)
     return unbalances_of(problem, result) if result.decisions else None
 
 
@@ -42,26 +40,26 @@ def start_points(problem: Problem) -> list[tuple[list[float], Array]]:
     The design as given, then points spread over all bounds: stiffness by ratio,
     unbalances in their sets.
     """
-    design, domains, balanced = problem.mount_design, domains_of(problem.decisions), _balanced(problem)
-    decisions = design.decisions
+    domains, balanced, search = domains_of(problem.unbalances), _balanced(problem), problem.search
+    decisions = problem.mount_decisions
     ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
     low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
-    given = np.array([d.start for d in decisions])
+    given = np.array([d.start_number for d in decisions])
     low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
     wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
     spread = spread_starts(
         np.concatenate([low_log, -wide]),
         np.concatenate([high_log, wide]),
-        max(POOL * design.starts, LEAST_POOL),
-        design.seed,
+        max(POOL * search.starts, LEAST_POOL),
+        search.seed,
     )
-    best = columns_of(domains, problem.start if balanced is None else balanced)
+    best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
     initial = evaluate_start(problem)
     # on a resonance a search has nowhere to go
     found = [] if initial.resonance else [(given.tolist(), best)]
     spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
     spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
-    for k, row in enumerate(_promising(problem, initial, spread, len(low), design.starts - len(found))):
+    for k, row in enumerate(_promising(problem, initial, spread, len(low), search.starts - len(found))):
         mounts = row[: len(low)]
         own = row[len(low) :].copy()
         for domain in domains:
@@ -76,18 +74,18 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, w
     misses, values = np.full(len(pool), np.inf), np.full(len(pool), np.inf)
     for k, row in enumerate(pool):
         try:
-            design = remounted(given, problem.mount_design.applied(problem.engine, row[:count].tolist()))
+            design = remounted(given, problem.design(row[:count].tolist(), problem.mount_decisions))
         except ModelError:
             continue
-        misses[k] = sum(max(excess(limit, design), 0.0) for limit in problem.mount_design.limits)
-        values[k] = whole_objective(problem, design)
+        misses[k] = sum(max(design.standing(limit).excess, 0.0) for limit in problem.mount_limits)
+        values[k] = objective_value(problem, design)
     best = np.argsort(misses + values / objective_size(problem), kind="stable")
     chosen = list(best[: wanted - wanted // 3])
     chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
     return pool[chosen]
 
 
-def columns_of(domains: Sequence[Domain], values: Sequence[complex]) -> Array:
+def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
     """Decision vector of complex unbalances, each brought into its set."""
     out = np.zeros(sum(domain.width for domain in domains))
     for domain, value in zip(domains, values, strict=True):
@@ -100,7 +98,7 @@ def unbalances_of(problem: Problem, result: Result) -> list[complex]:
     """Complex decisions from the sizes and angles of a result."""
     found = {decision.name: decision.value for decision in result.decisions}
     values = []
-    for decision in problem.decisions:
-        angle = found.get(decision.name.rsplit(".", 1)[0] + ".angle", decision.angle[0])
+    for decision in problem.unbalances:
+        angle = found.get(decision.name.rsplit(".", 1)[0] + ".angle", decision.set.angles[0])
         values.append(cmath.rect(found[decision.name], angle))
     return values

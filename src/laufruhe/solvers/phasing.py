@@ -175,7 +175,7 @@ def _share(problem: Problem) -> float:
 def _keeps(result: Result) -> bool:
     """Whether a design keeps its limits; those of a design without decisions nobody has looked at."""
     limits = result.problem.limits
-    return all(result.final.value(limit.quantity) <= limit.maximum * (1.0 + KEPT) for limit in limits)
+    return all(result.final.value(limit.measure) <= limit.maximum * (1.0 + KEPT) for limit in limits)
 
 
 def _is_even(order: RankedOrder) -> bool:

@@ -16,11 +16,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
-from laufruhe.load_models.domain import Domain
 from laufruhe.load_models.star_model import StarModel, StarProblem
-from laufruhe.numerics import mixed_norms
 from laufruhe.physics.crank_stars import Array, Stars
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import ShaftChoice
 from laufruhe.prove.certificate import Multipliers, best_bound
 
@@ -92,7 +91,7 @@ def allowed_sets(choice: ShaftChoice, domains: Sequence[Domain], owners: Sequenc
     domains, owners
         Decisions, and the set that each belongs to (-1 for none).
     """
-    if any(own >= 0 and d.decision.lower > 0.0 for d, own in zip(domains, owners, strict=True)):
+    if any(own >= 0 and d.set.lower > 0.0 for d, own in zip(domains, owners, strict=True)):
         return choice.allowed
     return tuple(b for b in choice.allowed if not any(set(b) < set(other) for other in choice.allowed))
 
@@ -102,8 +101,8 @@ def owners_of(model: StarModel) -> tuple[int, ...]:
     shaft_of = {rotor.name: rotor.shaft.name for rotor in model.problem.engine.rotors}
     sets = model.phasing.shafts.optional
     out = []
-    for decision in model.problem.decisions:
-        shaft = shaft_of[decision.drives[0].rotor]
+    for decision in model.problem.unbalances:
+        shaft = shaft_of[decision.rotor_drives[0].rotor]
         out.append(next((k for k, names in enumerate(sets) if shaft in names), -1))
     return tuple(out)
 
@@ -232,7 +231,7 @@ def _fixed(
     if any(norm.value(x) > maximum * (1.0 + FEASIBLE) for maximum, norm in whole.limits):
         return None
     value = whole.objective(x)
-    terms = tuple(mixed_norms.subgradient(n.norm, n.weights, n.rows(x)) for _, n in whole.terms)
+    terms = tuple(n.subgradient(x) for _, n in whole.terms)
     limits = tuple(np.zeros_like(n.constant) for _, n in whole.limits)
     return Solved(star, built, value, value, x), cut_of(fine, Multipliers(terms, limits))
 
@@ -341,9 +340,9 @@ def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
     gradient, turns, turning = np.zeros(size), np.zeros((throws, steps, size)), False
     parts = []
     for (weight, norm), given in zip(fine.terms, multipliers.terms, strict=True):
-        parts.append((weight * mixed_norms.dual_feasible(norm.norm, norm.weights, given), norm))
+        parts.append((weight * norm.norm.dual_feasible(norm.grid, given), norm))
     for (maximum, norm), z in zip(fine.limits, multipliers.limits, strict=True):
-        constant -= mixed_norms.dual_norm(norm.norm, norm.weights, z) * maximum
+        constant -= norm.norm.dual_norm(norm.grid, z) * maximum
         parts.append((z, norm))
     for z, norm in parts:
         constant += float(np.vdot(z, norm.constant))

@@ -11,10 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm, AffineProblem
-from laufruhe.load_models.domain import Domain
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.evaluation import PEAK_REFINEMENT, Evaluation, evaluate, objective_value
-from laufruhe.problem.measure import MASSES
+from laufruhe.problem.decision import Domain
+from laufruhe.problem.evaluation import BETWEEN, Evaluation, evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Bound, Certificate, Proof, best_bound, gap_unit, kkt_residual
 from laufruhe.solvers.accuracy import error_of
@@ -112,7 +110,7 @@ def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSol
         best = found
         if _hopeless(problem, best):
             break
-        rows = len(best.problem.terms[0][1].weights)
+        rows = len(best.problem.terms[0][1].grid.weights)
         if (best.gap <= problem.tolerance and best.excess <= FEASIBLE) or rows > MOST_ROWS:
             break
         samples *= 2
@@ -145,7 +143,7 @@ def _attempt(
     x = _settled(problem, fine, solution.x)
     bound = best_bound(model.at(fine.samples, averaged=True), coarse, x, solution.multipliers)
     # peaks where the result will be measured
-    judge = model.at(PEAK_REFINEMENT * fine.samples) if _has_peaks(problem) else fine
+    judge = model.at(BETWEEN * fine.samples) if _has_peaks(problem) else fine
     value = judge.objective(x)
     gap = (value - bound.value) / gap_unit(value, initial)
     return _Optimum(x, bound, fine, judge, max(gap, 0.0), judge.excess(x), samples)
@@ -158,8 +156,7 @@ def _stated(affine: AffineProblem) -> ConicSolution:
 
 
 def _has_peaks(problem: Problem) -> bool:
-    quantities = [term.quantity for term in problem.objective] + [limit.quantity for limit in problem.limits]
-    return any(quantity.norm is Norm.MAXIMUM for quantity in quantities)
+    return any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
 
 
 def _tightened(affine: AffineProblem, margin: float) -> AffineProblem:
@@ -189,7 +186,7 @@ def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
 
     still = _indistinguishable(problem, affine)
     if still.shape[1]:
-        sizes = [sum(abs(drive.gain) for drive in domain.decision.drives) for domain in affine.domains]
+        sizes = [sum(abs(drive.gain) for drive in domain.decision.rotor_drives) for domain in affine.domains]
         x = lightest(affine, x, still, sizes)
     return _without_negligible(affine, x)
 
@@ -204,7 +201,7 @@ def _without_negligible(affine: AffineProblem, x: Array) -> Array:
     norms = [(norm, max(norm.value(x), norm.value(nothing))) for _, norm in affine.terms]
     norms = _linear(norms)
     for domain in affine.domains:
-        if domain.decision.lower > 0.0 or not x[domain.columns].any():
+        if domain.set.lower > 0.0 or not x[domain.columns].any():
             continue
         alone, without = nothing.copy(), x.copy()
         alone[domain.columns] = x[domain.columns]
@@ -229,12 +226,12 @@ def _linear(norms: Sequence[tuple[AffineNorm, float]]) -> list[tuple[AffineNorm,
 
 def _indistinguishable(problem: Problem, affine: AffineProblem) -> Array:
     """Directions in which no load of the problem changes, shape (n, m); none if a mass is minimised."""
-    if not affine.size or any(term.quantity.subject in MASSES for term in problem.objective):
+    if not affine.size or any(term.measure.is_mass for term in problem.objective):
         return np.zeros((affine.size, 0))
     loads = [norm for _, norm in affine.terms]
     loads += [
         norm for limit, (_, norm) in zip(problem.limits, affine.limits, strict=True)
-        if limit.quantity.subject not in MASSES
+        if not limit.measure.is_mass
     ]  # fmt: skip
     # each decision in the size of what it loads: bounds may be far apart, and far from what is needed
     sizes = np.sqrt(np.sum([np.sum(norm.slope**2, axis=(0, 1)) for norm in loads], axis=0))
@@ -267,7 +264,7 @@ def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Eva
     )
     prices = bound.multipliers.shadow_prices(optimum.problem)
     limits = tuple(
-        _limit_value(limit.name, limit.quantity.unit, final.value(limit.quantity), limit.maximum, price, value)
+        _limit_value(limit.name, limit.measure.unit, final.value(limit.measure), limit.maximum, price, value)
         for limit, price in zip(problem.limits, prices, strict=True)
     )
     feasible = all(limit.value <= limit.limit * (1.0 + KEPT) + 1e-12 for limit in limits)
@@ -301,8 +298,8 @@ def _limit_value(name: str, unit: str, value: float, maximum: float, price: floa
 def decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[DecisionValue, ...]:
     """Size and, where open, angle of one decision; the gradient prices its bound."""
     decision = domain.decision
-    size, angle = decision.split(domain.complex_value(x))
-    given_size, given_angle = decision.split(decision.start)
+    size, angle = decision.set.split(domain.complex_value(x))
+    given_size, given_angle = decision.set.split(decision.start)
     reach = domain.scale * ACTIVE
     high, low = size >= decision.upper - reach, size <= decision.lower + reach
     slope = gradient[domain.columns]
@@ -312,17 +309,17 @@ def decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[Decision
         decision.name, size, decision.unit, decision.lower, decision.upper, given_size, at_bound,
         max(price, 0.0) if at_bound else 0.0,
     )  # fmt: skip
-    if decision.fixed_angle:
+    if domain.width == 1:
         return (entry,)
-    low_angle, high_angle = decision.angle
-    edge = not decision.free_angle and size > reach and min(angle - low_angle, high_angle - angle) < 1e-6
+    low_angle, high_angle = decision.set.angles
+    edge = not decision.set.free_angle and size > reach and min(angle - low_angle, high_angle - angle) < 1e-6
     name = decision.name.rsplit(".", 1)[0] + ".angle"
     return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
 
 
 def _infeasible(problem: Problem, conflict: tuple[str, ...], initial: Evaluation, timing: dict[str, float]) -> Result:
     limits = tuple(
-        LimitValue(limit.name, initial.value(limit.quantity), limit.maximum, limit.quantity.unit, False, 0.0)
+        LimitValue(limit.name, initial.value(limit.measure), limit.maximum, limit.measure.unit, False, 0.0)
         for limit in problem.limits
     )
     return infeasible(problem, initial, limits, conflict, timing)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.load_models.star_objective import amplitude_objective
-from laufruhe.load_models.uneven_model import UnevenModel
+from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.machine.firing import firing_turns, intervals_of
 from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -25,18 +25,21 @@ from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriteri
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate, Proof, gap_unit
 from laufruhe.prove.uneven_bound import steady_bound, uneven_bound
+from laufruhe.solvers.mount_starts import columns_of, unbalances_of
 from laufruhe.solvers.nonlinear import solve_nonlinear
 from laufruhe.solvers.phasing_result import no_result, phase_decisions, solve_fixed
 from laufruhe.solvers.ranking import PhasingResult, RankedStar, TradePoint, ranked_orders, ranked_star
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.smooth_program import TURN, SmoothProgram
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.uneven_program import UnevenProgram, rides_of
 
 Array = NDArray[np.float64]
 
 STARTS = 6
 ORDERS_WITH_GAS = 2
 FEASIBLE = 1e-6
+# share that keeps a design that stands on a limit from breaking it by a rounding
+SOFT_LIMIT = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 
 
@@ -102,21 +105,38 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> U
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
     problem = replace(phasing.realise(start), phasing=None)
-    layout = phasing.layout(start.bank_angle, start.split_pin)
-    model = UnevenModel(problem, layout, rides_of(phasing, start))
-    program = UnevenProgram(phasing, model, start, intervals, best.result if best is not None else None)
-    if program.is_fixed:
+    moves = ThrowMoves(phasing, phasing.layout(start.bank_angle, start.split_pin), start, intervals)
+    if not moves.size:
         return best
-    for optimum in solve_nonlinear(program.nonlinear, program.starts, workers=1, max_seconds=30.0):
+    smooth = SmoothProgram(problem, moves=moves, unit=_size(problem, best), slack=SOFT_LIMIT)
+    for optimum in solve_nonlinear(smooth.program, _points(smooth, best), workers=1, max_seconds=30.0):
         if not optimum.usable:
             continue
-        candidate = program.candidate(optimum.x)
+        candidate = moves.candidate(smooth.turns(optimum.x))
         answer = _evaluated(phasing, candidate, optimum.kkt_residual, moved=True)
         if answer is None or not intervals.holds(firing_intervals(phasing, candidate), 1e-7):
             continue
         if best is None or answer.value < best.value * (1.0 - 1e-9):
             best = answer
     return best
+
+
+def _size(problem: Problem, best: Uneven | None) -> float:
+    """What the objective is measured in: its value in the design as given, never far below it."""
+    if best is None or best.result.objective is None:
+        return objective_value(problem, evaluate(problem)) or 1.0
+    return gap_unit(best.value, best.result.objective.initial)
+
+
+def _points(smooth: SmoothProgram, best: Uneven | None) -> list[Array]:
+    """The star, and two points beside it: one that is its own mirror image may be a saddle."""
+    columns = np.zeros(smooth.columns)
+    if best is not None and smooth.columns:
+        columns = columns_of(smooth.domains, unbalances_of(smooth.problem, best.result))
+    turns = np.zeros(0 if smooth.moves is None else smooth.moves.size)
+    nudges = np.random.default_rng(1964).standard_normal((2, len(turns) + len(columns)))
+    nudges *= 0.02 * np.concatenate([np.full(len(turns), TURN), *(np.full(d.width, d.scale) for d in smooth.domains)])
+    return [smooth.start([], columns + n[len(turns) :], turns + n[: len(turns)]) for n in (0.0 * nudges[0], *nudges)]
 
 
 def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: bool) -> Uneven | None:
@@ -128,7 +148,7 @@ def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: b
     limits = result.problem.limits
     if result.objective is None or result.status in (Status.INFEASIBLE, Status.FAILED):
         return None
-    if any(result.final.value(limit.quantity) > limit.maximum * (1.0 + FEASIBLE) for limit in limits):
+    if any(result.final.value(limit.measure) > limit.maximum * (1.0 + FEASIBLE) for limit in limits):
         return None
     return Uneven(candidate, result, residual, moved)
 

@@ -16,13 +16,14 @@ import numpy as np
 import xarray as xr
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.numerics.mixed_norms import Norm
-from laufruhe.problem.measure import MASSES, Quantity, Subject
-from laufruhe.problem.problem import Limit, Problem
+from laufruhe.numerics.norms import NORMS
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from laufruhe.studies.shafts import shafts_of
 
-MASS_ON_SHAFTS = Quantity(Subject.BALANCER_MASS, Norm.SUM)
+MASS_ON_SHAFTS = Measure(channels.BALANCER_MASS, NORMS["mean"])
 PLAIN = "plain"
 """Name of the engine without any of the shafts."""
 LIMIT_NAME = "mass on shafts"
@@ -154,7 +155,7 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> Front:
     SolverError
         If there is no design.
     """
-    if not problem.objective or any(term.quantity.subject in MASSES for term in problem.objective):
+    if not problem.objective or any(term.measure.is_mass for term in problem.objective):
         raise ModelError("shafts are weighed against a load, and none is minimised; minimise mean mount force")
     optimum = best(problem)
     return Front(

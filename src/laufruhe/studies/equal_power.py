@@ -7,7 +7,8 @@ from dataclasses import replace
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
 from laufruhe.machine.similarity import EqualPowerScale, equal_power_scale
-from laufruhe.problem.problem import Problem, UnbalanceDecision
+from laufruhe.problem.decision import Decision
+from laufruhe.problem.problem import Problem
 
 # what a decision's size is multiplied by when the engine is rebuilt, as powers of its unit
 _FRACTION, _MASS, _UNBALANCE = "", "kg", "kg m"
@@ -34,7 +35,9 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
         problem,
         engine=_engine(problem.engine, scale),
         points=tuple(replace(point, speed=point.speed * scale.speed) for point in problem.points),
-        decisions=tuple(_decision(decision, scale) for decision in problem.decisions),
+        decisions=tuple(
+            _decision(decision, scale) if decision.is_affine else decision for decision in problem.decisions
+        ),
     )
 
 
@@ -90,14 +93,13 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
     )
 
 
-def _decision(decision: UnbalanceDecision, scale: EqualPowerScale) -> UnbalanceDecision:
+def _decision(decision: Decision, scale: EqualPowerScale) -> Decision:
     """Bounds grow with the size in its unit; gains turn that unit into kg m."""
     size = {_FRACTION: 1.0, _MASS: scale.mass, _UNBALANCE: scale.mass * scale.length}[decision.unit]
     gain = scale.mass * scale.length / size
     return replace(
         decision,
-        lower=decision.lower * size,
-        upper=decision.upper * size,
+        set=decision.set.scaled(size),
         start=decision.start * size,
-        drives=tuple(replace(drive, gain=drive.gain * gain) for drive in decision.drives),
+        drives=tuple(replace(drive, gain=drive.gain * gain) for drive in decision.rotor_drives),
     )

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
-from laufruhe.physics.metrics import order_amplitude, turning_parts
+from laufruhe.numerics.spectrum import order_amplitude
+from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import reciprocating_loads
 

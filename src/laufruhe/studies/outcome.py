@@ -91,7 +91,7 @@ def _finite(value: float) -> float:
 
 
 def _is_closed(problem: Problem) -> bool:
-    return not problem.decisions and problem.phasing is None and not problem.mount_design.decisions
+    return not problem.decisions and problem.phasing is None
 
 
 def _over_points(problem: Problem, evaluation: Evaluation) -> list[tuple[float, float]]:

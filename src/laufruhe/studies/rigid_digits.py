@@ -13,23 +13,25 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from laufruhe.machine import Cycle, Engine, GasModel, Mount, OperatingPoint, Rotor
-from laufruhe.numerics.mixed_norms import Norm
 from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import spectrum_of
 from laufruhe.numerics.turns import Turn, as_turn
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mechanism import momentum_loads
 from laufruhe.physics.rigid_body import point_motion
 from laufruhe.physics.shaking_loads import gas_torque, plane_wrench
+from laufruhe.problem import channels
+from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import COMPONENTS, MASSES, Quantity, Subject
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 DIGITS = 50
 STEPS, GAS_STEPS = 24, 360
 FREE = 1e-20
 """Of a stiffness over the largest: what is under it is a direction that no mount carries."""
-WHOLE_LOADS = Quantity(Subject.SHAKING_FORCE, Norm.SUM), Quantity(Subject.ROLL_MOMENT, Norm.SUM)
+WHOLE_LOADS = Measure(channels.SHAKING_FORCE, NORMS["mean"]), Measure(channels.ROLL_MOMENT, NORMS["mean"])
 
 Vector = list[Any]
 
@@ -59,7 +61,7 @@ def rigid_part(problem: Problem) -> RigidPart:
     """
     import mpmath
 
-    own = tuple(term.quantity for term in problem.objective if _is_covered(term.quantity, problem.engine))
+    own = tuple(term.measure for term in problem.objective if _is_covered(term.measure, problem.engine))
     used = replace(problem, fidelity=Fidelity(samples=STEPS, gas_samples=GAS_STEPS))
     if not own:
         used = replace(used, points=problem.points[:1])
@@ -75,11 +77,11 @@ def rigid_part(problem: Problem) -> RigidPart:
     return RigidPart(max(errors, default=0.0), tuple(names))
 
 
-def _is_covered(quantity: Quantity, engine: Engine) -> bool:
-    if quantity.subject in MASSES or quantity.orders is not None:
+def _is_covered(quantity: Measure, engine: Engine) -> bool:
+    if quantity.is_mass or quantity.orders is not None:
         return False
-    return quantity.subject is not Subject.MOUNT_TRAVEL and (
-        quantity.subject is not Subject.MOUNT_FORCE or engine.block is None
+    return quantity.channel is not channels.MOUNT_TRAVEL and (
+        quantity.channel is not channels.MOUNT_FORCE or engine.block is None
     )
 
 
@@ -183,26 +185,26 @@ def mount_maps_in_digits(mounts: Sequence[Mount]) -> list[Any]:
     return [spring * place * vectors * inverse * vectors.T for place, spring in zip(places, springs, strict=True)]
 
 
-def _measure(quantity: Quantity, problem: Problem, wrenches: Sequence[list[Vector]]) -> Any:
+def _measure(quantity: Measure, problem: Problem, wrenches: Sequence[list[Vector]]) -> Any:
     """A quantity from wrenches at equal steps (P1)."""
     import mpmath
 
     weights = [float(share) for share in quantity.shares(problem.points)]
     squares = [_squares(quantity, problem.engine, wrench) for wrench in wrenches]
-    if quantity.norm is Norm.MAXIMUM:
+    if quantity.norm is NORMS["maximum"]:
         return mpmath.sqrt(max(max(s) for s, weight in zip(squares, weights, strict=True) if weight > 0.0))
-    is_mean = quantity.norm is Norm.SUM
+    is_mean = quantity.norm is NORMS["mean"]
     means = [mpmath.fsum(map(mpmath.sqrt, s) if is_mean else s) / len(s) for s in squares]
     total = mpmath.fsum(mpmath.mpf(w) * mean for w, mean in zip(weights, means, strict=True)) / mpmath.fsum(weights)
     return total if is_mean else mpmath.sqrt(total)
 
 
-def _squares(quantity: Quantity, engine: Engine, wrenches: list[Vector]) -> list[Any]:
+def _squares(quantity: Measure, engine: Engine, wrenches: list[Vector]) -> list[Any]:
     """Squared lengths of what a quantity measures, at every step and mount."""
     import mpmath
 
-    if quantity.subject is not Subject.MOUNT_FORCE:
-        columns = range(*COMPONENTS[quantity.subject].indices(6))
+    if isinstance(quantity.channel, LoadChannel) and quantity.channel.part is not None:
+        columns = range(*quantity.channel.part.indices(6))
         return [mpmath.fsum(wrench[j] ** 2 for j in columns) for wrench in wrenches]
     counted = [m.name for m in engine.mounts] if quantity.mounts is None else quantity.mounts
     factors = quantity.direction_weights or (1.0, 1.0, 1.0)

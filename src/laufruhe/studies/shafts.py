@@ -8,6 +8,7 @@ from dataclasses import replace
 from laufruhe.errors import ModelError
 from laufruhe.files.study_parts import CaseTable
 from laufruhe.machine import Role
+from laufruhe.problem.decision import without_rotors
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.scenes import Scenes
 
@@ -23,9 +24,8 @@ def with_shafts(problem: Problem, kept: Sequence[str]) -> Problem:
     if unknown:
         raise ModelError(f"'{min(unknown)}' is no balancer shaft of this engine; name one that is")
     rotors = tuple(r for r in problem.engine.rotors if r.role is not Role.BALANCER or r.shaft.name in kept)
-    names = {rotor.name for rotor in rotors}
-    shortened = (replace(d, drives=tuple(v for v in d.drives if v.rotor in names)) for d in problem.decisions)
-    decisions = tuple(d for d in shortened if d.drives)
+    gone = {rotor.name for rotor in problem.engine.rotors} - {rotor.name for rotor in rotors}
+    decisions = without_rotors(problem.decisions, gone)
     return replace(problem, engine=replace(problem.engine, rotors=rotors), decisions=decisions)
 
 

@@ -15,7 +15,7 @@ from pydantic import Field
 from laufruhe.files.file_models import QuantityName
 from laufruhe.files.study_parts import SweepTable
 from laufruhe.files.study_sweeps import Axis, axis_of
-from laufruhe.problem.mount_design import MountMeasure
+from laufruhe.problem import channels
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.outcome import Outcome, solved
 from laufruhe.studies.part import Part, Record
@@ -97,10 +97,8 @@ class SweptPart(Part):
             If loads neither make up an objective nor are limited beside it.
         """
         for case, problem in zip(self.cases, problems, strict=True):
-            design = problem.mount_design
-            asked = [quantity for quantity, _ in design.terms] + [limit.quantity for limit in design.limits]
-            transmitted = any(quantity.measure is MountMeasure.TRANSMISSIBILITY for quantity in asked)
-            if not (problem.objective or problem.limits or transmitted):
+            asked = problem.measures
+            if all(measure.is_mounting and measure.channel is not channels.TRANSMISSIBILITY for measure in asked):
                 rule = f"is {problem.objective_name}, which no {what} changes"
                 raise scenes.refused(case, "objective", rule, "minimise a mount force or transmissibility")
 

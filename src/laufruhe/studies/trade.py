@@ -15,13 +15,11 @@ from laufruhe.errors import ModelError
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, error_bound, reference
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.machine import Engine
-from laufruhe.numerics import mixed_norms
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
-from laufruhe.problem.mount_design import mounting_in
-from laufruhe.problem.mount_values import whole_objective
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.rigid_digits import RigidPart, rigid_part
 from laufruhe.studies.trade_ladder import TIME_ORDERS, TIME_SAMPLES, ladder
@@ -125,10 +123,10 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     ModelError
         If the problem has no objective.
     """
-    if not problem.objective and not problem.mount_design.terms:
+    if not problem.objective and not problem.mount_terms:
         raise ModelError("a trade needs an objective; add [objective]")
     best = reference(problem)
-    truth = whole_objective(problem, best)
+    truth = objective_value(problem, best)
     least = math.nan
     if is_open(problem):
         say("solving the reference")
@@ -147,7 +145,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
 
 def _row(name: str, own: Problem, best: Evaluation, truth: float, least: float) -> Row:
     evaluation = evaluate(own)
-    value = whole_objective(own, evaluation)
+    value = objective_value(own, evaluation)
     prepared, gradient = _prepared_times(own)
     solve, regret = math.nan, math.nan
     if is_open(own) and own.fidelity.mounts != "time":
@@ -174,7 +172,7 @@ def _row(name: str, own: Problem, best: Evaluation, truth: float, least: float) 
 
 def _from_nothing(own: Problem) -> float:
     forget()
-    return whole_objective(own, evaluate(own))
+    return objective_value(own, evaluate(own))
 
 
 def _prepared_times(own: Problem) -> tuple[float, float]:
@@ -184,7 +182,7 @@ def _prepared_times(own: Problem) -> tuple[float, float]:
     model = AffineModel(own)
     affine = model.at(model.full_samples)
     x = np.concatenate([d.columns_of(d.decision.start) for d in affine.domains]) if affine.domains else np.zeros(0)
-    gradient = seconds(lambda: _value_and_gradient(affine.terms, x)) if own.decisions else math.nan
+    gradient = seconds(lambda: _value_and_gradient(affine.terms, x)) if own.unbalances else math.nan
     return seconds(lambda: affine.objective(x)), gradient
 
 
@@ -193,14 +191,14 @@ def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -
     value, gradient = 0.0, np.zeros(len(x))
     for weight, norm in terms:
         rows = norm.rows(x)
-        z = mixed_norms.subgradient(norm.norm, norm.weights, rows)
+        z = norm.norm.subgradient(norm.grid, rows)
         value += weight * float(np.vdot(z, rows))
         gradient += weight * (z.reshape(-1) @ norm.slope.reshape(-1, len(x)))
     return value, gradient
 
 
 def _reference_value(problem: Problem, engine: Engine) -> float:
-    return whole_objective(problem, reference(problem, engine))
+    return objective_value(problem, reference(problem, engine))
 
 
 def _price_of_time(problem: Problem) -> TimeDomain | None:

@@ -18,12 +18,12 @@ STARS_ON_OPEN_MOUNTS = 2
 
 def is_open(problem: Problem) -> bool:
     """Whether a problem leaves anything to be decided."""
-    return bool(problem.decisions or problem.phasing or problem.mount_design.decisions)
+    return bool(problem.decisions or problem.phasing)
 
 
 def is_local(problem: Problem) -> bool:
     """Whether its optimum is one of many: mounts decided for loads, searched from the design as given alone."""
-    return bool(problem.mount_design.decisions and problem.objective)
+    return bool(problem.mount_decisions and problem.objective)
 
 
 def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
@@ -34,10 +34,10 @@ def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
     both together the stars that rank first.
     """
     try:
-        if problem.phasing is None and not problem.mount_design.decisions:
+        if problem.phasing is None and not problem.mount_decisions:
             return _balanced(problem, samples)
-        one = replace(problem, mount_design=replace(problem.mount_design, starts=1))
-        if one.phasing is not None and one.mount_design.decisions:
+        one = replace(problem, search=replace(problem.search, starts=1))
+        if one.phasing is not None and one.mount_decisions:
             one = replace(one, phasing=replace(one.phasing, best=STARS_ON_OPEN_MOUNTS))
         result = solve(one)
     except (SolverError, ModelError):

@@ -15,7 +15,7 @@ from laufruhe.plots.style import AFTER, FAINT, INK, entry, entry_of_dots, headin
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import number
-from laufruhe.problem.mount_design import MountMeasure
+from laufruhe.problem import channels
 from laufruhe.solvers.result import Result
 
 # room for the names of the modes [inch]
@@ -28,9 +28,9 @@ def figure(result: Result) -> Figure:
     facts, top = facts_of(result.final), fastest(result)
     drawn = page(1, 1, (6.2, 4.2))
     axes = drawn.panels[0]
-    bands = [limit.outside for limit in limits_on(result, MountMeasure.FREQUENCIES) if limit.outside is not None]
-    limits = limits_on(result, MountMeasure.FREQUENCIES)
-    edges = [edge for limit in limits for edge in (limit.minimum, limit.maximum) if edge is not None]
+    bands = [limit.outside for limit in limits_on(result, channels.FREQUENCIES) if limit.outside is not None]
+    limits = limits_on(result, channels.FREQUENCIES)
+    edges = [edge for limit in limits for edge in (limit.minimum, limit.maximum) if math.isfinite(edge)]
     known = [*facts.modes.frequencies, *edges, *(edge for band in bands for edge in band), 1e-9]
     reach = 1.1 * float(max(known))
     legend = _marked(axes, edges, bands)

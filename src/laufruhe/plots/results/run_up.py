@@ -13,8 +13,8 @@ from laufruhe.plots.speed_axis import RPM, driven, main_order
 from laufruhe.plots.style import INK, entry, heading, page, series_of, source_line
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import figure as words
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.mount_design import mounting_in
 from laufruhe.solvers.result import Result
 
 SECONDS = 3.0

@@ -11,10 +11,10 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from laufruhe.physics.metrics import order_amplitude
+from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.plots.style import FAINT, heading, page, point_name, series_of, source_line
 from laufruhe.present.measures import hardest_point, main_load, mount_orders, padded
-from laufruhe.problem.evaluation import PointLoads
+from laufruhe.problem.loads import PointLoads
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]

@@ -19,8 +19,9 @@ from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, fastest, limits_on, ma
 from laufruhe.plots.style import FAINT, INK, entry, heading, page, series_of, source_line
 from laufruhe.present.measures import hardest_point
 from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.mount_design import MountMeasure, mounting_in
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -69,8 +70,8 @@ def _curves(
 
 def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:
     """Limits of the problem, over the speeds that they hold at [rpm]."""
-    limits = limits_on(result, MountMeasure.TRANSMISSIBILITY)
-    most = [(limit.maximum, limit.quantity.points) for limit in limits if limit.maximum is not None]
+    limits = limits_on(result, channels.TRANSMISSIBILITY)
+    most = [(limit.maximum, limit.measure.points) for limit in limits]
     for maximum, named in most:
         speeds = [point.speed * RPM for point in result.problem.points if named is None or point.name in named]
         low, high = min(speeds), max(speeds)

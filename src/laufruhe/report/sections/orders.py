@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from laufruhe.present.measures import hardest_point, has_mounts, load_designs, mount_orders, padded, shaking_orders
 from laufruhe.present.numbers import aligned
-from laufruhe.problem.evaluation import PointLoads
+from laufruhe.problem.loads import PointLoads
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from laufruhe.problem.measure import MASSES, Quantity, counted_rotors
+from laufruhe.problem.measure import Measure, counted_rotors
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.outcome import solved
 from laufruhe.studies.part import Record
@@ -31,7 +31,7 @@ def shaft_groups(problem: Problem) -> list[tuple[str, ...]]:
     shaft_of = {rotor.name: rotor.shaft.name for rotor in problem.engine.rotors}
     groups = [{shaft} for shaft in shafts_of(problem)]
     for decision in problem.decisions:
-        driven = {shaft_of[drive.rotor] for drive in decision.drives}
+        driven = {shaft_of[drive.rotor] for drive in decision.rotor_drives}
         touched = [group for group in groups if group & driven]
         if len(touched) > 1:
             groups = [group for group in groups if not group & driven] + [set().union(*touched)]
@@ -99,19 +99,19 @@ class BalancerSizing(SweptPart):
 def _counting(problem: Problem) -> Problem:
     """Terms and limits that still count something; the mass of a shaft left out is none."""
 
-    def counted(quantity: Quantity) -> Quantity | None:
-        if quantity.subject not in MASSES:
+    def counted(quantity: Measure) -> Measure | None:
+        if not quantity.is_mass:
             return quantity
         names = {rotor.name for rotor in problem.engine.rotors}
         kept = None if quantity.rotors is None else tuple(name for name in quantity.rotors if name in names)
         fewer = replace(quantity, rotors=kept)
         return fewer if counted_rotors(fewer, problem.engine.rotors) else None
 
-    terms = [(term, counted(term.quantity)) for term in problem.objective]
-    limits = [(limit, counted(limit.quantity)) for limit in problem.limits]
-    limits_left = tuple(replace(limit, quantity=quantity) for limit, quantity in limits if quantity is not None)
-    terms_left = tuple(replace(term, quantity=quantity) for term, quantity in terms if quantity is not None)
-    if problem.objective and not terms_left and not problem.mount_design.terms:
+    terms = [(term, counted(term.measure)) for term in problem.objective]
+    limits = [(limit, counted(limit.measure)) for limit in problem.limits]
+    limits_left = tuple(replace(limit, measure=quantity) for limit, quantity in limits if quantity is not None)
+    terms_left = tuple(replace(term, measure=quantity) for term, quantity in terms if quantity is not None)
+    if problem.objective and not terms_left:
         # the mass of no shafts is zero, whatever else is open
         return replace(problem, limits=limits_left, decisions=())
     return replace(problem, objective=terms_left, limits=limits_left)

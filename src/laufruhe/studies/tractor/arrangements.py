@@ -9,7 +9,8 @@ import xarray as xr
 
 from laufruhe.machine import Cycle, Engine
 from laufruhe.machine.layouts import Layout, boxer, build, inline, vee
-from laufruhe.physics.metrics import order_amplitude, turning_parts
+from laufruhe.numerics.spectrum import order_amplitude
+from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.verdict import Verdict

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.physics.metrics import cycle_measures
+from laufruhe.problem.decision import Decision, RotorDrive, Sector
 from laufruhe.problem.evaluation import Evaluation, evaluate, mount_samples
-from laufruhe.problem.measure import MEAN_MOUNT_FORCE
-from laufruhe.problem.problem import Drive, Problem, Term, UnbalanceDecision
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Term
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.shafts import SHAFT_PLACE
@@ -58,7 +59,7 @@ def given(name: str, engine: Engine, point: OperatingPoint) -> Design:
     return Design(name, evaluate(_problem(engine, point, ())))
 
 
-def optimum(name: str, engine: Engine, point: OperatingPoint, decisions: Sequence[UnbalanceDecision]) -> Design:
+def optimum(name: str, engine: Engine, point: OperatingPoint, decisions: Sequence[Decision]) -> Design:
     """The design of least mean mount force, with its proven bound."""
     result = solve(_problem(engine, point, tuple(decisions)))
     if result.certificate is None:
@@ -66,10 +67,10 @@ def optimum(name: str, engine: Engine, point: OperatingPoint, decisions: Sequenc
     return Design(name, result.final, result.certificate.lower_bound)
 
 
-def open_rotor(name: str, *follows: tuple[str, complex, bool]) -> UnbalanceDecision:
+def open_rotor(name: str, *follows: tuple[str, complex, bool]) -> Decision:
     """Size and angle of a rotor open; others follow with a gain, mirrored where they turn the other way."""
-    drives = (Drive(name, 1.0), *(Drive(*follow) for follow in follows))
-    return UnbalanceDecision(f"{name}.unbalance", "kg m", 0.0, MOST_UNBALANCE, (0.0, math.tau), 0j, drives)
+    drives = (RotorDrive(name, 1.0), *(RotorDrive(*follow) for follow in follows))
+    return Decision(f"{name}.unbalance", "kg m", Sector(MOST_UNBALANCE), 0j, drives)
 
 
 def free_webs(cylinders: int) -> tuple[Rotor, ...]:
@@ -86,7 +87,7 @@ def free_shaft(cylinders: int) -> tuple[Rotor, ...]:
     )
 
 
-def opened(rotors: Sequence[Rotor]) -> tuple[UnbalanceDecision, ...]:
+def opened(rotors: Sequence[Rotor]) -> tuple[Decision, ...]:
     """Every rotor on its own."""
     return tuple(open_rotor(rotor.name) for rotor in rotors)
 
@@ -126,7 +127,7 @@ def _newton(name: str) -> dict[str, str]:
     return {"units": "N", "long_name": name}
 
 
-def _problem(engine: Engine, point: OperatingPoint, decisions: tuple[UnbalanceDecision, ...]) -> Problem:
+def _problem(engine: Engine, point: OperatingPoint, decisions: tuple[Decision, ...]) -> Problem:
     return Problem(
         name=engine.name,
         title=engine.name,

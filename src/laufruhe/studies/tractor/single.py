@@ -13,7 +13,7 @@ from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import gas_loads, reciprocating_loads, rod_inertia_loads
-from laufruhe.problem.problem import Drive, UnbalanceDecision
+from laufruhe.problem.decision import Decision, Interval, RotorDrive
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.designs import ASSUMED, given, optimum
 from laufruhe.studies.verdict import Verdict
@@ -175,7 +175,7 @@ def fraction() -> xr.Dataset:
 
 def _best_fraction(speed: float) -> tuple[float, float, float]:
     whole = study.counterweight(1.0).unbalance
-    decision = UnbalanceDecision("web.balance_fraction", "", 0.0, 1.0, (0.0, 0.0), 0j, (Drive("web", whole),))
+    decision = Decision("web.balance_fraction", "", Interval(0.0, 1.0), 0j, (RotorDrive("web", whole),))
     point = study.running(study.gas(study.FULL_LOAD), speed)
     design = optimum("", study.single((study.counterweight(0.0),)), point, (decision,))
     share = (design.evaluation.engine.rotors[0].unbalance / whole).real

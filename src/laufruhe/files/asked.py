@@ -1,0 +1,202 @@
+"""What a problem file minimises and limits: its measures, checked against the engine that they speak of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from laufruhe import units
+from laufruhe.errors import ModelError
+from laufruhe.files.complaints import Refused, measured, nearest
+from laufruhe.files.file_models import ConstraintTable, ProblemFile, QuantityTable
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.problem.channels import ON_PLACES, Channel, LoadChannel, MassChannel, MountChannel, Needs
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Term, counted_rotors, radius_of
+
+_NEEDS = {
+    Needs.MOUNTS: ("needs mounts", "add [mounts], or ask for a shaking force"),
+    Needs.ELASTIC: ("needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]'),
+}
+_KEYS = ("operating_points", "orders", "mounts", "direction_weights", "motions", "frequency", "of")
+_SIDES = ("min", "max", "outside")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What measures may refer to."""
+
+    engine: Engine
+    points: tuple[OperatingPoint, ...]
+
+    def measure(self, name: str, table: QuantityTable, where: str) -> Measure:
+        """The measure that a name and its keys mean.
+
+        Raises
+        ------
+        Refused
+            If it means nothing for this engine.
+        """
+        if name not in MEASURES:
+            raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
+        channel, norm = MEASURES[name]
+        at, of = where.rsplit(".", 1)[0], getattr(table, "of", None)
+        self._meets(channel.needs, where, name)
+        for key in _KEYS:
+            if getattr(table, key, None) is not None and key not in channel.keys:
+                raise Refused(f"{at}.{key}", of if key == "of" else None, _stray(key, channel), "leave it out")
+        mounts, points = [mount.name for mount in self.engine.mounts], [point.name for point in self.points]
+        _known(table.mounts, mounts, f"{at}.mounts", "mount")
+        _known(table.operating_points, points, f"{at}.operating_points", "operating point")
+        if "frequency" in channel.keys and table.frequency is None:
+            remedy = "say which natural frequency about the axis is wanted"
+            raise Refused(f"{at}.frequency", None, "is missing", remedy)
+        weights = table.direction_weights
+        found = Measure(
+            channel,
+            norm,
+            mounts=_tuple(table.mounts),
+            points=_tuple(table.operating_points),
+            rotors=_tuple(of),
+            orders=None if table.orders is None else tuple(table.orders),
+            direction_weights=None if weights is None else (weights[0], weights[1], weights[2]),
+            motions=None if table.motions is None else tuple(table.motions),
+            frequency=table.frequency or 0.0,
+        )
+        if found.is_mass:
+            self._counts(found, of, at)
+        return found
+
+    def _meets(self, needs: Needs, where: str, name: str) -> None:
+        lacking = {Needs.MOUNTS: not self.engine.mounts, Needs.ELASTIC: self.engine.block is None}
+        if lacking.get(needs):
+            raise Refused(where, name, *_NEEDS[needs])
+
+    def _counts(self, measure: Measure, of: list[str] | None, at: str) -> None:
+        """Refuse masses of nothing, and of what has no radius."""
+        rotors = self.engine.rotors
+        _known(of, [rotor.name for rotor in rotors], f"{at}.of", "counterweight or balancer")
+        counted = counted_rotors(measure, rotors)
+        if not counted:
+            raise Refused(f"{at}", measure.name, "counts nothing in this engine", "add what it counts, or leave it out")
+        for rotor in counted:
+            try:
+                radius_of(rotor)
+            except ModelError:
+                rule = f"counts the mass of '{rotor.name}', which has no radius"
+                raise Refused(f"{at}", measure.name, rule, "give it one") from None
+
+
+def _stray(key: str, channel: Channel) -> str:
+    """Why a key means nothing for a channel."""
+    if key == "of":
+        return "goes with masses only"
+    if isinstance(channel, MassChannel):
+        return "means nothing for a mass"
+    if isinstance(channel, LoadChannel) and key in ON_PLACES:
+        return "goes with mount forces and travels only"
+    return f"means nothing for {channel}" if isinstance(channel, MountChannel) else f"means nothing for a {channel}"
+
+
+def _known(names: list[str] | None, known: Sequence[str], where: str, what: str) -> None:
+    if names is not None and not names:
+        raise Refused(where, names, "is empty", "leave it out to count all")
+    for name in names or ():
+        if name not in known:
+            raise Refused(where, name, f"is no {what} here", nearest(name, list(known)) if known else "add it")
+
+
+def _tuple(names: Sequence[str] | None) -> tuple[str, ...] | None:
+    return None if names is None else tuple(names)
+
+
+def objective_of(file: ProblemFile, scene: Scene) -> tuple[Term, ...]:
+    """What is to be least, norms of loads before numbers of the mounts; the mean mount force where nothing is said."""
+    table = file.objective
+    if table is None:
+        return (Term(MEAN_MOUNT_FORCE),) if scene.engine.mounts else ()
+    if (table.minimise is None) == (not table.terms):
+        state = "is missing" if table.minimise is None else "is given twice, also as terms"
+        raise Refused("objective.minimise", table.minimise, state, "give minimise or [[objective.terms]], one of them")
+    if table.minimise is not None:
+        return (Term(_minimised(table.minimise, table, "objective.minimise", scene)),)
+    found = [
+        Term(_minimised(term.quantity, term, f"objective.terms[{k + 1}].quantity", scene), term.weight)
+        for k, term in enumerate(table.terms)
+    ]
+    return tuple(sorted(found, key=lambda term: term.measure.is_mounting))
+
+
+def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Measure:
+    found = scene.measure(name, table, where)
+    if not found.channel.minimised:
+        others = [n for n, (channel, _) in MEASURES.items() if isinstance(channel, MountChannel) and channel.minimised]
+        raise Refused(where, name, "is not minimised but limited", "use one of: " + ", ".join(others))
+    return found
+
+
+def limits_of(file: ProblemFile, scene: Scene) -> tuple[Limit, ...]:
+    """What is forbidden, limits of loads and masses before those of the mounts."""
+    found = [_limit(table, f"constraints[{k + 1}]", scene) for k, table in enumerate(file.constraints)]
+    found.sort(key=lambda limit: limit.measure.is_mounting)
+    _check_together([limit for limit in found if limit.measure.is_mounting])
+    return tuple(found)
+
+
+def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
+    measure = scene.measure(table.limit, table, f"{where}.limit")
+    sides, channel = measure.channel.sides, measure.channel
+    norm = not isinstance(channel, MountChannel)
+    for key in _SIDES:
+        if getattr(table, key) is not None and key not in sides:
+            rule = f"{channel}, which has a largest value only" if norm else table.limit
+            raise Refused(f"{where}.{key}", None, f"does not go with {rule}", "give " + " or ".join(sides))
+    if all(getattr(table, key) is None for key in sides):
+        raise Refused(f"{where}.{sides[0]}", None, "is missing", "add it" if norm else "give " + " or ".join(sides))
+    low, high = (_side(getattr(table, key), measure, f"{where}.{key}") for key in ("min", "max"))
+    if not norm and "max" not in sides and low is not None and low > 1.0:
+        raise Refused(f"{where}.min", table.min, "is more than the whole energy", "give a share under 1")
+    return Limit(
+        table.name or measure.name,
+        measure,
+        math.inf if high is None else high,
+        -math.inf if low is None else low,
+        _band(table, measure, where),
+    )
+
+
+def _side(text: str | None, measure: Measure, where: str) -> float | None:
+    if text is None:
+        return None
+    value = measured(text, measure.unit, where)
+    if value < 0.0:
+        raise Refused(
+            where, text, "is negative" if measure.is_mounting else "is negative, and no norm is",
+            "give a value of zero or more",
+        )  # fmt: skip
+    return value
+
+
+def _band(table: ConstraintTable, measure: Measure, where: str) -> tuple[float, float] | None:
+    if table.outside is None:
+        return None
+    low, high = (measured(text, measure.unit, f"{where}.outside") for text in table.outside)
+    for text, value in zip(table.outside, (low, high), strict=True):
+        if value < 0.0:
+            raise Refused(f"{where}.outside", text, "is negative", "give a value of zero or more")
+    if not low < high:
+        raise Refused(f"{where}.outside", table.outside, "is no band", "write the smaller one first")
+    return low, high
+
+
+def _check_together(limits: Sequence[Limit]) -> None:
+    """Refuse a least value above a largest one of the same measure."""
+    for low in limits:
+        for high in limits:
+            if low.measure != high.measure or low.minimum <= high.maximum:
+                continue
+            unit = low.measure.unit
+            rule = f"at least {units.shown(low.minimum, unit)} and at most {units.shown(high.maximum, unit)}"
+            said = f"'{low.name}' and '{high.name}' contradict each other"
+            said = said if low is not high else f"'{low.name}' contradicts itself"
+            raise Refused("constraints", None, f"{said}: {rule}", "let the limits leave room")

@@ -1,0 +1,15 @@
+"""Norms of signals, one a file; a problem file names them as this table does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from laufruhe.numerics.norms.maximum import Maximum
+from laufruhe.numerics.norms.mean import Mean
+from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, softened_lengths
+from laufruhe.numerics.norms.rms import RootMeanSquare
+
+__all__ = ["MEAN", "NORMS", "RMS", "Cones", "Grid", "Norm", "SmoothProgram", "lengths", "softened_lengths"]
+
+NORMS: Mapping[str, Norm] = {norm.name: norm for norm in (Mean(), Maximum(), RootMeanSquare())}
+MEAN, RMS = NORMS["mean"], NORMS["rms"]

@@ -1,0 +1,107 @@
+"""max_k |v_k|: the peak over the cycle, over mounts and operating points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from laufruhe.numerics.norms.norm import (
+    Array,
+    Cones,
+    Grid,
+    Norm,
+    SmoothProgram,
+    curvature,
+    fine_lengths,
+    lengths,
+    softened_lengths,
+)
+from laufruhe.numerics.spectrum import Spectrum, order_amplitude
+
+
+class Maximum(Norm):
+    """The largest length."""
+
+    name = "maximum"
+    refinement = 8
+
+    def value(self, grid: Grid, rows: Array) -> float:
+        """max_k |v_k|."""
+        return float(lengths(rows).max(initial=0.0))
+
+    def subgradient(self, grid: Grid, rows: Array) -> Array:
+        """v_k / |v_k| of the longest row alone."""
+        size, z = lengths(rows), np.zeros_like(rows)
+        k = int(np.argmax(size)) if len(size) else 0
+        if len(size) and size[k] > 0.0:
+            z[k] = rows[k] / size[k]
+        return z
+
+    def dual_norm(self, grid: Grid, z: Array) -> float:
+        """sum_k |z_k|."""
+        return float(lengths(z).sum())
+
+    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+        """The solver's: one row is too little where several are as long."""
+        return z
+
+    def spread(self, z: Array, steps: int, times: int) -> Array:
+        """In place: the angles between have nothing."""
+        blocks = z.reshape(-1, steps, z.shape[-1])
+        out = np.zeros((len(blocks), steps * times, z.shape[-1]))
+        out[:, ::times] = blocks
+        return out.reshape(-1, z.shape[-1])
+
+    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+        """The largest."""
+        return np.asarray(lengths.max(axis=-1))
+
+    def cones(self, grid: Grid) -> Cones:
+        """One head over all rows."""
+        count = len(grid.weights)
+        return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
+
+    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+        """A variable that no softened row exceeds (E22)."""
+        import casadi as ca
+
+        top = program.head(ca.mmax(ca.sqrt(ca.sum2(rows * rows))) / unit)
+        program.hold(softened_lengths(rows / unit, share) - top)
+        return top * unit
+
+    def limited(
+        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+    ) -> tuple[Any, float, float]:
+        """Squares, which are smooth at zero."""
+        import casadi as ca
+
+        return ca.sum2(rows * rows), most * most, 2.0 * most
+
+    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+        """Not above the sum of the orders' amplitudes."""
+        used = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
+        return max((_amplitudes(signal) for signal in used), default=0.0)
+
+    def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
+        """Compared at every place where the samples could have stood, and what curvature lets these miss."""
+        coarse = steps * self.refinement
+        times, errors, bends = max(2, math.ceil(finest / coarse)), [0.0], [0.0]
+        for signal, share in zip(signals, shares, strict=True):
+            if share > 0.0:
+                size, step = fine_lengths(signal, coarse, times)
+                bends.append(step**2 / 8.0 * _amplitudes(curvature(signal)))
+                errors.append(float((size.max(axis=(0, 1)) - size.max(axis=0).min(axis=0)).max(initial=0.0)))
+        return max(errors) + max(bends)
+
+    def least_of_orders(
+        self, squares: Sequence[Sequence[float]], roots: Sequence[Sequence[float]], shares: Array
+    ) -> float:
+        """No less than the root mean square at any operating point."""
+        return math.sqrt(max((sum(each) for each in squares), default=0.0))
+
+
+def _amplitudes(signal: Spectrum) -> float:
+    return float(order_amplitude(signal.coefficients).sum(axis=0).max(initial=0.0))

@@ -1,0 +1,116 @@
+"""sum_k w_k |v_k|: a mean where the weights add up to one, a sum of masses where they are one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from laufruhe.numerics.norms.norm import (
+    Array,
+    Cones,
+    Grid,
+    Norm,
+    SmoothProgram,
+    curvature,
+    fine_lengths,
+    lengths,
+    mean_square,
+    softened_lengths,
+)
+from laufruhe.numerics.spectrum import Spectrum
+
+
+class Mean(Norm):
+    """Weighted sum of the lengths."""
+
+    name = "mean"
+    averages = True
+    sums_lengths = True
+
+    def value(self, grid: Grid, rows: Array) -> float:
+        """sum_k w_k |v_k|."""
+        return float(grid.weights @ lengths(rows))
+
+    def subgradient(self, grid: Grid, rows: Array) -> Array:
+        """w_k v_k / |v_k|."""
+        size = lengths(rows)
+        return np.asarray(grid.weights[:, None] * rows / np.where(size > 0.0, size, 1.0)[:, None])
+
+    def dual_norm(self, grid: Grid, z: Array) -> float:
+        """max_k |z_k| / w_k; infinite where a weightless row is used."""
+        size, weights = lengths(z), grid.weights
+        if np.any((weights == 0.0) & (size > 0.0)):
+            return math.inf
+        return float((size / np.where(weights > 0.0, weights, 1.0)).max(initial=0.0))
+
+    def dual_feasible(self, grid: Grid, z: Array) -> Array:
+        """Rows that are too long are cut."""
+        size, weights = lengths(z), grid.weights
+        shrink = np.where(size > weights, weights / np.where(size > 0.0, size, 1.0), 1.0)
+        return np.asarray(z * shrink[:, None])
+
+    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+        """The design's own directions, the solver's only where a row vanishes."""
+        size = lengths(rows)
+        small = size <= 1e-6 * float(size.max(initial=0.0))
+        return np.where(small[:, None], z, self.subgradient(grid, rows))
+
+    def spread(self, z: Array, steps: int, times: int) -> Array:
+        """Straight from angle to angle."""
+        return between(z, steps, times)
+
+    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+        """Lengths times weights."""
+        return np.asarray(np.dot(lengths, weights))
+
+    def cones(self, grid: Grid) -> Cones:
+        """A head for each row."""
+        count = len(grid.weights)
+        return Cones(grid.weights, np.arange(count), np.ones(count))
+
+    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+        """Softened lengths."""
+        import casadi as ca
+
+        return ca.dot(ca.DM(grid.weights), softened_lengths(rows, share * unit))
+
+    def limited(
+        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+    ) -> tuple[Any, float, float]:
+        """Softened lengths."""
+        return self.least(program, grid, rows, 1.0, share), most, 1.0
+
+    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+        """Not above the root mean square of the same place."""
+        squares = np.array([mean_square(signal) for signal in signals])
+        return float(shares @ np.sqrt(squares).mean(axis=1))
+
+    def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
+        """Compared at every place where the samples could have stood, and what curvature lets these miss."""
+        times, total = max(2, math.ceil(finest / steps)), 0.0
+        for signal, share in zip(signals, shares, strict=True):
+            if share == 0.0:
+                continue
+            size, step = fine_lengths(signal, steps, times)
+            shifted = size.mean(axis=(0, 2))
+            bend = step**2 / 8.0 * float(np.sqrt(mean_square(curvature(signal))).mean())
+            total += share * (float(np.abs(shifted - shifted.mean()).max()) + bend)
+        return float(total)
+
+    def least_of_orders(
+        self, squares: Sequence[Sequence[float]], roots: Sequence[Sequence[float]], shares: Array
+    ) -> float:
+        """At every operating point no less than its strongest order."""
+        return float(sum(share * max(each) for share, each in zip(shares, roots, strict=True)))
+
+
+def between(z: Array, steps: int, times: int) -> Array:
+    """Dual rows on a finer grid, straight from angle to angle."""
+    blocks = z.reshape(-1, steps, z.shape[-1])
+    share = np.arange(times) / times
+    following = np.roll(blocks, -1, axis=1)
+    mixed = blocks[:, :, None] * (1.0 - share[:, None]) + following[:, :, None] * share[:, None]
+    return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)

@@ -1,0 +1,214 @@
+"""What a norm of a signal has to know of itself (P1-P3).
+
+Mean, peak and root mean square of a force over angle, mounts and operating points are
+norms of the same kind: a norm over rows of the length of each row. So is a sum of masses
+of unbalances. A class in a file of its own says how such a norm is computed, bounded,
+stated as cones, made smooth, and how far samples can be off. Nothing else in the project
+asks which norm it has before it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.numerics.spectrum import Spectrum
+
+Array = NDArray[np.float64]
+
+# squares of numbers between these neither overflow nor lose digits
+_LEAST, _MOST = 1e-140, 1e150
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Where rows stand.
+
+    Attributes
+    ----------
+    weights
+        w_k, shape (k,).
+    steps
+        Rows of one signal that follow each other at equal steps of its period; rows come
+        in groups of as many.
+    """
+
+    weights: Array
+    steps: int
+
+
+@dataclass(frozen=True, eq=False)
+class Cones:
+    """A norm as the least linear function of heads t_c >= |rows of cone c| (P1).
+
+    Attributes
+    ----------
+    value
+        The norm is value . heads, shape (heads,).
+    head
+        Of each cone the head that is over it, shape (cones,).
+    factors
+        What each row is multiplied by inside its cone, shape (k,).
+    whole
+        Whether one cone holds all rows; else each row has its own.
+    """
+
+    value: Array
+    head: NDArray[np.intp]
+    factors: Array
+    whole: bool = False
+
+
+class SmoothProgram(Protocol):
+    """What a smooth form may add to the program that it becomes part of (N3, E22)."""
+
+    def head(self, value: Any) -> Any:
+        """A variable that is at least zero; `value` is where it stands at a given point."""
+
+    def hold(self, expression: Any) -> None:
+        """Every entry at most zero."""
+
+
+class Norm(ABC):
+    """A norm of rows v_k, shape (k, d), on a grid.
+
+    Attributes
+    ----------
+    name
+        As a problem file and a report say it.
+    refinement
+        Times as many samples, among which the value of a result is sought (M6).
+    averages
+        Whether rows may be averages about their angles, which bound the whole cycle (P7).
+    is_euclidean
+        Whether nothing but the sum of weighted squares of all rows matters (S12).
+    sums_lengths
+        Whether the norm is linear in the lengths of the rows.
+    """
+
+    name: ClassVar[str]
+    refinement: ClassVar[int] = 1
+    averages: ClassVar[bool] = False
+    is_euclidean: ClassVar[bool] = False
+    sums_lengths: ClassVar[bool] = False
+
+    def __repr__(self) -> str:
+        return f"<{self.name}>"
+
+    @abstractmethod
+    def value(self, grid: Grid, rows: Array) -> float:
+        """The norm."""
+
+    @abstractmethod
+    def subgradient(self, grid: Grid, rows: Array) -> Array:
+        """A Z with dual norm at most one and <Z, V> = norm(V); zero rows give zero (P2).
+
+        The inner product is sum_k z_k . v_k; weights are part of Z.
+        """
+
+    @abstractmethod
+    def dual_norm(self, grid: Grid, z: Array) -> float:
+        """Smallest t with <Z, V> <= t norm(V) for every V (P3); infinite where there is none."""
+
+    def dual_feasible(self, grid: Grid, z: Array) -> Array:
+        """The nearest simple change of Z into the unit ball of the dual norm (P3)."""
+        excess = self.dual_norm(grid, z)
+        return z if excess <= 1.0 else z / excess
+
+    @abstractmethod
+    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+        """Dual rows along the rows of a design where that is at least as good as a solver's Z (P6)."""
+
+    @abstractmethod
+    def spread(self, z: Array, steps: int, times: int) -> Array:
+        """Dual rows at `steps` angles of each signal on a grid `times` as fine (P6)."""
+
+    @abstractmethod
+    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+        """Of many designs from the lengths of their rows, shape (..., k) to (...); the lengths are used up."""
+
+    @abstractmethod
+    def cones(self, grid: Grid) -> Cones:
+        """As second-order cones."""
+
+    @abstractmethod
+    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+        """A smooth expression to minimise, off by no more than the share of `unit` (N3, E22)."""
+
+    @abstractmethod
+    def limited(
+        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+    ) -> tuple[Any, float, float]:
+        """A smooth expression, what it may not exceed where the norm may not exceed `most`, and the slope of that.
+
+        Smooth where the rows are zero too, and off by no more than the share of one.
+        """
+
+    @abstractmethod
+    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+        """A value that the norm of these signals (n, places, d) does not exceed, without a sample (F6)."""
+
+    @abstractmethod
+    def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
+        """How far the norm at `steps` samples a cycle can be off at the most (F7, F8)."""
+
+    @abstractmethod
+    def least_of_orders(self, squares: Sequence[Sequence[float]], roots: Sequence[Sequence[float]], shares: Array
+                        ) -> float:  # fmt: skip
+        """A value that the norm is not under, from bounds of every order at every operating point (E34).
+
+        Parameters
+        ----------
+        squares
+            Of the mean over places of the mean square.
+        roots
+            Of the mean over places of the mean length.
+        """
+
+
+def lengths(rows: Array) -> Array:
+    """|v_k| of each row, shape (k, d) to (k,), safe from overflow and underflow."""
+    if not np.abs(rows).max(initial=0.0) < _MOST:
+        return _scaled_lengths(rows)
+    size = np.sqrt(np.einsum("...d,...d->...", rows, rows))
+    small = size < _LEAST
+    if small.any():
+        size[small] = _scaled_lengths(rows[small])
+    return np.asarray(size)
+
+
+def _scaled_lengths(rows: Array) -> Array:
+    size = np.abs(rows).max(axis=-1, initial=0.0)
+    safe = np.where(size > 0.0, size, 1.0)
+    return np.asarray(size * np.sqrt(np.square(rows / safe[..., None]).sum(axis=-1)))
+
+
+def softened_lengths(rows: Any, softness: Any) -> Any:
+    """|v|_e of each row of a CasADi matrix (k, d), shape (k, 1) (N3)."""
+    import casadi as ca
+
+    return ca.sqrt(ca.sum2(rows * rows) + softness * softness) - softness
+
+
+def mean_square(signal: Spectrum) -> Array:
+    """Mean square over the cycle at every place, shape (places,); Parseval's sum."""
+    c = signal.coefficients
+    power = 0.5 * np.sum(np.abs(c) ** 2, axis=(0, 2))
+    # the steady part does not alternate
+    return np.asarray(power - 0.5 * np.sum(np.abs(c[0]) ** 2, axis=-1) + np.sum(c[0].real ** 2, axis=-1))
+
+
+def curvature(signal: Spectrum) -> Spectrum:
+    """The second derivative over crank angle, its sign left out."""
+    return Spectrum(signal.base, signal.coefficients * (signal.orders**2)[:, None, None])
+
+
+def fine_lengths(signal: Spectrum, steps: int, times: int) -> tuple[Array, float]:
+    """Lengths at `steps` samples from each of `times` first angles, (steps, times, places); and the step [rad]."""
+    step = 2.0 * np.pi / float(signal.base) / (steps * times)
+    return lengths(signal.sample(steps * times)).reshape(steps, times, -1), step

@@ -1,0 +1,90 @@
+"""sqrt(sum_k w_k |v_k|^2): the root mean square."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from laufruhe.numerics.norms.mean import between
+from laufruhe.numerics.norms.norm import Array, Cones, Grid, Norm, SmoothProgram, lengths, mean_square
+from laufruhe.numerics.spectrum import Spectrum
+
+
+class RootMeanSquare(Norm):
+    """The Euclidean norm of weighted rows."""
+
+    name = "rms"
+    is_euclidean = True
+
+    def value(self, grid: Grid, rows: Array) -> float:
+        """sqrt(sum_k w_k |v_k|^2)."""
+        size = lengths(rows)
+        largest = float(size.max(initial=0.0))
+        if largest == 0.0:
+            return largest
+        return largest * float(np.sqrt(grid.weights @ np.square(size / largest)))
+
+    def subgradient(self, grid: Grid, rows: Array) -> Array:
+        """w_k v_k over the norm."""
+        total = self.value(grid, rows)
+        return np.asarray(grid.weights[:, None] * rows / total) if total > 0.0 else np.zeros_like(rows)
+
+    def dual_norm(self, grid: Grid, z: Array) -> float:
+        """sqrt(sum_k |z_k|^2 / w_k); infinite where a weightless row is used."""
+        size, weights = lengths(z), grid.weights
+        if np.any((weights == 0.0) & (size > 0.0)):
+            return math.inf
+        largest = float(size.max(initial=0.0))
+        if largest == 0.0:
+            return 0.0
+        return largest * float(np.sqrt((np.square(size / largest) / np.where(weights > 0.0, weights, 1.0)).sum()))
+
+    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+        """The design's own direction."""
+        return self.subgradient(grid, rows)
+
+    def spread(self, z: Array, steps: int, times: int) -> Array:
+        """Straight from angle to angle."""
+        return between(z, steps, times)
+
+    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+        """The root of squares times weights."""
+        return np.asarray(np.sqrt(np.dot(np.multiply(lengths, lengths, out=lengths), weights)))
+
+    def cones(self, grid: Grid) -> Cones:
+        """One cone for all rows, each times the root of its weight."""
+        return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), whole=True)
+
+    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+        """Softened as one length."""
+        import casadi as ca
+
+        softness = share * unit
+        return ca.sqrt(ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)) + softness**2) - softness
+
+    def limited(
+        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+    ) -> tuple[Any, float, float]:
+        """The mean square, which is smooth at zero."""
+        import casadi as ca
+
+        return ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)), most * most, 2.0 * most
+
+    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+        """Parseval's sum, which is exact."""
+        squares = np.array([mean_square(signal) for signal in signals])
+        return math.sqrt(float(shares @ squares.mean(axis=1)))
+
+    def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
+        """Against Parseval's sum."""
+        squares = [float(np.square(lengths(s.sample(steps))).mean()) for s in signals]
+        return abs(math.sqrt(float(shares @ np.array(squares))) - self.above(signals, shares))
+
+    def least_of_orders(
+        self, squares: Sequence[Sequence[float]], roots: Sequence[Sequence[float]], shares: Array
+    ) -> float:
+        """The squares of all orders and operating points add up."""
+        return math.sqrt(sum(share * sum(each) for share, each in zip(shares, squares, strict=True)))

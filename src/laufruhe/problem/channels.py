@@ -1,0 +1,199 @@
+"""What can be asked of a design: loads over the cycle, masses, and what a block on its mounts is (M1-M5, E6-E15).
+
+A channel of a load is a function from the loads at an operating point to a signal; one of
+a block on its mounts is a function to numbers. The table at the end names them all. Every
+channel says which keys narrow it and which sides of it may be limited, so that who reads
+a file asks no names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from laufruhe.machine import Role
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics import mount_numbers
+from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
+from laufruhe.physics.modes import MOTIONS
+from laufruhe.physics.mount_forces import rigid_mounting
+
+if TYPE_CHECKING:
+    from laufruhe.machine import Engine
+    from laufruhe.problem.evaluation import Evaluation
+    from laufruhe.problem.loads import PointLoads
+    from laufruhe.problem.measure import Measure
+
+ON_BLOCK = ("operating_points", "orders")
+ON_PLACES = (*ON_BLOCK, "mounts", "direction_weights")
+
+
+class Needs(StrEnum):
+    """What an engine must have before a channel means anything."""
+
+    NOTHING = ""
+    MOUNTS = "mounts"
+    ELASTIC = "elastic mounts"
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One thing that is measured.
+
+    Attributes
+    ----------
+    name, unit
+        As files and reports say it; SI.
+    keys
+        That narrow it in a file.
+    needs
+        What the engine must have.
+    sides
+        That a limit may have.
+    minimised
+        Whether it may be an objective.
+    """
+
+    name: str
+    unit: str
+    keys: tuple[str, ...] = ()
+    needs: Needs = Needs.NOTHING
+    sides: tuple[str, ...] = ("max",)
+    minimised: bool = True
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True, eq=False)
+class LoadChannel(Channel):
+    """A signal over the cycle, linear in the loads; it has a norm.
+
+    Attributes
+    ----------
+    signal
+        Coefficients of shape (n, places, d) from the loads at an operating point.
+    part
+        Components of the wrench where its one place is the block; None where its places are the mounts.
+    feels_gas
+        Whether the roll moment is in it: gas gives no force (eq. 1).
+    """
+
+    keys: tuple[str, ...] = ON_BLOCK
+    signal: Callable[[PointLoads], Spectrum] = field(kw_only=True)
+    part: slice | None = None
+    feels_gas: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class MassChannel(Channel):
+    """Masses of the rotors of some roles, added up."""
+
+    keys: tuple[str, ...] = ("of",)
+    roles: tuple[Role, ...] = field(kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class MountChannel(Channel):
+    """A block on its mounts.
+
+    Attributes
+    ----------
+    values
+        Numbers of a design; the first is the one that is shown, all of them keep a limit.
+    """
+
+    needs: Needs = Needs.ELASTIC
+    values: Callable[[Measure, Evaluation], Sequence[float]] = field(kw_only=True)
+
+
+def _on_block(name: str, unit: str, part: slice, feels_gas: bool) -> LoadChannel:
+    def signal(loads: PointLoads) -> Spectrum:
+        return Spectrum(loads.wrench.base, loads.wrench.coefficients[:, None, part])
+
+    return LoadChannel(name, unit, signal=signal, part=part, feels_gas=feels_gas)
+
+
+def _on_mounts(name: str, unit: str, needs: Needs, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
+    def found(loads: PointLoads) -> Spectrum:
+        spectrum = signal(loads)
+        if spectrum is None:
+            raise ValueError(f"this mounting has no {name}")
+        return spectrum
+
+    return LoadChannel(name, unit, ON_PLACES, needs, signal=found)
+
+
+def mounting_in(engine: Engine) -> ElasticMounting:
+    """The elastic mounting of an engine that has one."""
+    if engine.block is None:
+        raise ValueError("this engine has no block, so its mounts are rigid")
+    return elastic_mounting(engine.block, engine.mounts)
+
+
+def _of_mounting(number: Callable[[ElasticMounting, Measure], float | Sequence[float]]) -> Callable[
+    [Measure, Evaluation], Sequence[float]
+]:  # fmt: skip
+    def values(measure: Measure, evaluation: Evaluation) -> Sequence[float]:
+        found = number(mounting_in(evaluation.engine), measure)
+        return (found,) if isinstance(found, float) else found
+
+    return values
+
+
+def _transmissibility(measure: Measure, evaluation: Evaluation) -> Sequence[float]:
+    firm = rigid_mounting(evaluation.engine.mounts)
+    ratios = [
+        mount_numbers.transmitted(loads.mount_forces, firm.forces(loads.wrench), measure.orders)
+        for loads in evaluation.loads
+        if (measure.points is None or loads.point.name in measure.points) and loads.mount_forces is not None
+    ]
+    return (max(ratios, default=0.0),)
+
+
+def motion_indices(measure: Measure) -> tuple[int, ...]:
+    """Of the motions that are to have a mode of their own."""
+    return tuple(MOTIONS.index(name) for name in measure.motions or MOTIONS)
+
+
+MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
+MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
+SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3), feels_gas=False)
+ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), feels_gas=False)
+ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4), feels_gas=True)
+
+COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))
+BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
+ADDED_MASS = MassChannel("added mass", "kg", roles=(Role.COUNTERWEIGHT, Role.BALANCER))
+
+TRANSMISSIBILITY = MountChannel("transmissibility", "", ON_BLOCK, values=_transmissibility)
+SAG = MountChannel(
+    "static sag", "m", sides=("min", "max"), values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting))
+)
+FREQUENCIES = MountChannel(
+    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False,
+    values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
+)  # fmt: skip
+DECOUPLING = MountChannel(
+    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False,
+    values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
+)  # fmt: skip
+TORQUE_ROLL = MountChannel(
+    "torque-roll residual", "", ("frequency",),
+    values=_of_mounting(lambda mounting, m: mount_numbers.torque_roll_residual(mounting, m.frequency)),
+)  # fmt: skip
+TOTAL_STIFFNESS = MountChannel(
+    "total stiffness", "N/m", sides=("min", "max"),
+    values=_of_mounting(lambda mounting, _: mount_numbers.total_stiffness(mounting.mounts)),
+)  # fmt: skip
+
+CHANNELS: Mapping[str, Channel] = {
+    channel.name: channel
+    for channel in (
+        MOUNT_FORCE, MOUNT_TRAVEL, SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT,
+        COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
+        TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
+    )
+}  # fmt: skip
