@@ -39,7 +39,7 @@ STARTS = 6
 ORDERS_WITH_GAS = 2
 FEASIBLE = 1e-6
 # share that keeps a design that stands on a limit from breaking it by a rounding
-SOFT_LIMIT = 1e-6
+SOFT_LIMIT = 1e-7
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 
 
