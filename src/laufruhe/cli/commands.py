@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn, Optional
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
@@ -33,27 +33,24 @@ app = typer.Typer(
 )
 
 ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help="Problem file (TOML).", show_default=False)]
-JsonOption = Annotated[
-    Optional[str],  # noqa: UP045  (typer reads it at run time)
-    typer.Option(
-        "--json", metavar="FILE", help="Write the result as JSON to FILE; - prints it, and the text goes to stderr."
-    ),
-]
-StudyJsonOption = Annotated[
-    Optional[str],  # noqa: UP045
-    typer.Option("--json", metavar="FILE", help="Write all parts as JSON to FILE; - prints them."),
-]
-OutOption = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--out", metavar="DIR", help="Folder of the results.  [default: results/<name of the file>]"),
-]
-NoPlotsOption = Annotated[
-    bool, typer.Option("--no-plots", help="Draw no pictures; those of an earlier result are removed.")
-]
-ToleranceOption = Annotated[
-    Optional[float],  # noqa: UP045
-    typer.Option("--tolerance", metavar="X", help="Relative gap that counts as proven, in place of the file's."),
-]
+JSON = "Write the result as JSON to FILE; - prints it, and the text goes to stderr."
+JsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=JSON)]
+PARTS = "Write all parts as JSON to FILE; - prints them."
+StudyJsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=PARTS)]
+OUT = "Folder of the results.  [default: results/<name of the file>]"
+OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT)]
+PAGES = "Folder of the pages.  [default: results/trade]"
+PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=PAGES)]
+NO_PLOTS = "Draw no pictures; those of an earlier result are removed."
+NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help=NO_PLOTS)]
+GAP = "Relative gap that counts as proven, in place of the file's."
+ToleranceOption = Annotated[float | None, typer.Option("--tolerance", metavar="X", help=GAP)]
+ERROR = "Relative error of the objective that is allowed."
+FidelityTolerance = Annotated[float, typer.Option("--tolerance", metavar="X", help=ERROR)]
+JOBS = "Processes that may be used.  [default: one a core]"
+JobsOption = Annotated[int | None, typer.Option("--jobs", metavar="N", help=JOBS)]
+StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)]
+Problems = Annotated[list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False)]
 
 
 @app.command()
@@ -86,15 +83,7 @@ def evaluate(
 
 
 @app.command()
-def study(
-    problem: Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)],
-    json: StudyJsonOption = None,
-    out: OutOption = None,
-    jobs: Annotated[
-        Optional[int],  # noqa: UP045
-        typer.Option("--jobs", metavar="N", help="Processes that may be used.  [default: one a core]"),
-    ] = None,
-) -> None:
+def study(problem: StudyArgument, json: StudyJsonOption = None, out: OutOption = None, jobs: JobsOption = None) -> None:
     """Run the sweeps and comparisons of a study file.
 
     Finished points are kept; a study that was interrupted goes on where it stopped.
@@ -104,7 +93,7 @@ def study(
         from laufruhe.cli.study import studied
         from laufruhe.report import files
 
-        copy = json_file(Request("study", problem, json, None, False), places)
+        copy = json_file(json, problem, places)
         with progress() as say:
             text, data = studied(problem, out, jobs, say)
         if copy is not None:
@@ -124,20 +113,13 @@ def check(problem: ProblemArgument, json: JsonOption = None) -> None:
         from laufruhe.report.json_result import as_json
         from laufruhe.solvers import state
 
-        copy = json_file(Request("check", problem, json, None, False), places)
+        copy = json_file(json, problem, places)
         given = load(problem)
         # a load that no mount carries, or a gas cycle that cannot be met, shows only here
         stated = state(given, to_start_from=True)
         if copy is not None:
             files.write(copy, as_json(stated))
-        if json == "-":
-            sys.stdout.write(as_json(stated))
-        typer.echo(f"ok: {given.summary}", err=json == "-")
-
-
-FidelityTolerance = Annotated[
-    float, typer.Option("--tolerance", metavar="X", help="Relative error of the objective that is allowed.")
-]
+        hand_out(f"ok: {given.summary}\n", as_json(stated), "-" if json == "-" else None)
 
 
 @app.command()
@@ -146,26 +128,16 @@ def explain(problem: ProblemArgument, json: JsonOption = None, tolerance: Fideli
     with exit_statuses(problem):
         from laufruhe.cli.fidelity import explained
 
-        checked_tolerance(tolerance)
-        text, data = explained(problem, tolerance)
-        hand_out(text, data, json)
+        hand_out(*explained(problem, checked_tolerance(tolerance)), json)
 
 
 @app.command()
-def trade(
-    problems: Annotated[list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False)],
-    json: JsonOption = None,
-    out: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--out", metavar="DIR", help="Folder of the pages.  [default: results/trade]"),
-    ] = None,
-) -> None:
+def trade(problems: Problems, json: JsonOption = None, out: PagesOption = None) -> None:
     """Measure speed against accuracy of every fidelity, on these problems."""
     with exit_statuses(problems[0]), progress() as say:
         from laufruhe.cli.fidelity import traded
 
-        text, data = traded(problems, out or Path("results") / "trade", say)
-        hand_out(text, data, json)
+        hand_out(*traded(problems, out or Path("results") / "trade", say), json)
 
 
 def _show_version(wanted: bool) -> None:

@@ -6,8 +6,8 @@ import math
 import shlex
 import sys
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -48,13 +48,13 @@ def written(request: Request, answer: Answer, say: Callable[[str], None]) -> tup
     from laufruhe.report.markdown import as_markdown
 
     say("reading the problem")
-    clock = _Clock()
-    problem = _with_tolerance(load(request.problem), request.tolerance)
-    clock.stop("load")
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "load"):
+        problem = _with_tolerance(load(request.problem), request.tolerance)
     with ExitStack() as places:
         option, folder = ("--out", request.out) if request.out is not None else ("results", _default_folder(problem))
         stage = places.enter_context(files.staged(folder, option))
-        copy = json_file(request, places)
+        copy = json_file(request.json, request.problem, places)
         open_numbers = len(problem.decisions)
         what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
         say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
@@ -64,10 +64,9 @@ def written(request: Request, answer: Answer, say: Callable[[str], None]) -> tup
             from laufruhe.plots import draw
 
             say("drawing")
-            clock.start()
-            pictures = draw(result, stage)
-            clock.stop("plots")
-        result = replace(result, timing={**result.timing, **clock.seconds})
+            with _timed(seconds, "plots"):
+                pictures = draw(result, stage)
+        result = replace(result, timing={**result.timing, **seconds})
         text = as_json(result)
         files.write(stage / files.RESULT, text)
         files.write(stage / files.REPORT, as_markdown(result, pictures, request.command))
@@ -76,32 +75,23 @@ def written(request: Request, answer: Answer, say: Callable[[str], None]) -> tup
     return result, folder
 
 
-def json_file(request: Request, places: ExitStack) -> Path | None:
+def json_file(json: str | None, problem: Path, places: ExitStack) -> Path | None:
     """Where a copy of the result goes, if one is wanted as a file."""
     from laufruhe.report import files
 
-    if request.json in (None, "-"):
+    if json is None or json == "-":
         return None
-    path = Path(str(request.json))
-    if path.resolve() == request.problem.resolve():
+    path = Path(json)
+    if path.resolve() == problem.resolve():
         raise InputError("laufruhe", (Complaint("--json", str(path), "is the problem file", "name another file"),))
     return places.enter_context(files.staged_file(path, "--json"))
 
 
-class _Clock:
-    """Seconds by what they were spent on."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self.start()
-
-    def start(self) -> None:
-        """Count from now."""
-        self._started = time.perf_counter()
-
-    def stop(self, what: str) -> None:
-        """Book the time since the start."""
-        self.seconds[what] = time.perf_counter() - self._started
+@contextmanager
+def _timed(seconds: dict[str, float], what: str) -> Iterator[None]:
+    started = time.perf_counter()
+    yield
+    seconds[what] = time.perf_counter() - started
 
 
 def solved(problem: Problem, say: Callable[[str], None]) -> Result:
@@ -134,14 +124,12 @@ def _default_folder(problem: Problem) -> Path:
 
 
 def _with_tolerance(problem: Problem, tolerance: float | None) -> Problem:
-    if tolerance is None:
-        return problem
-    checked_tolerance(tolerance)
-    return replace(problem, tolerance=tolerance)
+    return problem if tolerance is None else replace(problem, tolerance=checked_tolerance(tolerance))
 
 
-def checked_tolerance(tolerance: float) -> None:
+def checked_tolerance(tolerance: float) -> float:
     """Refuse a tolerance that is no number above zero."""
     if not (math.isfinite(tolerance) and tolerance > 0.0):
         complaint = Complaint("--tolerance", f"{tolerance:g}", "must be a number above zero", "try 1e-3")
         raise InputError("laufruhe", (complaint,))
+    return tolerance

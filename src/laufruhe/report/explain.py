@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
 
 from laufruhe.fidelity.automatic import Choice
 from laufruhe.problem.problem import Problem
@@ -19,18 +18,18 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         Of one evaluation of a further design: as chosen, and exact over the whole cycle.
     """
     pruned, whole = choice.numbers
-    asked = f"asked {tolerance:g}"
+    fewer = f", 1/{whole / pruned:.2g}" if 0 < pruned < whole else ""
     met = "" if choice.error_estimate <= tolerance else "; the reference itself is no better, give a smoother gas trace"
     lines = [
         f"{problem.title}",
-        f"error of the objective at most {choice.error_estimate:.1e} ({asked}{met})",
+        f"error of the objective at most {choice.error_estimate:.1e} (asked {tolerance:g}{met})",
         "",
         "kept:",
         *(f"  {text}" for text in choice.kept),
         "left out:",
         *(_line(part.what, part.why, part.share) for part in choice.left_out),
         "saved:",
-        f"  {pruned} force components sampled in place of {whole}{_saved(whole, pruned)}",
+        f"  {pruned} force components sampled in place of {whole}{fewer}",
         f"  {milliseconds[0]:.3f} ms for another design in place of {milliseconds[1]:.3f} ms",
     ]
     return "\n".join(lines) + "\n"
@@ -38,7 +37,7 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
 
 def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
     """The same for scripts."""
-    content: dict[str, Any] = {
+    return strict({
         "problem": problem.name,
         "tolerance": tolerance,
         "error_estimate": choice.error_estimate,
@@ -47,13 +46,7 @@ def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         "left_out": [{"what": part.what, "why": part.why, "share": part.share} for part in choice.left_out],
         "numbers": {"kept": choice.numbers[0], "exact": choice.numbers[1]},
         "milliseconds": {"kept": milliseconds[0], "exact": milliseconds[1]},
-    }
-    return strict(content)
-
-
-def _saved(whole: int, pruned: int) -> str:
-    """How many times fewer numbers; nothing where the tolerance asks for as many or more."""
-    return f", 1/{whole / pruned:.2g}" if 0 < pruned < whole else ""
+    })  # fmt: skip
 
 
 def _line(what: str, why: str, share: float) -> str:

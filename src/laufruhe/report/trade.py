@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
-from laufruhe.report.grid import escaped
+from laufruhe.present.numbers import DASH
+from laufruhe.report.grid import escaped, piped
 from laufruhe.report.strict_json import strict
 from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade
 from laufruhe.studies.trade_optima import is_local
 
-DASH = "-"
 ALIKE = 1.3
 TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
 MOVED = " Throws leave their even steps here, and such optima are local: a regret may be below zero."
@@ -21,9 +21,13 @@ LOCAL = (
     "A small regret may be below zero."
 )
 HEAD = (
-    "| fidelity | error | said to be at most | another design | gradient | solve | from nothing | memory | regret |\n"
-    "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
-)
+    "fidelity", "error", "said to be at most", "another design", "gradient", "solve", "from nothing", "memory",
+    "regret",
+)  # fmt: skip
+INDEX = (
+    "problem", "for a number good to 0.1 %", "a design", "to decide within 0.1 %", "a solve", "error of two-order",
+    "of no gas", "of auto 0.001", "regret of two-order", "of auto 0.001", "uneven speed",
+)  # fmt: skip
 
 
 def as_page(found: Trade, picture: str | None, command: str) -> str:
@@ -38,7 +42,7 @@ def as_page(found: Trade, picture: str | None, command: str) -> str:
         f"![Time against error of every fidelity; colour is regret]({picture})"
         if picture
         else "No load enters what is asked, so every fidelity gives the same number.",
-        "\n".join([HEAD, *(_line(row) for row in found.rows)]),
+        piped(HEAD, [_cells(row) for row in found.rows]),
         "*Another design*: objective with the scene prepared. *Gradient*: with its derivatives by all decisions. "
         "*Solve*: optimum from nothing, at this fidelity's own angles. *From nothing*: engine to objective. "
         "*Regret*: by how much the reference objective of the optimum found is above that of the best."
@@ -107,10 +111,8 @@ def as_json(found: Trade) -> str:
         "problem": found.problem.name,
         "reference": {"objective": found.value, "optimum": found.optimum},
         "rigid_part": asdict(found.rigid_part),
-        "uneven_speed": None
-        if found.flywheel is None
-        else dict(zip(("crank_inertia", "change"), found.flywheel, strict=True)),
-        "time_domain": None if found.time_domain is None else asdict(found.time_domain),
+        "uneven_speed": found.flywheel and dict(zip(("crank_inertia", "change"), found.flywheel, strict=True)),
+        "time_domain": found.time_domain and asdict(found.time_domain),
         "rows": [asdict(row) for row in found.rows],
     }
     return strict(content)
@@ -134,30 +136,24 @@ def index(trades: Sequence[Trade]) -> str:
         "- Regret may be far below the error, for an optimum is flat, and far above it: what a shaft is wrongly made "
         "to balance stays. Read both columns.",
         "",
-        "| problem | for a number good to 0.1 % | a design | to decide within 0.1 % | a solve "
-        "| error of two-order | of no gas | of auto 0.001 | regret of two-order | of auto 0.001 | uneven speed |",
-        "| --- | --- | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
-    ]
-    lines += [_index_line(found) for found in trades]
-    lines += [
+        piped(INDEX, [_index_row(found) for found in trades], (0, 1, 3)),
         "",
         "A dash: the problem has no such part, leaves nothing open, has an optimum of zero, or asks of mounts what no "
         "load enters. Where mounts are open, or throws one by one, optima are local: a regret there says as much of "
         "the search as of the fidelity, and may be below zero.",
+        "",
+        "*Uneven speed*: what a flywheel that leaves 2 % of unevenness changes of the objective.",
     ]
-    lines += ["", "*Uneven speed*: what a flywheel that leaves 2 % of unevenness changes of the objective."]
     return "\n".join(lines) + "\n"
 
 
-def _index_line(found: Trade) -> str:
+def _index_row(found: Trade) -> list[str]:
     two, auto, gas = (_named(found, name) for name in (TWO_ORDER, "auto 0.001", NO_GAS))
     number, decided = choices(found)
-    deciding = f"`{decided.name}` | {_time(decided.solve)}" if decided else f"{DASH} | {DASH}"
-    name = found.problem.name
-    return (
-        f"| [{name}]({name}.md) | `{number.name}` | {_time(number.evaluation)} | {deciding} | {_error(two)} "
-        f"| {_error(gas)} | {_error(auto)} | {_regret(two)} | {_regret(auto)} | {_uneven(found)} |"
-    )
+    deciding = (f"`{decided.name}`", _time(decided.solve)) if decided else (DASH, DASH)
+    name, uneven = found.problem.name, DASH if found.flywheel is None else f"{100.0 * found.flywheel[1]:+.2f} %"
+    return [f"[{name}]({name}.md)", f"`{number.name}`", _time(number.evaluation), *deciding, _error(two), _error(gas),
+            _error(auto), _regret(two), _regret(auto), uneven]  # fmt: skip
 
 
 def _named(found: Trade, name: str) -> Row | None:
@@ -189,27 +185,17 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
-def _line(row: Row) -> str:
-    return (
-        f"| {row.name} | {row.error:.1e} | {row.estimate:.1e} | {_time(row.evaluation)} | {_time(row.gradient)} "
-        f"| {_time(row.solve)} | {_time(row.fresh)} | {row.memory / 1e6:.2f} MB | {_regret(row)} |"
-    )
-
-
-def _uneven(found: Trade) -> str:
-    return DASH if found.flywheel is None else f"{100.0 * found.flywheel[1]:+.2f} %"
+def _cells(row: Row) -> list[str]:
+    times = map(_time, (row.evaluation, row.gradient, row.solve, row.fresh))
+    return [row.name, f"{row.error:.1e}", f"{row.estimate:.1e}", *times, f"{row.memory / 1e6:.2f} MB", _regret(row)]
 
 
 def _time(seconds: float) -> str:
     if math.isnan(seconds):
         return DASH
-    return (
-        f"{1e6 * seconds:.0f} us"
-        if seconds < 1e-3
-        else f"{1e3 * seconds:.3g} ms"
-        if seconds < 1.0
-        else f"{seconds:.3g} s"
-    )
+    if seconds < 1e-3:
+        return f"{1e6 * seconds:.0f} us"
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
 def _error(row: Row | None) -> str:
