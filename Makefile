@@ -4,19 +4,22 @@ STUDY ?= problems/tractor-study.toml
 
 VENV := .venv
 BIN := $(VENV)/bin
+LANES := -n auto --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test bench pictures lint format clean distclean
+.PHONY: help solve study test test-fast bench pictures lint format clean distclean
 
 help:
-	@echo "make solve   design the balance of PROBLEM ($(PROBLEM))"
-	@echo "make study   sweeps and comparisons that STUDY describes ($(STUDY))"
-	@echo "make test    all tests"
-	@echo "make bench   benchmarks, which write under results/benchmarks/; an hour"
+	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
+	@echo "make study      sweeps and comparisons that STUDY describes ($(STUDY))"
+	@echo "make test-fast  tests of every room, under a minute on two cores"
+	@echo "make test       all tests, minutes"
+	@echo "make lint       style, types, direction of imports"
+	@echo "make format     put the source into the project's style"
+	@echo "make bench      benchmarks, which write results/benchmarks/; an hour and more"
 	@echo "make pictures   the pictures of README.md again, under docs/pictures/"
-	@echo "make lint    style, types and the direction of imports"
-	@echo "make format  put the source into the project's style"
-	@echo "make clean   remove caches; make distclean removes $(VENV) as well"
+	@echo "make clean      remove caches; make distclean removes $(VENV) as well"
+	@echo "TESTS='-k name' goes to pytest"
 
 # pip from Python 3.11 knows no dependency groups, so the pinned pip comes first.
 $(STAMP): pyproject.toml constraints.txt
@@ -32,8 +35,14 @@ solve: $(STAMP)
 study: $(STAMP)
 	$(BIN)/laufruhe study $(STUDY)
 
+# A process for every core, one thread in each.
+test test-fast: export OMP_NUM_THREADS = 1
+
 test: $(STAMP)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(LANES) $(TESTS)
+
+test-fast: $(STAMP)
+	$(BIN)/python -m pytest $(LANES) -m "not slow" $(TESTS)
 
 # Scripts that write under results/benchmarks/.
 bench: $(STAMP)

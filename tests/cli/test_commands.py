@@ -269,6 +269,7 @@ def test_help_imports_no_heavy_library() -> None:
     assert "solve" in done.stdout
 
 
+@pytest.mark.slow
 def test_evaluate_and_check_need_no_solver(tmp_path: Path) -> None:
     path = written(tmp_path, scenes.GIVEN)
     code = (
@@ -282,6 +283,7 @@ def test_evaluate_and_check_need_no_solver(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_process_ends_with_the_status(tmp_path: Path) -> None:
     done = in_a_process("check", str(tmp_path / "missing.toml"))
     assert done.returncode == 2

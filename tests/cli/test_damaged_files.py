@@ -66,6 +66,7 @@ TEXTS = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.slow
 @TEXTS
 @pytest.mark.parametrize("batch", range(BATCHES))
 def test_damaged_tables(text: str, batch: int, tmp_path: Path) -> None:

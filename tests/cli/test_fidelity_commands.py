@@ -41,6 +41,7 @@ def test_tolerance_must_be_positive(tolerance: str, tmp_path: Path) -> None:
     assert answer.exit_code == 2
 
 
+@pytest.mark.slow
 def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
     path, out = written(tmp_path, scenes.TIGHT), tmp_path / "trade"
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(out), "--json", str(tmp_path / "trade.json")])
@@ -65,6 +66,7 @@ def test_trade_of_a_damaged_file(tmp_path: Path) -> None:
     assert not (tmp_path / "trade").exists()
 
 
+@pytest.mark.slow
 def test_trade_of_a_question_about_modes(tmp_path: Path) -> None:
     """No load enters, so every fidelity is right, and the mounts alone are the cheapest."""
     path, out = Path(__file__).parents[2] / "problems" / "powertrain-torque-roll.toml", tmp_path / "trade.json"
@@ -79,6 +81,7 @@ def test_trade_of_a_question_about_modes(tmp_path: Path) -> None:
     assert {p.name for p in (tmp_path / "trade").iterdir()} == {"powertrain-torque-roll.md"}
 
 
+@pytest.mark.slow
 def test_trade_of_elastic_mounts(tmp_path: Path) -> None:
     """Mounts held, unbalances open: rows of the block's own choices, and a regret where they can decide."""
     path, out = written(tmp_path, _elastic_with_a_shaft()), tmp_path / "trade.json"

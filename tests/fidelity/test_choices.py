@@ -111,6 +111,7 @@ print(found.objective.value, found.certificate.lower_bound, choose(found.problem
 """
 
 
+@pytest.mark.slow
 def test_threads_of_the_machine_change_a_rounding() -> None:
     """Optimum, bound and estimate to a rounding, whatever the threads of its libraries."""
     answers = [

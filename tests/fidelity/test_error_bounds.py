@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import pytest
@@ -14,7 +13,9 @@ from laufruhe.fidelity.error_bounds import error_bound, reference
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 
-QUICK, MANY, AUTOMATIC = 150, 10_000, 25
+QUICK, AUTOMATIC = 150, 25
+# ten thousand engines, a thousand at a time
+SHARES, SHARE = 10, 1000
 
 
 def _fidelity(rng: random.Random) -> Fidelity:
@@ -43,19 +44,21 @@ def test_estimate_is_not_below_the_error(seed: int) -> None:
     assert true <= stated, fidelity
 
 
+@pytest.mark.slow
 def test_estimate_is_not_idle() -> None:
     """A bound far above the truth would pass every test and help nobody."""
     ratios = [stated / true for true, stated, _ in map(_errors, range(QUICK)) if true > 1e-6]
     assert sorted(ratios)[len(ratios) // 2] < 12.0
 
 
+@pytest.mark.slow
 @pytest.mark.validation
-def test_estimate_on_ten_thousand_engines() -> None:
+@pytest.mark.parametrize("share", range(SHARES))
+def test_estimate_on_ten_thousand_engines(share: int) -> None:
     """Nothing is below without gas; with it one in a thousand: where its bends fall between steps is chance."""
-    with ProcessPoolExecutor(2) as pool:
-        shares = list(pool.map(_excess, range(MANY), chunksize=250))
-    assert [seed for seed, (excess, has_gas) in enumerate(shares) if excess > 0.0 and not has_gas] == []
-    assert sum(excess > 0.0 for excess, _ in shares) <= MANY // 1000
+    found = {seed: _excess(seed) for seed in range(share * SHARE, (share + 1) * SHARE)}
+    assert [seed for seed, (excess, has_gas) in found.items() if excess > 0.0 and not has_gas] == []
+    assert sum(excess > 0.0 for excess, _ in found.values()) <= 1
 
 
 def _excess(seed: int) -> tuple[float, bool]:

@@ -127,6 +127,7 @@ def solved(tmp_path_factory):
     return problem, solve(problem)
 
 
+@pytest.mark.slow
 def test_joint_design_keeps_its_limits_and_beats_each_part_alone(solved):
     problem, result = solved
     assert result.status is Status.FEASIBLE
@@ -139,6 +140,7 @@ def test_joint_design_keeps_its_limits_and_beats_each_part_alone(solved):
     assert result.objective.value < balance.objective.value < result.objective.initial
 
 
+@pytest.mark.slow
 def test_no_neighbour_within_the_limits_is_better(solved):
     problem, result = solved
     values = {d.name: d.value for d in result.decisions}
@@ -171,6 +173,7 @@ def test_unbalances_on_fixed_elastic_mounts_are_proven_globally(tmp_path):
     assert result.objective.value < 0.2 * result.objective.initial
 
 
+@pytest.mark.slow
 def test_with_mounts_held_the_search_ends_at_the_proven_balance(tmp_path):
     """The nonlinear route, given a limit that never binds, must reproduce the cone program's optimum."""
     fixed = MOUNTS.replace('{ between = ["20 N/mm", "4000 N/mm"], start = "400 N/mm" }', '"300 N/mm"')
@@ -182,6 +185,7 @@ def test_with_mounts_held_the_search_ends_at_the_proven_balance(tmp_path):
     assert searched.objective.value >= proven.certificate.lower_bound * (1 - 1e-9)
 
 
+@pytest.mark.slow
 def test_a_convex_problem_searched_all_the_same_is_recognised_as_global(tmp_path):
     band = SAG + '[[constraints]]\nlimit = "natural frequencies"\noutside = ["14 Hz", "30 Hz"]\nname = "band"\n'
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, band, SEARCH)
@@ -190,6 +194,7 @@ def test_a_convex_problem_searched_all_the_same_is_recognised_as_global(tmp_path
     assert result.objective.value == pytest.approx(1.3973e-3, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_limits_out_of_reach_are_not_met_and_said_so(tmp_path):
     hopeless = '[[constraints]]\nlimit = "static sag"\nmax = "2 mm"\n'
     hopeless += '[[constraints]]\nlimit = "natural frequencies"\nmax = "9 Hz"\n'
@@ -204,6 +209,7 @@ def test_limits_out_of_reach_are_not_met_and_said_so(tmp_path):
     assert "no design found" in found.message
 
 
+@pytest.mark.slow
 def test_a_natural_frequency_is_kept_out_of_a_band(tmp_path):
     asked = (
         FORCE.format(measure="rms") + '[[constraints]]\nlimit = "natural frequencies"\noutside = ["8 Hz", "12 Hz"]\n'
@@ -217,6 +223,7 @@ def test_a_natural_frequency_is_kept_out_of_a_band(tmp_path):
     assert np.any((given > 8.0) & (given < 12.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["400 N/mm", "1e-2 N/mm"])
 def test_bounds_a_thousand_million_apart_are_searched_by_ratio(start, tmp_path):
     """The least stiffness isolates best; no start may be pushed to the middle of bounds and end above itself."""
@@ -228,6 +235,7 @@ def test_bounds_a_thousand_million_apart_are_searched_by_ratio(start, tmp_path):
     assert result.certificate.lower_bound <= result.objective.value
 
 
+@pytest.mark.slow
 @pytest.mark.validation
 @pytest.mark.parametrize("seed", range(10))
 def test_ten_seeds_find_the_best_known_optimum_of_the_tractor(seed):
@@ -236,6 +244,7 @@ def test_ten_seeds_find_the_best_known_optimum_of_the_tractor(seed):
     assert solve_joint(problem).objective.value == pytest.approx(4.0870, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.validation
 @pytest.mark.parametrize("seed", [0])
 def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):

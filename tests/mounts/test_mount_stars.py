@@ -52,6 +52,7 @@ def decided(tmp_path_factory):
     return solve(problem_of(tmp_path_factory.mktemp("open"), *parts()))
 
 
+@pytest.mark.slow
 def test_the_best_star_is_the_best_of_all_solved_one_by_one(decided, tmp_path):
     one_by_one = {}
     for star in STARS:
@@ -65,6 +66,7 @@ def test_the_best_star_is_the_best_of_all_solved_one_by_one(decided, tmp_path):
     assert decided.phasing.ranking[0].value == min(entry.value for entry in decided.phasing.ranking)
 
 
+@pytest.mark.slow
 def test_a_search_of_all_stars_is_bounded_but_not_called_proven(decided):
     certificate = decided.certificate
     assert decided.status is Status.FEASIBLE
@@ -75,12 +77,14 @@ def test_a_search_of_all_stars_is_bounded_but_not_called_proven(decided):
     assert [d.name for d in decided.decisions][:4] == [f"throw {k}" for k in (1, 2, 3, 4)]
 
 
+@pytest.mark.slow
 def test_stars_left_out_leave_no_bound(tmp_path):
     result = solve(problem_of(tmp_path, *parts(), "[phasing]\nbest = 1\n"))
     assert result.certificate.lower_bound == 0.0
     assert "the best of 3 on the mounts as given" in result.certificate.method
 
 
+@pytest.mark.slow
 def test_where_no_star_matters_the_proof_of_the_mounts_holds(tmp_path):
     """Sag and natural frequencies know no throws: every star has the same proven optimum."""
     engine = changed(ENGINE, ('"open"', '"open"'), ('[[counterweights]]\nname = "web"\n', ""),
@@ -92,6 +96,7 @@ def test_where_no_star_matters_the_proof_of_the_mounts_holds(tmp_path):
     assert len(result.phasing.ranking) == 3
 
 
+@pytest.mark.slow
 def test_limits_that_contradict_on_every_star_are_named(tmp_path):
     hopeless = changed(FORCE, ("4 mm", "2 mm")) + '[[constraints]]\nlimit = "natural frequencies"\nmax = "9 Hz"\n'
     result = solve(problem_of(tmp_path, *parts(objective=hopeless)))
@@ -104,6 +109,7 @@ def uneven(tmp_path_factory):
     return solve(problem_of(tmp_path_factory.mktemp("uneven"), *parts(), UNEVEN))
 
 
+@pytest.mark.slow
 def test_throws_that_may_move_are_never_worse_and_keep_their_intervals(decided, uneven):
     assert uneven.objective.value < decided.objective.value * (1 - 1e-4)
     assert uneven.problem.phasing.intervals.holds(uneven.final.engine.firing_intervals, 1e-7)
@@ -115,6 +121,7 @@ def test_throws_that_may_move_are_never_worse_and_keep_their_intervals(decided, 
     assert [part.throw for part in uneven.final.engine.slider_cranks] == pytest.approx(throws)
 
 
+@pytest.mark.slow
 def test_no_star_near_an_uneven_one_is_better(uneven):
     phasing = uneven.problem.phasing
     candidate = _candidate(uneven)
@@ -193,6 +200,7 @@ def test_the_program_of_moved_throws_has_the_gas_of_the_exact_model(quantity, tm
         assert float(value(x, 1e-9)) == pytest.approx(objective_value(moved, exact), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_throws_between_bounds_of_their_own_are_decided_with_the_mounts(tmp_path):
     throws = "[0, { between = [160, 200] }, { between = [160, 200] }, { between = [-15, 15] }]"
     phasing = '[phasing]\nintervals = { largest_deviation = "25 deg" }\n'

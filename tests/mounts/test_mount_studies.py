@@ -117,6 +117,7 @@ def test_equal_power_does_not_rebuild_a_block_on_springs(tmp_path: Path) -> None
         computed(study(tmp_path, "layout comparison", in_case="equal_power_to = 2"))
 
 
+@pytest.mark.slow
 def test_shafts_are_sized_for_transmissibility(tmp_path: Path) -> None:
     """Without its shaft the engine still minimises what its mounts transmit, and decides their stiffness."""
     asked = '[objective]\nminimise = "transmissibility"\norders = [2]\n'

@@ -124,6 +124,7 @@ def left_out(piston: float) -> float:
     return float(np.abs(found - expected).max() / np.abs(found).max())
 
 
+@pytest.mark.slow
 @pytest.mark.validation
 def test_the_linear_model_leaves_out_no_more_than_the_mass_that_moves():
     heavy, light = left_out(2.0), left_out(0.5)

@@ -54,6 +54,7 @@ def test_a_design_off_resonance_is_evaluated_as_ever(tmp_path: Path) -> None:
     assert off_resonance(problem) is problem
 
 
+@pytest.mark.slow
 def test_the_search_ends_where_it_does_from_elsewhere(tmp_path: Path) -> None:
     asked = FORCE.replace("starts = 4", "starts = 1")
     found, usual = solve(resonant(tmp_path, asked)), solve(resonant(tmp_path, asked, UNDAMPED))
@@ -87,6 +88,7 @@ def test_a_resonance_that_no_open_number_moves_is_refused(tmp_path: Path) -> Non
         solve(resonant(tmp_path, mounts=mounts))
 
 
+@pytest.mark.slow
 def test_from_the_shell(tmp_path: Path) -> None:
     """Evaluate refuses the design, check and solve take it; what has no size is null in the file, and said in words."""
     resonant(tmp_path, FORCE.replace("starts = 4", "starts = 1"))

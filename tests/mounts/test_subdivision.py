@@ -127,6 +127,7 @@ max = "4"
 """
 
 
+@pytest.mark.slow
 def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> None:
     problem = asked_for(tmp_path, ASKED["rms"], LIMITS)
     given = evaluate(problem)
@@ -145,6 +146,7 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
     assert allowed_ones > 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text", [ASKED["rms"], 'minimise = "transmissibility"\norders = [2]', 'minimise = "mean mount travel"']
 )

@@ -81,6 +81,7 @@ def test_hysteretic_resonance_peak_is_that_of_the_frequency_domain():
     assert shape.shape == (6,)
 
 
+@pytest.mark.slow
 def test_a_stop_that_is_never_met_changes_nothing_and_one_that_is_met_limits_travel():
     load, speed = wrench(2, orders=2), 560.0 * RPM
     free = periodic_state(powertrain(damping=300.0), load, speed)

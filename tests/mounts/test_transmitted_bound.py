@@ -39,6 +39,7 @@ def random_designs(problem, count: int, seed: int = 0):
         yield mounts, sizes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["powertrain-least-force", "tractor-four-elastic"])
 def test_no_design_allowed_is_under_the_bound(name):
     problem = load(PROBLEMS / f"{name}.toml")
@@ -60,6 +61,7 @@ def test_no_design_allowed_is_under_the_bound(name):
     assert allowed > 100
 
 
+@pytest.mark.slow
 def test_every_order_of_every_design_obeys_its_own_bound():
     problem = load(PROBLEMS / "powertrain-least-force.toml")
     problem = replace(problem, mount_design=replace(problem.mount_design, limits=()))
@@ -116,6 +118,7 @@ def test_limits_bound_a_vertical_force_like_the_single_mass_that_they_describe(l
         assert of_squares <= force**2 / 4.0 * (1.0 + 1e-9) + 1e-9
 
 
+@pytest.mark.slow
 def test_the_mean_torque_is_carried_whole(tmp_path):
     """At order zero the mounts carry the load itself, however soft they are."""
     problem = load(PROBLEMS / "powertrain-least-force.toml")

@@ -127,6 +127,7 @@ class TestStarSum:
         found = star_sum(weights, [Fraction(0), Fraction(0)], np.array([0]))[0]
         assert found.tolist() == [0.0, 2e-9]
 
+    @pytest.mark.slow
     @given(st.lists(PARTS, min_size=1, max_size=6), st.integers(-10_000, 10_000))
     def test_phasors_of_exact_turns_are_table_values(self, turns: list[Fraction], multiple: int) -> None:
         """A multiple of an exact angle is exact as well, however large."""

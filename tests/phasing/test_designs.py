@@ -102,7 +102,7 @@ def test_cuts_never_exceed_an_optimum(tmp_path, name):
         assert cut.least(model.space) <= min(s.value for s, _ in answers) * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("cylinders", [3, 4, 5, 6, 7, pytest.param(8, marks=pytest.mark.validation)])
+@pytest.mark.parametrize("cylinders", [3, 4, 5, 6, 7, pytest.param(8, marks=pytest.mark.slow)])
 def test_program_and_search_agree_on_couples(tmp_path, cylinders):
     by = {}
     for method in ("search", "program"):
@@ -114,7 +114,7 @@ def test_program_and_search_agree_on_couples(tmp_path, cylinders):
     assert by["program"].certificate.lower_bound <= by["search"].objective.value * (1.0 + 1e-9)
 
 
-@pytest.mark.validation
+@pytest.mark.slow
 @pytest.mark.parametrize("cylinders", [9, 10])
 def test_program_and_search_agree_up_to_ten(tmp_path, cylinders):
     test_program_and_search_agree_on_couples(tmp_path, cylinders)
@@ -134,6 +134,7 @@ def test_program_and_cuts_agree_with_unbalances_and_shafts(tmp_path, cylinders):
     assert values[1] == pytest.approx(values[0], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_program_out_of_time_is_not_sold_as_an_optimum(tmp_path):
     problem = engines.problem(tmp_path, 12)
     space = families_of(problem.phasing)[0][0].space
@@ -147,6 +148,7 @@ def test_a_program_out_of_time_is_not_sold_as_an_optimum(tmp_path):
     assert result.certificate.lower_bound <= proven + 1e-9 * result.objective.initial
 
 
+@pytest.mark.slow
 def test_sampled_norms_are_not_certified_by_scip(tmp_path):
     problem = engines.problem(
         tmp_path, 4, phasing='method = "program"\nbest = 1', rest=engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
@@ -162,6 +164,7 @@ def test_sampled_norms_are_not_certified_by_scip(tmp_path):
         assert result.status is Status.FEASIBLE
 
 
+@pytest.mark.slow
 def test_shafts_keep_the_limits_on_number_and_mass(tmp_path):
     rest = (
         engines.MOUNTS + engines.WEIGHTS + engines.shaft("against", -1, mass="3 kg")

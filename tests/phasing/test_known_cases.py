@@ -60,6 +60,7 @@ def test_two_stroke_four_with_a_shaft():
     assert unbalance == pytest.approx(wanted, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_two_stroke_four_without_a_shaft(tmp_path):
     """Hasselgruber: without a shaft the star with sqrt 2 is better."""
     text = (PROBLEMS / "two-stroke-four-open.toml").read_text(encoding="utf-8")
@@ -114,8 +115,8 @@ COUPLES = [
         (7, ()),
         (9, ()),
         (10, ()),
-        (11, (pytest.mark.validation,)),
-        (12, (pytest.mark.validation,)),
+        (11, (pytest.mark.slow,)),
+        (12, (pytest.mark.slow,)),
     )
 ]
 
@@ -150,6 +151,7 @@ def test_published_couples():
     assert couples[0] == pytest.approx((0.2673, 1.0056), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_vee_twenty():
     result = engines.solved("vee-twenty-open")
     assert result.certificate.kind is Proof.GLOBAL
@@ -194,6 +196,7 @@ def test_reports_say_where_a_bound_is_from(tmp_path):
     assert "cone solver" not in explained(none)
 
 
+@pytest.mark.slow
 def test_json_holds_ranking_and_trade():
     record = as_dict(engines.solved("inline-nine-uneven"))
     assert [star["rank"] for star in record["ranking"]] == list(range(1, len(record["ranking"]) + 1))

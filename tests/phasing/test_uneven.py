@@ -26,6 +26,7 @@ PROBLEMS = Path(__file__).parents[2] / "problems"
 SPLIT = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["inline-seven-uneven", "inline-nine-uneven", "two-stroke-eight-uneven"])
 def test_slightly_uneven_angles_cut_the_couple(name):
     """The marine trick: a few degrees take most of the couple."""
@@ -57,6 +58,7 @@ def test_zero_is_reached_cleanly():
     assert result.certificate.kkt_residual < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cylinders", [5, 7])
 def test_hardly_any_freedom_gives_the_even_optimum(tmp_path, cylinders):
     even = solve(engines.problem(tmp_path, cylinders, "four-stroke"))
@@ -141,6 +143,7 @@ def test_throws_between_bounds_of_their_own(tmp_path):
     assert result.objective.value <= result.objective.initial * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_bank_and_split_pins_move_within_bounds(tmp_path):
     engine = f'{SPLIT}throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n'
     allowed = 'intervals = { largest_deviation = "10 deg" }\nbest = 2'

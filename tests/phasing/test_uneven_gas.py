@@ -132,6 +132,7 @@ def test_neither_the_origin_of_the_angle_nor_the_numbering_matters(tmp_path):
     assert values[0] == pytest.approx(values[1], rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cycle", ["two-stroke", "four-stroke"])
 def test_one_open_throw_is_where_a_fine_grid_is_least(tmp_path, cycle):
     throws, order, low, high = {

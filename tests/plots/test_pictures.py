@@ -199,6 +199,7 @@ def test_long_lines_are_cut() -> None:
     assert fitted("x" * 500, 8.0, 9.0).endswith("…")
 
 
+@pytest.mark.slow
 def test_pictures_need_no_pyplot_and_change_no_settings(tmp_path: Path) -> None:
     path = written(tmp_path, scenes.GIVEN)
     code = (

@@ -48,6 +48,7 @@ def test_the_residual_is_not_small_away_from_an_optimum():
     assert not stopped.usable
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_mean_of_lengths_reaches_zero_cleanly(workers):
     x, softness = ca.SX.sym("x", 2), ca.SX.sym("e")

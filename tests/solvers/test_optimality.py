@@ -139,6 +139,7 @@ def test_a_wrong_answer_gets_a_wide_gap() -> None:
     assert kkt_residual(fine, worse, bad) > 1e-2
 
 
+@pytest.mark.slow
 def test_shadow_price_is_the_slope_of_the_optimum() -> None:
     """The price of a mass limit against finite differences of proven optima."""
 
@@ -158,6 +159,7 @@ def test_shadow_price_is_the_slope_of_the_optimum() -> None:
     assert prices[1] == pytest.approx((left - right) / (2 * step), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_price_of_a_bound_is_the_slope_of_the_optimum() -> None:
     """The price of a largest unbalance against finite differences."""
 
@@ -173,6 +175,7 @@ def test_price_of_a_bound_is_the_slope_of_the_optimum() -> None:
     assert price == pytest.approx((low - high) / (2 * step), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_limits_hold_between_the_samples_and_bind() -> None:
     """A peak limit is met by the exact model on a grid four times as fine, and costs something."""
     free = solve(four())

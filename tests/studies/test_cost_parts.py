@@ -86,6 +86,7 @@ def told(kind: str, data: xr.Dataset) -> str:
     return "\n".join(line for text in KINDS[kind].table(data) for line in markdown(text))
 
 
+@pytest.mark.slow
 def test_economics_by_its_command(tmp_path: Path) -> None:
     """Files, proofs, the worth of the shaft, and the engine with more cylinders rebuilt at equal power."""
     path, out = written(tmp_path, ECONOMICS, "study"), tmp_path / "out"
@@ -107,6 +108,7 @@ def test_economics_by_its_command(tmp_path: Path) -> None:
     assert told["parts"]["three"]["attrs"]["kind"] == "economics"
 
 
+@pytest.mark.slow
 def test_tolerances_keep_to_the_file(tmp_path: Path) -> None:
     data = part_of(tmp_path, TOLERANCE)
     assert data.attrs["engines"] == 200

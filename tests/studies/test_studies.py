@@ -263,6 +263,7 @@ def test_progress_says_how_long_is_left(monkeypatch: pytest.MonkeyPatch) -> None
     assert said == ["5000 of 10000 points", "5100 of 10000 points, about 8 min left", "10000 of 10000 points"]
 
 
+@pytest.mark.slow
 def test_cores_change_nothing(tmp_path: Path, small: Path, pool_at_once: None) -> None:
     path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(12)))
     one = computed(path, small, 1, tmp_path / "1" / NAME)
@@ -270,6 +271,7 @@ def test_cores_change_nothing(tmp_path: Path, small: Path, pool_at_once: None) -
     assert one.identical(two)
 
 
+@pytest.mark.slow
 def test_what_a_worker_refuses_is_one_line(tmp_path: Path, small: Path, pool_at_once: None) -> None:
     """In the middle of this sweep the cycle cannot be met; its ends were tried before."""
     values = '["9 kp/cm^2", "8 kp/cm^2", "400 kp/cm^2", "7 kp/cm^2", "6 kp/cm^2"]'
@@ -288,6 +290,7 @@ def whole(small: Path, tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     return computed(study(tmp_path_factory.mktemp("whole"), LONG), small)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
 def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals, whole: xr.Dataset) -> None:
     shutil.copy(small / "single.toml", tmp_path)
@@ -331,6 +334,7 @@ def test_two_stroke_shaft_is_the_closed_form(star: str, root: float, second: boo
     assert left > 0.5 if second else left < 0.06
 
 
+@pytest.mark.slow
 def test_every_figure_and_statement_is_on_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The whole study by its command: a picture and a dataset a figure, and the list of statements."""
     monkeypatch.chdir(tmp_path)
