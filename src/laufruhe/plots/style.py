@@ -52,7 +52,13 @@ class Page:
 
 
 def page(
-    rows: int, columns: int, panel: tuple[float, float], count: int | None = None, gap: float = GAP, lead: float = 0.0
+    rows: int,
+    columns: int,
+    panel: tuple[float, float],
+    count: int | None = None,
+    gap: float = GAP,
+    lead: float = 0.0,
+    across: float | None = None,
 ) -> Page:
     """Panels of one size [inch] with room for a heading above and a source line below.
 
@@ -60,12 +66,13 @@ def page(
     ----------
     count
         Panels wanted, where fewer than rows times columns.
-    gap
-        Between panels [inch].
+    gap, across
+        Between panels, and between columns of them where that is another [inch].
     lead
         Above each panel, for a heading of its own [inch].
     """
-    wide = max(LEFT + RIGHT + columns * panel[0] + (columns - 1) * gap, NARROWEST)
+    across = gap if across is None else across
+    wide = max(LEFT + RIGHT + columns * panel[0] + (columns - 1) * across, NARROWEST)
     high = TOP + BOTTOM + rows * (panel[1] + lead) + (rows - 1) * gap
     with mpl.rc_context(_SETTINGS):
         figure = Figure(figsize=(wide, high), dpi=DPI, facecolor="white")
@@ -73,7 +80,7 @@ def page(
         panels = []
         for k in range(rows * columns if count is None else count):
             row, column = divmod(k, columns)
-            left = LEFT + column * (panel[0] + gap)
+            left = LEFT + column * (panel[0] + across)
             bottom = BOTTOM + (rows - 1 - row) * (panel[1] + lead + gap)
             panels.append(figure.add_axes((left / wide, bottom / high, panel[0] / wide, panel[1] / high)))
     return Page(figure, tuple(panels))
