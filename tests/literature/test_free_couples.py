@@ -23,7 +23,7 @@ from laufruhe.machine.layouts import Layout, Mechanism, build, even_throws, inli
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import rotating_loads, shaking_loads
-from laufruhe.studies.free_forces import FreeLoad, free_load
+from laufruhe.studies.kinds.free_forces import FreeLoad, free_load
 
 TWO_ORDER = Fidelity(kinematics="two-order")
 HALF_DIGIT = 0.00005

@@ -15,10 +15,10 @@ from laufruhe.errors import InputError
 from laufruhe.plots.picture import draw
 from laufruhe.report.study_report import markdown
 from laufruhe.studies import run
-from laufruhe.studies.free_forces import printed_agree
 from laufruhe.studies.kinds import KINDS
+from laufruhe.studies.kinds.free_forces import printed_agree
 from laufruhe.studies.reader import load_study
-from laufruhe.studies.tolerance_study import verdicts
+from laufruhe.studies.tolerance import verdicts
 from laufruhe.studies.worth import worths
 from problem_files import written
 

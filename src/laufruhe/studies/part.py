@@ -60,3 +60,8 @@ class Part(Table):
     def about(self, **more: Any) -> dict[str, Any]:
         """Attributes of the dataset that every part has, and more."""
         return {"title": self.title, "kind": self.settings()["kind"], "source": self.source, **more}
+
+
+def variable(dims: str | tuple[str, ...], values: Any, words: str, unit: str = "1") -> tuple[Any, Any, dict[str, str]]:
+    """Values along dimensions with their unit and what they are, as xarray takes them."""
+    return dims, values, {"units": unit, "long_name": words}

@@ -1,27 +1,98 @@
-"""Free forces and couples by layout, beside what tables print."""
+"""Free forces and couples of the first two orders by layout, beside what tables print.
+
+Handbooks tabulate them for the choice of a crankshaft: forces over F_h of one cylinder, couples
+about the middle over F_h a. An order that turns with the crank is taken by crank weights; what
+turns against it needs a shaft (Hasselgruber 1964, eq. 33, Fig. 29).
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
+from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.file_models import Table
 from laufruhe.files.study_parts import CaseTable
+from laufruhe.machine import Engine
+from laufruhe.numerics.spectrum import order_amplitude
+from laufruhe.physics.metrics import turning_parts
+from laufruhe.physics.order_coefficients import piston_acceleration_orders
+from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.studies import picture as p
-from laufruhe.studies.free_forces import FreeLoad, Layout, compared, layout, printed_agree
-from laufruhe.studies.part import Part, Record
+from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Rows, Text
 
 if TYPE_CHECKING:
     import xarray as xr
 
-WHAT = ("force", "couple")
+ORDERS, WHAT = (1, 2), ("force", "couple")
+SPEED = 100.0
+"""Crank speed [rad/s] at which loads are taken; it drops out of the ratios."""
+_WORDS = {
+    "force": "free force over one cylinder's",
+    "couple": "free couple over one cylinder's force times the spacing",
+    "force_against": "free force that turns against the crank",
+    "couple_against": "free couple that turns against the crank",
+}
+
+
+@dataclass(frozen=True)
+class FreeLoad:
+    """What the pistons of an engine leave of one order, largest over a turn, over one cylinder's [1].
+
+    Attributes
+    ----------
+    force, couple
+        Couples over force times the spacing.
+    force_against, couple_against
+        The part that turns against the crank, which no crank weight takes.
+    """
+
+    force: float
+    couple: float
+    force_against: float
+    couple_against: float
+
+
+def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
+    """Free force and couple of the reciprocating masses in an order, about the middle of the engine.
+
+    Parameters
+    ----------
+    order
+        Of crank speed.
+    spacing
+        Unit of length of the couples [m].
+
+    Raises
+    ------
+    ModelError
+        If cylinders differ in mechanism: there is no one cylinder to compare with.
+    """
+    shapes = {(p.crank_radius, p.rod_length, p.offset, p.reciprocating_mass) for p in engine.slider_cranks}
+    if len(shapes) > 1:
+        raise ModelError(f"the cylinders of '{engine.name}' differ, so free forces have no unit; make them equal")
+    part = engine.slider_cranks[0]
+    amplitude = abs(piston_acceleration_orders(part.rod_ratio, part.offset_ratio, order)[order])
+    unit = part.reciprocating_mass * part.crank_radius * SPEED**2 * float(amplitude)
+    load = reciprocating_loads(engine, SPEED).at(order)
+    force, couple = load[1:3] / unit, load[4:6] / (unit * spacing)
+    (_, force_against), (_, couple_against) = turning_parts(*force), turning_parts(*couple)
+    return FreeLoad(float(order_amplitude(force)), float(order_amplitude(couple)), force_against, couple_against)
+
+
+def printed_agree(data: xr.Dataset) -> tuple[int, int]:
+    """How many printed values agree to half of their last digit, and of how many."""
+    half = 0.5 * 10.0 ** -int(data.attrs["digits"]) * (1.0 + 1e-9)
+    apart = np.array([abs(data[what].values - data[f"{what}_printed"].values) for what in WHAT])
+    return int((apart <= half).sum()), int(np.isfinite(apart).sum())
 
 
 class LiteratureTable(Table):
@@ -59,16 +130,32 @@ class FreeForces(Part):
         return points
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Free loads of one layout."""
+        """Free loads of one layout, and its shortest and longest firing interval [rad]."""
         with scenes.blamed(point):
-            return asdict(layout(scenes.problem(point).engine, self.spacing))
+            engine = scenes.problem(point).engine
+            loads = [asdict(free_load(engine, order, self.spacing)) for order in ORDERS]
+            intervals = engine.firing_intervals
+            return {"loads": loads, "intervals": [min(intervals), max(intervals)], "cylinders": len(engine.cylinders)}
 
-    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Layouts side by side."""
-        layouts = {point.case.name: _layout(record) for point, record in zip(points, records, strict=True)}
-        given = {case.name: case.literature.model_dump(exclude_none=True) for case in self.cases}
-        printed = {name: {key.replace("_", " "): value for key, value in of.items()} for name, of in given.items()}
-        return compared(layouts, printed).assign_attrs(self.about(digits=self.digits))
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
+        """Layouts side by side; NaN where the literature has nothing."""
+        import xarray as xr
+
+        along = ("case", "order")
+        table = {
+            name: variable(along, [[load[name] for load in record["loads"]] for record in records], words)
+            for name, words in _WORDS.items()
+        }
+        known = [case.literature.model_dump(exclude_none=True) for case in self.cases]
+        for what in WHAT:
+            values = [[own.get(f"{what}_{order}", math.nan) for order in ORDERS] for own in known]
+            table[f"{what}_printed"] = variable(along, values, f"free {what} in the literature")
+        for k, (name, which) in enumerate((("least", "shortest"), ("largest", "longest"))):
+            ends = np.degrees([record["intervals"][k] for record in records])
+            table[f"{name}_interval"] = variable("case", ends, f"{which} firing interval", "deg")
+        cylinders = ("case", [record["cylinders"] for record in records], {"units": "1"})
+        coords = {"case": [case.name for case in self.cases], "order": list(ORDERS), "cylinders": cylinders}
+        return xr.Dataset(table, coords, self.about(digits=self.digits))
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
@@ -104,11 +191,6 @@ class FreeForces(Part):
         words = "Pistons alone, over one cylinder's force, couples times the spacing."
         size = (1.75, 0.2 * count + 0.2)
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, 4, 0.3, room=1.1, legend=legend)
-
-
-def _layout(record: Mapping[str, Any]) -> Layout:
-    least, most = record["intervals"]
-    return Layout(tuple(FreeLoad(**load) for load in record["loads"]), (least, most), record["cylinders"])
 
 
 def _beside(row: xr.Dataset, what: str) -> str:

@@ -18,8 +18,7 @@ from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Rows, Text, number, said
-from laufruhe.studies.tolerance import CAUSES, Tolerances
-from laufruhe.studies.tolerance_study import Spread, compared, rise_of, spread, verdicts
+from laufruhe.studies.tolerance import CAUSES, Spread, Tolerances, compared, rise_of, spread, verdicts
 
 if TYPE_CHECKING:
     import xarray as xr
