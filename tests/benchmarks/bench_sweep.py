@@ -24,10 +24,10 @@ from scipy.optimize import NonlinearConstraint, differential_evolution, minimize
 
 from laufruhe import load  # noqa: E402
 from laufruhe.load_models.affine import AffineModel, AffineProblem  # noqa: E402
+from laufruhe.solvers import solve  # noqa: E402
 from laufruhe.solvers.conic import ConicProgram  # noqa: E402
 from laufruhe.studies import run  # noqa: E402
 from laufruhe.studies.reader import load_study  # noqa: E402
-from laufruhe.studies.speed_sweep import speed_sweep  # noqa: E402
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester-and-moment.toml"
 OUT = PAGES / "sweep.md"
@@ -120,8 +120,8 @@ def main() -> None:
     swept = []
 
     def sweep() -> list[float]:
-        swept[:] = speed_sweep(problem, speeds, SAMPLES)
-        return [point.force for point in swept]
+        swept[:] = [solve(replace(problem, points=(replace(rated, speed=s),)), many=True) for s in speeds]
+        return [result.objective.value for result in swept]
 
     def bare() -> list[float]:
         program = ConicProgram(squared[0], reusable=True)
@@ -135,7 +135,7 @@ def main() -> None:
     rows += [("sweep with proofs", proven, turns[0][1][1], POINTS)]
     rows += [("SciPy SLSQP, sampled objective", *timed(lambda: general(fine, False)), POINTS)]
     rows += [("differential evolution", *timed(lambda: general(fine[-EVOLVED:], True)), EVOLVED)]
-    bounds = np.array([point.lower_bound for point in swept])
+    bounds = np.array([result.certificate.lower_bound for result in swept])
     lines = [
         "# A sweep over speed, against general-purpose optimisers",
         "",

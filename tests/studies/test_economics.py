@@ -227,10 +227,10 @@ def test_unlike_objectives_and_unknown_shafts_are_refused() -> None:
     problem = load(FOUR)
     with pytest.raises(ModelError, match="no balancer shaft"):
         with_shafts(problem, ("third",))
-    peak = replace(problem.objective[0], quantity=Measure(channels.MOUNT_FORCE, NORMS["maximum"]))
+    peak = replace(problem.objective[0], measure=Measure(channels.MOUNT_FORCE, NORMS["maximum"]))
     other: Problem = replace(problem, objective=(peak,))
     with pytest.raises(ModelError, match="minimise different things"):
         compared([Build("a"), Build("b")], [front(problem, (1.0,)), front(other, (1.0,))])
-    mass = replace(problem.objective[0], quantity=Measure(channels.BALANCER_MASS, NORMS["mean"]))
+    mass = replace(problem.objective[0], measure=Measure(channels.BALANCER_MASS, NORMS["mean"]))
     with pytest.raises(ModelError, match="against a load"):
         front(replace(problem, objective=(mass,)), (1.0,))

@@ -176,7 +176,7 @@ def test_nothing_open_is_not_called_an_optimum(tmp_path: Path) -> None:
 
 def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
-    force = Limit("force", problem.objective[0].quantity, 1.0)
+    force = Limit("force", problem.objective[0].measure, 1.0)
     kept = solved(replace(problem, limits=(force,)))
     assert (kept.status, kept.proof) == ("infeasible", "none")
     assert kept.objective_given == pytest.approx(893.3, abs=0.1)

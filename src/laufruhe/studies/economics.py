@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -21,6 +22,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
+from laufruhe.studies.part import variable
 from laufruhe.studies.shafts import shafts_of
 
 MASS_ON_SHAFTS = Measure(channels.BALANCER_MASS, NORMS["mean"])
@@ -41,23 +43,14 @@ class Standing(StrEnum):
 
 @dataclass(frozen=True)
 class Claim:
-    """What a source says of a build.
+    """What a source says of a build: a judgement of `laufruhe.studies.worth`, or by what share the force falls.
 
-    Attributes
-    ----------
-    says
-        The judgement, by the names of `laufruhe.studies.worth`; empty where only a number is given.
-    falls_by
-        Share by which the force is said to fall; NaN where only a judgement is given.
-    against
-        Name of the build that it is compared with.
-    where
-        Figure or passage.
+    Either may be missing; the force is compared with that of the build named by `against`.
     """
 
     says: str = ""
     falls_by: float = float("nan")
-    against: str = "plain"
+    against: str = PLAIN
     where: str = ""
 
 
@@ -78,10 +71,8 @@ class FrontPoint:
     ----------
     mass_limit, mass
         Allowed and used on balancer shafts [kg]; infinite where nothing is asked of the mass.
-    force
-        Least objective at this limit, by the exact model [SI].
-    lower_bound
-        What no design within the limit falls below [SI].
+    force, lower_bound
+        Least objective at this limit, and what no design within it falls below [SI].
     price
         Fall of the least objective per kilogram more [SI / kg]; zero where the limit does
         not bind, and at no mass at all, where the solver's price has nothing to vary.
@@ -121,19 +112,7 @@ def best(problem: Problem, mass_limit: float = np.inf) -> FrontPoint:
 
 @dataclass(frozen=True)
 class Front:
-    """Least objective of one engine against the mass on its shafts.
-
-    Attributes
-    ----------
-    points
-        Under each limit, in the order asked for.
-    optimum
-        Whatever the shafts weigh.
-    shafts, cylinders
-        How many the engine has.
-    objective, unit
-        What is least, in words and SI.
-    """
+    """Least objective of one engine under each limit on the mass of its shafts, and whatever these weigh."""
 
     points: tuple[FrontPoint, ...]
     optimum: FrontPoint
@@ -182,46 +161,41 @@ def compared(builds: Sequence[Build], fronts: Sequence[Front]) -> xr.Dataset:
     asked = sorted({line.objective for line in fronts})
     if len(asked) > 1:
         raise ModelError(f"engines minimise different things ({'; '.join(asked)}); give all one objective")
-    unit = fronts[0].unit
-    limits = [point.mass_limit for point in fronts[0].points]
+    unit, claims = fronts[0].unit, [build.claim for build in builds]
 
-    def along(name: str, unit: str, words: str) -> tuple[tuple[str, str], list[list[float]], dict[str, str]]:
+    def along(name: str, words: str, unit: str = "1") -> Any:
         table = [[getattr(point, name) for point in line.points] for line in fronts]
-        return ("build", "mass_limit"), table, {"units": unit, "long_name": words}
+        return variable(("build", "mass_limit"), table, words, unit)
 
-    def each(name: str, unit: str, words: str) -> tuple[str, list[float], dict[str, str]]:
-        return "build", [getattr(line.optimum, name) for line in fronts], {"units": unit, "long_name": words}
+    def each(name: str, words: str, unit: str) -> Any:
+        return variable("build", [getattr(line.optimum, name) for line in fronts], words, unit)
 
+    limits = [point.mass_limit for point in fronts[0].points]
     data = xr.Dataset(
         {
-            "force": along("force", unit, "least objective"),
-            "lower_bound": along("lower_bound", unit, "what no design falls below"),
-            "mass": along("mass", "kg", "mass on the shafts"),
-            "gap": along("gap", "1", "relative gap of the proof"),
-            "price": along("price", f"{unit} / kg", "fall of the least objective per kilogram more"),
-            "optimum": each("force", unit, "least objective whatever the shafts weigh"),
-            "optimum_bound": each("lower_bound", unit, "what no design falls below, whatever the shafts weigh"),
-            "optimum_mass": each("mass", "kg", "mass on the shafts at the least objective"),
+            "force": along("force", "least objective", unit),
+            "lower_bound": along("lower_bound", "what no design falls below", unit),
+            "mass": along("mass", "mass on the shafts", "kg"),
+            "gap": along("gap", "relative gap of the proof"),
+            "price": along("price", "fall of the least objective per kilogram more", f"{unit} / kg"),
+            "optimum": each("force", "least objective whatever the shafts weigh", unit),
+            "optimum_bound": each("lower_bound", "what no design falls below, whatever the shafts weigh", unit),
+            "optimum_mass": each("mass", "mass on the shafts at the least objective", "kg"),
         },
-        coords=_coordinates(builds, fronts, limits),
-        attrs={"title": "Economics of balancing", "kind": "economics", "objective": asked[0]},
+        coords={
+            "build": [build.name for build in builds],
+            "mass_limit": variable("mass_limit", limits, "mass allowed on shafts", "kg"),
+            "shafts": variable("build", [line.shafts for line in fronts], "balancer shafts"),
+            "cylinders": ("build", [line.cylinders for line in fronts], {"units": "1"}),
+            "standing": ("build", [str(build.standing) for build in builds]),
+            "claim": ("build", [claim.says for claim in claims], {"long_name": "what the source says"}),
+            "claimed_fall": ("build", [claim.falls_by for claim in claims], {"units": "1"}),
+            "claimed_against": ("build", [claim.against for claim in claims]),
+            "claimed_where": ("build", [claim.where for claim in claims]),
+        },
+        attrs={"title": "", "kind": "", "objective": asked[0]},
     )
     return data.assign(efficient=_efficient(data))
-
-
-def _coordinates(builds: Sequence[Build], fronts: Sequence[Front], limits: Sequence[float]) -> dict[str, object]:
-    claims = [build.claim for build in builds]
-    return {
-        "build": [build.name for build in builds],
-        "mass_limit": ("mass_limit", list(limits), {"units": "kg", "long_name": "mass allowed on shafts"}),
-        "shafts": ("build", [line.shafts for line in fronts], {"units": "1", "long_name": "balancer shafts"}),
-        "cylinders": ("build", [line.cylinders for line in fronts], {"units": "1"}),
-        "standing": ("build", [str(build.standing) for build in builds]),
-        "claim": ("build", [claim.says for claim in claims], {"long_name": "what the source says"}),
-        "claimed_fall": ("build", [claim.falls_by for claim in claims], {"units": "1"}),
-        "claimed_against": ("build", [claim.against for claim in claims]),
-        "claimed_where": ("build", [claim.where for claim in claims]),
-    }
 
 
 def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str, str]]:

@@ -39,17 +39,10 @@ class Worth:
 
     Attributes
     ----------
-    build
-        Name.
-    fall
-        Share of the plain engine's force that it takes off.
-    further_fall
-        Share that it takes off the least force of any smaller number of shafts.
+    fall, further_fall
+        Share that it takes off the plain engine's force, and off the least of any smaller number of shafts.
     beside_next
-        Its force over that of the plain engine with one more cylinder at equal power; the
-        first where several are given.
-    worth
-        By W3.
+        Its force over that of the first plain engine with more cylinders at equal power.
     why
         The rule that decides, in words.
     """
@@ -90,38 +83,24 @@ def _worth(data: xr.Dataset, build: str) -> Worth:
 def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
     """What the source says of each build, confirmed or not, by the name of the build."""
     found: dict[str, tuple[Verdict, ...]] = {}
-    for name in data["build"].values:
+    for name in map(str, data["build"].values):
         row = data.sel(build=name)
-        says, falls = str(row["claim"].item()), float(row["claimed_fall"])
-        own: tuple[Verdict, ...] = (_judged(data, str(name), says),) if says else ()
-        own += () if np.isnan(falls) else (_fallen(data, str(name), falls),)
+        says, falls, against, where = (row[f"claim{end}"].item() for end in ("", "ed_fall", "ed_against", "ed_where"))
+        statement = f"{name}: beside {against}" + (f" ({where})" if where else "")
+        own: list[Verdict] = []
+        if says:
+            agrees, ours, why = _RULES[says](data, name, against)
+            own.append(Verdict(statement, says, ours, "% of the force", agrees, why))
+        if not np.isnan(falls):
+            ours, said = _fall(data, name, against), f"{-100.0 * falls:.0f} %"
+            agrees = abs(ours - falls) <= PRINTED_FALL
+            own.append(Verdict(statement, said, -100.0 * ours, "% of the force", agrees, _ALLOWED))
         if own:
-            found[str(name)] = own
+            found[name] = tuple(own)
     return found
 
 
-def _judged(data: xr.Dataset, build: str, says: str) -> Verdict:
-    against = str(data["claimed_against"].sel(build=build).item())
-    rule = _RULES[says]
-    agrees, ours, why = rule(data, build, against)
-    return Verdict(_statement(data, build, against), says, ours, "% of the force", agrees, why)
-
-
-def _fallen(data: xr.Dataset, build: str, falls: float) -> Verdict:
-    against = str(data["claimed_against"].sel(build=build).item())
-    ours = _fall(data, build, against)
-    points = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted rod ratio and gas trace move it by"
-    return Verdict(
-        _statement(data, build, against), f"{-100.0 * falls:.0f} %", -100.0 * ours, "% of the force",
-        abs(ours - falls) <= PRINTED_FALL, points,
-    )  # fmt: skip
-
-
-def _statement(data: xr.Dataset, build: str, against: str) -> str:
-    where = str(data["claimed_where"].sel(build=build).item())
-    return f"{build}: beside {against}" + (f" ({where})" if where else "")
-
-
+_ALLOWED = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted rod ratio and gas trace move it by"
 Rule = Callable[[xr.Dataset, str, str], tuple[bool, float, str]]
 
 
