@@ -36,7 +36,8 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.mixed_conic import solve_program
 from laufruhe.solvers.star_cuts import owners_of, search_designs, solve_design
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm, enumerate_stars, search_stars
+from laufruhe.solvers.star_search import (enumerate_stars, search_stars)
+from laufruhe.load_models.amplitudes import (AmplitudeObjective, AmplitudeTerm)
 
 OUT = PAGES / "crank-phasing.md"
 RANKED = (

@@ -17,7 +17,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.mount_convex import ConvexDuals, convex_program, dual_bound, is_convex, solve_convex_mounts
-from laufruhe.solvers.mounts import solve_mounts
+from laufruhe.solvers.mount_nonlinear import solve_mounts
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
 

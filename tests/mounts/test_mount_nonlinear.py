@@ -19,7 +19,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.mount_nonlinear import solve_joint
-from laufruhe.solvers.mounts import solve_mounts
+from laufruhe.solvers.mount_nonlinear import solve_mounts
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.unbalances import solve_unbalances
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, problem_of

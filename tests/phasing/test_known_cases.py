@@ -18,7 +18,8 @@ from laufruhe.report.json_result import as_dict
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm, search_stars
+from laufruhe.solvers.star_search import (search_stars)
+from laufruhe.load_models.amplitudes import (AmplitudeObjective, AmplitudeTerm)
 from phasing import engines
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

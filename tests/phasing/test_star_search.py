@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from laufruhe.machine.layouts import inline
 from laufruhe.physics.star_space import Partial, StarSpace, outside_in
 from laufruhe.solvers import star_search
-from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm, enumerate_stars, search_stars
+from laufruhe.solvers.star_search import (enumerate_stars, search_stars)
+from laufruhe.load_models.amplitudes import (AmplitudeObjective, AmplitudeTerm)
 
 NONE = (0.0,) * 4
 ORDERS = (1, 2, 3, 4)

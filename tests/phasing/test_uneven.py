@@ -10,7 +10,7 @@ import pytest
 from laufruhe.solvers.uneven_program import rides_of
 
 from laufruhe.files.reader import load
-from laufruhe.load_models.star_objective import amplitude_objective
+from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.uneven_model import Symbols, UnevenModel
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals

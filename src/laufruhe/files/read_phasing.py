@@ -25,17 +25,8 @@ from laufruhe.machine.firing import (
     star_throws,
 )
 from laufruhe.machine.layouts import LAYOUTS, Layout, even_throws
-from laufruhe.problem.phasing import (
-    SOONEST,
-    Candidate,
-    Intervals,
-    Method,
-    OrderCriterion,
-    Phasing,
-    ShaftChoice,
-    bounded_stars,
-)
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, Method, OrderCriterion, ShaftChoice, bounded_stars
+from laufruhe.problem.problem import Phasing, Problem
 
 Assemble = Callable[[ProblemFile], Problem]
 

@@ -21,8 +21,8 @@ from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Decision, Domain
-from laufruhe.problem.phasing import Candidate, Phasing
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Phasing, Problem
 
 Array = NDArray[np.float64]
 

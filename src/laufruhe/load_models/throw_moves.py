@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from laufruhe.machine.firing import firing_turns
 from laufruhe.machine.layouts import Layout
-from laufruhe.problem.phasing import Candidate, Intervals, Phasing
+from laufruhe.problem.phasing import Candidate, Intervals
+from laufruhe.problem.problem import Phasing
 
 Array = NDArray[np.float64]
 

@@ -31,8 +31,8 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.measure import Measure, counted_rotors, radius_of
-from laufruhe.problem.phasing import Candidate, Phasing
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Phasing, Problem
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.mount_result import mount_limits
+from laufruhe.solvers.conclusion import limit_values
 from laufruhe.solvers.ranking import PhasingResult
 from laufruhe.solvers.result import LimitValue, Result
 
@@ -48,22 +47,12 @@ def padded(values: Array, length: int) -> Array:
 
 def limits_of(result: Result) -> tuple[LimitValue, ...]:
     """Limits as solved, or how an evaluated design stands to those of its problem."""
-    return result.limits or _limits_at(result.problem, result.final)
+    return result.limits or limit_values(result.problem, result.final)
 
 
 def breaks_a_limit(problem: Problem, evaluation: Evaluation) -> bool:
     """Whether a design keeps not all limits of its problem."""
-    return not all(is_met(limit) for limit in _limits_at(problem, evaluation))
-
-
-def _limits_at(problem: Problem, evaluation: Evaluation) -> tuple[LimitValue, ...]:
-    return (*(_stated(limit, evaluation) for limit in problem.limits), *mount_limits(problem, evaluation))
-
-
-def _stated(limit: Limit, evaluation: Evaluation) -> LimitValue:
-    value = evaluation.value(limit.measure)
-    active = value >= limit.maximum * (1.0 - 1e-5)
-    return LimitValue(limit.name, value, limit.maximum, limit.measure.unit, active, 0.0)
+    return not all(is_met(limit) for limit in limit_values(problem, evaluation))
 
 
 def is_met(limit: LimitValue) -> bool:

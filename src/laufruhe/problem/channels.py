@@ -11,20 +11,48 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from laufruhe.machine import Role
+from laufruhe.machine import Engine, Role
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.problem.loads import PointLoads
 
-if TYPE_CHECKING:
-    from laufruhe.machine import Engine
-    from laufruhe.problem.evaluation import Evaluation
-    from laufruhe.problem.loads import PointLoads
-    from laufruhe.problem.measure import Measure
+
+class Asked(Protocol):
+    """How a measure narrows its channel."""
+
+    @property
+    def points(self) -> tuple[str, ...] | None:
+        """Operating points that count."""
+
+    @property
+    def orders(self) -> tuple[float, ...] | None:
+        """Orders that count."""
+
+    @property
+    def motions(self) -> tuple[str, ...] | None:
+        """Motions that are to have a mode of their own."""
+
+    @property
+    def frequency(self) -> float:
+        """Wanted about the torque-roll axis [Hz]."""
+
+
+class Answered(Protocol):
+    """A design and its loads."""
+
+    @property
+    def engine(self) -> Engine:
+        """The design."""
+
+    @property
+    def loads(self) -> tuple[PointLoads, ...]:
+        """Per operating point."""
+
 
 ON_BLOCK = ("operating_points", "orders")
 ON_PLACES = (*ON_BLOCK, "mounts", "direction_weights")
@@ -106,7 +134,7 @@ class MountChannel(Channel):
     """
 
     needs: Needs = Needs.ELASTIC
-    values: Callable[[Measure, Evaluation], Sequence[float]] = field(kw_only=True)
+    values: Callable[[Asked, Answered], Sequence[float]] = field(kw_only=True)
 
 
 def _on_block(name: str, unit: str, part: slice, feels_gas: bool) -> LoadChannel:
@@ -133,17 +161,17 @@ def mounting_in(engine: Engine) -> ElasticMounting:
     return elastic_mounting(engine.block, engine.mounts)
 
 
-def _of_mounting(number: Callable[[ElasticMounting, Measure], float | Sequence[float]]) -> Callable[
-    [Measure, Evaluation], Sequence[float]
+def _of_mounting(number: Callable[[ElasticMounting, Asked], float | Sequence[float]]) -> Callable[
+    [Asked, Answered], Sequence[float]
 ]:  # fmt: skip
-    def values(measure: Measure, evaluation: Evaluation) -> Sequence[float]:
+    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
         found = number(mounting_in(evaluation.engine), measure)
         return (found,) if isinstance(found, float) else found
 
     return values
 
 
-def _transmissibility(measure: Measure, evaluation: Evaluation) -> Sequence[float]:
+def _transmissibility(measure: Asked, evaluation: Answered) -> Sequence[float]:
     firm = rigid_mounting(evaluation.engine.mounts)
     ratios = [
         mount_numbers.transmitted(loads.mount_forces, firm.forces(loads.wrench), measure.orders)
@@ -153,7 +181,7 @@ def _transmissibility(measure: Measure, evaluation: Evaluation) -> Sequence[floa
     return (max(ratios, default=0.0),)
 
 
-def motion_indices(measure: Measure) -> tuple[int, ...]:
+def motion_indices(measure: Asked) -> tuple[int, ...]:
     """Of the motions that are to have a mode of their own."""
     return tuple(MOTIONS.index(name) for name in measure.motions or MOTIONS)
 

@@ -7,16 +7,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import Any, Generic, TypeVar
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_orders, star_throws
 from laufruhe.machine.layouts import Layout, even_throws
 
-if TYPE_CHECKING:
-    from laufruhe.problem.problem import Problem
-
+P = TypeVar("P")
 
 SOONEST = 1e-8
 """What fires sooner after another fires with it [rad]."""
@@ -119,7 +117,7 @@ class ShaftChoice:
 
 
 @dataclass(frozen=True, eq=False)
-class Phasing:
+class PhasingOf(Generic[P]):
     """The open part of an engine's phasing.
 
     Attributes
@@ -165,7 +163,7 @@ class Phasing:
     bank: tuple[float, float] | None
     split: tuple[float, float] | None
     intervals: Intervals
-    realise: Callable[[Candidate], Problem]
+    realise: Callable[[Candidate], P]
     steps: int | None = None
     shafts: ShaftChoice = ShaftChoice()
     best: int = 10
@@ -245,7 +243,7 @@ def _multiples(step: float, bounds: tuple[float, float], other: float) -> list[f
     return [m * step - other for m in range(low, high + 1)]
 
 
-def bounded_stars(phasing: Phasing, layout: Layout) -> list[tuple[float, ...]]:
+def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, ...]]:
     """Throws within their own bounds [rad]: the middle, then the even stars that need to move least to lie there.
 
     Of many cylinders without a firing order the middle alone: they have too many even stars.

@@ -5,13 +5,13 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.decision import Decision, Numbers, Value, moved_numbers
 from laufruhe.problem.measure import Limit, Measure, Term
-from laufruhe.problem.phasing import Phasing
+from laufruhe.problem.phasing import PhasingOf
 
 
 @dataclass(frozen=True)
@@ -194,3 +194,7 @@ class Problem:
             [list(row) for row in self.mount_numbers] if on_mounts else [],
         )
         return moved_numbers(given, moved, values)
+
+
+Phasing: TypeAlias = PhasingOf[Problem]
+"""Of a problem; `realise` gives problems."""

@@ -38,6 +38,36 @@ class Proof(StrEnum):
     NONE = "none"
 
 
+class Reach(StrEnum):
+    """What the bound of a method can prove."""
+
+    WHOLE = "closes on the optimum, however long that takes"
+    NEAR = "closes where it comes near"
+    ASIDE = "holds, and is not made to meet the design"
+
+
+NEAR = 0.05
+"""Gap at which a bound that need not close is called a proof within its gap."""
+
+
+def certified(
+    value: float, bound: float, given: float, tolerance: float, reach: Reach, kkt_residual: float, method: str
+) -> Certificate:
+    """The certificate of a value by a bound, for the design as given has `given`.
+
+    Gaps are counted here and nowhere else.
+    """
+    value, bound = float(value), float(min(max(bound, 0.0), value))
+    gap = (value - bound) / gap_unit(value, given)
+    if gap <= tolerance:
+        kind = Proof.GLOBAL
+    elif reach is Reach.WHOLE or (reach is Reach.NEAR and gap <= NEAR):
+        kind = Proof.WITHIN_GAP
+    else:
+        kind = Proof.LOCAL
+    return Certificate(kind, bound, gap, kkt_residual, method)
+
+
 @dataclass(frozen=True)
 class Certificate:
     """How good a design is.

@@ -31,6 +31,7 @@ from laufruhe.problem.decision import POSITION, STIFFNESS, TURNED, Domain
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.quadratics import Quadratic, best_prices, covering
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -41,31 +42,6 @@ ROUNDS = 2
 # share of a square that is spent on the arms of mounts whose places are open
 STRETCH = 0.2
 ASIDE = 5e-2
-
-
-@dataclass(frozen=True, eq=False)
-class Quadratic:
-    """v' H v + 2 b' v + c."""
-
-    matrix: Array
-    vector: Array
-    constant: float
-
-    def plus(self, other: Quadratic, factor: float) -> Quadratic:
-        """The sum with a multiple of another."""
-        return Quadratic(
-            self.matrix + factor * other.matrix,
-            self.vector + factor * other.vector,
-            self.constant + factor * other.constant,
-        )
-
-    @property
-    def least(self) -> float:
-        """Over all v; minus infinity where it is not strictly convex."""
-        values, vectors = np.linalg.eigh(0.5 * (self.matrix + self.matrix.T))
-        if values[0] <= 1e-12 * abs(values[-1]):
-            return -math.inf
-        return self.constant - float(np.sum((vectors.T @ self.vector) ** 2 / values))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +67,6 @@ class Softest:
         """P of E32: for squares of forces their sum, for the forces themselves a matrix that covers each."""
         if not norm.sums_lengths:
             return np.asarray(self.squares.sum(axis=0))
-        from laufruhe.solvers.mount_cones import covering
-
         # tight along the load, for what is transmitted points mostly the same way
         felt = np.real(np.outer(loads[0], loads[0].conj()))
         size = float(np.trace(felt))
@@ -241,8 +215,6 @@ def least_transmitted(
 
 def _least(objective: Quadratic, held: Sequence[Quadratic], scales: Array) -> float:
     """A lower bound of a function under others that may not exceed zero; none of them takes it under zero (E33)."""
-    from laufruhe.solvers.mount_cones import best_prices
-
     if not len(scales):
         return objective.constant
     total, unit = _scaled(objective, scales)

@@ -17,13 +17,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
 from laufruhe.machine.firing import firing_lattice
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.phasing import Intervals, Phasing
-from laufruhe.problem.problem import Problem
-from laufruhe.solvers.star_search import AmplitudeObjective, directions
+from laufruhe.problem.phasing import Intervals
+from laufruhe.problem.problem import Phasing, Problem
 
 Array = NDArray[np.float64]
 

@@ -18,9 +18,8 @@ from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
-from laufruhe.solvers.mount_result import objective_of
 from laufruhe.solvers.ranking import RankedStar
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.result import Result, objective_of
 
 Record = dict[str, Any]
 

@@ -1,25 +1,120 @@
-"""One solver per file; what they return is evaluated again by the exact model."""
+"""Methods propose designs, the exact model judges them, bounds prove them: which method decides what."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
 from functools import partial
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.accuracy import error_of, solve_within
+from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.accuracy import solve_within
+from laufruhe.solvers.conclusion import state
 from laufruhe.solvers.direct_cones import solve_direct
-from laufruhe.solvers.mount_result import objective_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
 
-__all__ = ["Result", "Status", "solve", "state"]
+__all__ = ["METHODS", "Result", "Status", "solve", "state"]
+
+Say = Callable[[str], None]
 
 
-def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many: bool = False) -> Result:
+class Kind(Enum):
+    """Kinds of what may be open, by what a method has to know of them."""
+
+    UNBALANCE = auto()
+    STIFFNESS = auto()
+    MOUNT = auto()
+    STAR = auto()
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way of deciding.
+
+    Attributes
+    ----------
+    name
+        In words.
+    decides
+        Kinds that it can have open together.
+    suits
+        Whether what is asked suits it.
+    reach
+        What its bounds can prove.
+    solve
+        The design, proven as far as it is.
+    """
+
+    name: str
+    decides: frozenset[Kind]
+    suits: Callable[[Problem], bool]
+    reach: Reach
+    solve: Callable[[Problem, Say], Result]
+
+
+def kinds_of(problem: Problem) -> frozenset[Kind]:
+    """Kinds of what is open."""
+    found = {Kind.STAR} if problem.phasing is not None else set()
+    for decision in problem.decisions:
+        found.add(
+            Kind.UNBALANCE if decision.is_affine else Kind.STIFFNESS if decision.is_stiffness else Kind.MOUNT
+        )  # fmt: skip
+    return frozenset(found)
+
+
+def _convex_mounts(problem: Problem, _: Say) -> Result:
+    from laufruhe.solvers.mount_convex import solve_convex_mounts
+
+    return solve_convex_mounts(problem)
+
+
+def _is_convex(problem: Problem) -> bool:
+    from laufruhe.solvers.mount_convex import is_convex
+
+    return is_convex(problem)
+
+
+def _smooth(problem: Problem, _: Say) -> Result:
+    from laufruhe.solvers.mount_nonlinear import solve_joint
+
+    return solve_joint(problem)
+
+
+def _stars(problem: Problem, _: Say) -> Result:
+    from laufruhe.solvers.phasing import solve_phasing
+
+    return solve_within(problem, solve_phasing)
+
+
+def _stars_on_mounts(problem: Problem, say: Say) -> Result:
+    from laufruhe.solvers.mount_stars import solve_star_mounts
+
+    return solve_star_mounts(problem, say)
+
+
+def _on_firm_loads(problem: Problem) -> bool:
+    return not problem.asks_mounts
+
+
+_U, _K, _M, _S = Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR
+METHODS: tuple[Method, ...] = (
+    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, lambda problem, _: state(problem)),
+    Method("second-order cones", frozenset({_U}), _on_firm_loads, Reach.WHOLE,
+           lambda problem, _: solve_within(problem, solve_unbalances)),
+    Method("stars, each with cones", frozenset({_S, _U}), _on_firm_loads, Reach.WHOLE, _stars),
+    Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
+    Method("smooth program, boxes of stiffness", frozenset({_K}), lambda _: True, Reach.NEAR, _smooth),
+    Method("smooth program", frozenset({_U, _K, _M}), lambda _: True, Reach.ASIDE, _smooth),
+    Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), lambda _: True, Reach.ASIDE,
+           _stars_on_mounts),
+)  # fmt: skip
+"""Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
+
+
+def solve(problem: Problem, say: Say = lambda _: None, *, many: bool = False) -> Result:
     """Decide what a problem leaves open.
 
     Parameters
@@ -37,48 +132,14 @@ def solve(problem: Problem, say: Callable[[str], None] = lambda _: None, *, many
     SolverError
         If a solver stops without an answer.
     ModelError
-        If the engine as given cannot be evaluated.
+        If the engine as given cannot be evaluated, or nothing decides what is open.
     """
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
-    if problem.phasing is not None and problem.asks_mounts:
-        from laufruhe.solvers.mount_stars import solve_star_mounts
-
-        return solve_star_mounts(problem, say)
-    if problem.phasing is None and not problem.decisions:
-        return state(problem)
-    if problem.asks_mounts:
-        from laufruhe.solvers.mounts import solve_mounts
-
-        return solve_mounts(problem)
-    if problem.phasing is not None:
-        from laufruhe.solvers.phasing import solve_phasing
-
-        return solve_within(problem, solve_phasing)
-    if problem.decisions and not problem.objective:
+    kinds = kinds_of(problem)
+    if problem.decisions and not problem.objective and Kind.STAR not in kinds:
         raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
-    return solve_within(problem, partial(solve_unbalances, cones=solve_direct if many else None))
-
-
-def state(problem: Problem, to_start_from: bool = False) -> Result:
-    """The design as given, evaluated and not changed.
-
-    Parameters
-    ----------
-    to_start_from
-        Whether it is only where a search starts, so that it may stand on a resonance.
-    """
-    started = time.perf_counter()
-    evaluation = evaluate_start(problem) if to_start_from else evaluate(problem)
-    return Result(
-        problem=problem,
-        status=Status.FEASIBLE,
-        objective=objective_of(problem, evaluation, evaluation),
-        certificate=None,
-        decisions=(),
-        limits=(),
-        initial=evaluation,
-        final=evaluation,
-        error_estimate=0.0 if evaluation.resonance else error_of(problem, evaluation),
-        timing={"evaluate": time.perf_counter() - started},
-    )
+    method = next(m for m in METHODS if kinds <= m.decides and m.suits(problem))
+    if many and method.decides == {Kind.UNBALANCE}:
+        return solve_within(problem, partial(solve_unbalances, cones=solve_direct))
+    return method.solve(problem, say)

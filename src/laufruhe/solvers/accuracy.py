@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import error_bound, reference
-from laufruhe.problem.evaluation import Evaluation, objective_value
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
 
@@ -19,7 +19,7 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
 
     A fidelity chosen by hand is taken as wanted, so that only its samples are judged.
     """
-    if not problem.objective:
+    if not problem.load_terms:
         return 0.0
     if problem.fidelity.tolerance is None:
         return sampling_error(problem, evaluation)
@@ -29,13 +29,11 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
 def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
     """Relative change of the objective when every second angle is left out."""
     samples = evaluation.samples
-    whole = objective_value(problem, evaluation)
+    terms = problem.load_terms
+    whole = sum(term.weight * evaluation.value(term.measure) for term in terms)
     if samples % 2 or not whole:
         return 0.0
-    half = sum(
-        term.weight * evaluation.rows(term.measure, samples // 2).value
-        for term in problem.objective
-    )  # fmt: skip
+    half = sum(term.weight * evaluation.rows(term.measure, samples // 2).value for term in terms)
     return abs(half - whole) / whole
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from typing import Any
 
 import cvxpy as cp
@@ -11,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
-from laufruhe.prove.transmitted_bound import Quadratic
-from laufruhe.solvers.mount_convex import (
+from laufruhe.prove.convex_functions import (
     Compliance,
     ConvexDuals,
     ConvexFunction,
@@ -24,8 +22,6 @@ from laufruhe.solvers.mount_convex import (
 
 Array = NDArray[np.float64]
 
-# least curvature that is left to a sum of quadratic functions of size one
-CONVEX_BY = 1e-9
 _TIGHT = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
 
 
@@ -117,45 +113,3 @@ def _vector(cone: Any) -> Array | None:
         return None
     top, rows = (np.asarray(part, dtype=float).reshape(-1) for part in cone.dual_value)
     return -rows / max(float(top[0]), 1e-300)
-
-
-def covering(matrices: Sequence[Array], felt: Array) -> Array:
-    """A matrix not under any of these, with about the least trace of its product with `felt`, shape (n, n) (E32)."""
-    unit = max(float(np.trace(matrix)) for matrix in matrices)
-    size = len(matrices[0])
-    cover = cp.Variable((size, size), symmetric=True)
-    least = cp.Problem(cp.Minimize(cp.trace(felt @ cover)), [cover - matrix / unit >> 0 for matrix in matrices])
-    found = _quietly(least, cover)
-    found = np.zeros((size, size)) if found is None else unit * found
-    # whatever the solver returned, lifted until it covers
-    lacking = max(float(np.linalg.eigvalsh(matrix - found)[-1]) for matrix in matrices)
-    return np.asarray(found + (max(lacking, 0.0) + 1e-9 * unit) * np.eye(size))
-
-
-def best_prices(objective: Quadratic, held: Sequence[Quadratic]) -> Array:
-    """Multipliers with which the limits bound the objective best from below (E33); zeros where none do."""
-    if not held:
-        return np.zeros(0)
-    size = len(objective.vector)
-    prices, level = cp.Variable(len(held), nonneg=True), cp.Variable()
-
-    def summed(part: str) -> Any:
-        return getattr(objective, part) + sum(p * getattr(each, part) for p, each in zip(prices, held, strict=True))
-
-    column = cp.reshape(summed("vector"), (size, 1), order="C")
-    corner = cp.reshape(summed("constant") - level, (1, 1), order="C")
-    matrix = cp.bmat([[summed("matrix") - CONVEX_BY * np.eye(size), column], [column.T, corner]])
-    found = _quietly(cp.Problem(cp.Maximize(level), [matrix >> 0]), prices)
-    return np.zeros(len(held)) if found is None else found
-
-
-def _quietly(problem: Any, wanted: Any) -> Array | None:
-    """The value of a variable at the optimum; None where the solver found none."""
-    with warnings.catch_warnings():
-        # judged by what follows from it, not by a warning
-        warnings.simplefilter("ignore")
-        try:
-            problem.solve(solver=cp.CLARABEL, **_TIGHT)
-        except cp.error.SolverError:
-            return None
-    return None if wanted.value is None else np.asarray(wanted.value, dtype=float)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,36 +12,27 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.problem import channels
-from laufruhe.problem.decision import domains_of
-from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.decision import Value, domains_of
+from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Certificate, Proof, gap_unit
+from laufruhe.prove.certificate import Reach, gap_unit
 from laufruhe.prove.subdivision import Divided, divided_bound, divides
 from laufruhe.prove.transmitted_bound import transmitted_bound
-from laufruhe.solvers.accuracy import sampling_error
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Design, Shown, concluded, judged, none_within
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
-from laufruhe.solvers.mount_result import (
-    FEASIBLE,
-    infeasible_mounts,
-    mount_decisions,
-    mount_limits,
-    objective_of,
-)
 from laufruhe.solvers.mount_starts import columns_of, start_points, unbalances_of
 from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear
-from laufruhe.solvers.result import DecisionValue, LimitValue, Result, Status
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth_program import SmoothProgram
-from laufruhe.solvers.unbalances import decision_values, solve_unbalances
+from laufruhe.solvers.unbalances import solve_unbalances
 
 Array = NDArray[np.float64]
 
 SLACK = 1e-5
 WORTH_SAYING = 1.01
-# a bound from boxes that is nearer than this is called a proof within its gap
-SMALL_GAP = 0.05
 MOST_MARGINS = 3
 ITERATIONS = 150
 MOST_AROUND = 3
@@ -50,16 +41,9 @@ SPREAD = 0.4
 NUDGE = 0.02
 
 
-@dataclass(frozen=True, eq=False)
-class _Design:
-    """Decisions and what the exact model says of them; the problem has its throws where they were moved to."""
-
-    problem: Problem
-    mounts: list[float]
-    unbalances: list[complex]
-    evaluation: Evaluation
-    value: float
-    excess: float
+def solve_mounts(problem: Problem, workers: int | None = None) -> Result:
+    """Convex where all that is asked is, else from many starts in `workers` processes."""
+    return solve_convex_mounts(problem) if is_convex(problem) else solve_joint(problem, workers)
 
 
 def solve_joint(problem: Problem, workers: int | None = None) -> Result:
@@ -156,20 +140,22 @@ def _nudged(joint: SmoothProgram, generator: np.random.Generator, k: int) -> Arr
     return np.clip(nudge, joint.moves.lower, joint.moves.upper)
 
 
-def _judged(problem: Problem, mounts: list[float], unbalances: list[complex]) -> _Design | None:
+def _judged(problem: Problem, mounts: list[float], unbalances: list[complex]) -> Design | None:
+    found = iter(mounts), iter(unbalances)
+    values: list[Value] = [next(found[1]) if decision.is_affine else next(found[0]) for decision in problem.decisions]
     try:
-        evaluation = evaluate(
-            problem, problem.design([*unbalances, *mounts], [*problem.unbalances, *problem.mount_decisions])
-        )
+        return judged(problem, values)
     except ModelError:
         # a resonance without damping is no design
         return None
-    return _Design(
-        problem, mounts, unbalances, evaluation, objective_value(problem, evaluation), evaluation.excess(problem.limits)
-    )
 
 
-def _first_allowed(joint: SmoothProgram, optima: Sequence[LocalOptimum]) -> tuple[LocalOptimum | None, _Design | None]:
+def _mounts(design: Design) -> list[float]:
+    pairs = zip(design.problem.decisions, design.values, strict=True)
+    return [value.real for decision, value in pairs if not decision.is_affine]
+
+
+def _first_allowed(joint: SmoothProgram, optima: Sequence[LocalOptimum]) -> tuple[LocalOptimum | None, Design | None]:
     """The best optimum by the exact model: within limits first, then by value."""
     found = []
     for optimum in optima:
@@ -183,8 +169,8 @@ def _first_allowed(joint: SmoothProgram, optima: Sequence[LocalOptimum]) -> tupl
 
 
 def _tightened(
-    problem: Problem, moves: ThrowMoves | None, best: LocalOptimum | None, design: _Design
-) -> tuple[LocalOptimum | None, _Design | None]:
+    problem: Problem, moves: ThrowMoves | None, best: LocalOptimum | None, design: Design
+) -> tuple[LocalOptimum | None, Design | None]:
     """Again with limits a little tighter: a peak between the samples breaks its limit by a little."""
     margin = 0.0
     for _ in range(MOST_MARGINS):
@@ -200,7 +186,7 @@ def _tightened(
     return best, design
 
 
-def _rebalanced(design: _Design) -> tuple[_Design, float] | None:
+def _rebalanced(design: Design) -> tuple[Design, float] | None:
     """Unbalances decided anew on the mounts found, with proof; None where that is not convex."""
     problem = design.problem
     if not problem.unbalances or not problem.load_terms or problem.mount_terms:
@@ -208,13 +194,13 @@ def _rebalanced(design: _Design) -> tuple[_Design, float] | None:
     if any(limit.measure.unit == "" for limit in problem.mount_limits):
         # transmissibility depends on what excites
         return None
-    held = problem.design(design.mounts, problem.mount_decisions)
+    held = problem.design(_mounts(design), problem.mount_decisions)
     result = solve_unbalances(replace(problem, engine=held).balance)
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return None
     values = unbalances_of(problem, result)
-    judged = _judged(problem, design.mounts, values)
-    return None if judged is None or judged.excess > 10.0 * FEASIBLE else (judged, result.certificate.gap)
+    again = _judged(problem, _mounts(design), values)
+    return None if again is None or again.excess > KEPT else (again, result.certificate.gap)
 
 
 def _convex_part(problem: Problem) -> Problem | None:
@@ -243,61 +229,32 @@ def _bound(problem: Problem) -> float:
     return certificate.lower_bound if certificate is not None else 0.0
 
 
-def _unbalance_values(problem: Problem, values: Sequence[complex]) -> tuple[DecisionValue, ...]:
-    domains = domains_of(problem.unbalances)
-    x = columns_of(domains, values)
-    return tuple(entry for domain in domains for entry in decision_values(domain, x, np.zeros_like(x)))
-
-
 def _result(
     problem: Problem,
     joint: SmoothProgram,
     initial: Evaluation,
-    design: _Design,
+    design: Design,
     best: LocalOptimum,
     optima: Sequence[LocalOptimum],
-    proven: tuple[_Design, float] | None,
+    proven: tuple[Design, float] | None,
     timing: dict[str, float],
 ) -> Result:
-    objective = objective_of(problem, initial, design.evaluation)
-    scale = gap_unit(design.value, objective.initial) if objective else 1.0
+    scale = gap_unit(design.value, objective_value(problem, initial))
     # throws that move are not in the bound
-    met = design.excess <= 10.0 * FEASIBLE
     divided = Divided(_bound(problem) if joint.moves is None else 0.0, 0)
-    if joint.moves is None and met and divides(problem):
+    if joint.moves is None and design.excess <= KEPT and divides(problem):
         divided = divided_bound(problem, design.value, problem.tolerance * scale, divided.bound)
-    gap = max(design.value - divided.bound, 0.0) / scale
-    certificate = Certificate(
-        _proof(gap, problem.tolerance, divided), divided.bound, gap, best.kkt_residual,
-        _method(optima, scale, proven, divided),
-    )  # fmt: skip
-    prices = [joint.price(limit.name, best.multipliers) for limit in problem.mount_limits]
-    limits = (*_load_limits(problem, design, joint, best), *mount_limits(problem, design.evaluation, prices))
-    status = Status.FAILED if not met else Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
-    return Result(
-        problem=design.problem,
-        status=status,
-        objective=objective,
-        certificate=certificate,
-        decisions=(*mount_decisions(problem, design.mounts), *_unbalance_values(problem, design.unbalances)),
-        limits=limits,
-        initial=initial,
-        final=design.evaluation,
-        message="" if met else f"the best design found breaks {_broken_among(limits)}; relax it, or open more",
-        error_estimate=sampling_error(problem, design.evaluation),
-        timing=timing,
+    shown = Shown(
+        bound=divided.bound,
+        reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
+        kkt_residual=best.kkt_residual,
+        method=_method(optima, scale, proven, divided),
+        prices=[joint.price(limit.name, best.multipliers) for limit in problem.limits],
     )
+    return concluded(design, initial, shown, timing)
 
 
-def _proof(gap: float, tolerance: float, divided: Divided) -> Proof:
-    if gap <= tolerance:
-        return Proof.GLOBAL
-    return Proof.WITHIN_GAP if divided.boxes and gap <= SMALL_GAP else Proof.LOCAL
-
-
-def _method(
-    optima: Sequence[LocalOptimum], scale: float, proven: tuple[_Design, float] | None, divided: Divided
-) -> str:
+def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, float] | None, divided: Divided) -> str:
     usable = [o for o in optima if o.usable]
     apart = distinct(optima, scale)
     text = f"IPOPT from {len(optima)} start{'s' if len(optima) > 1 else ''}, {len(usable)} of which ended at "
@@ -311,27 +268,6 @@ def _method(
     return text
 
 
-def _broken_among(limits: Sequence[LimitValue]) -> str:
-    """Names of the limits that a design breaks."""
-    names = []
-    for limit in limits:
-        sign = 1.0 if limit.side == "at most" else -1.0
-        if sign * (limit.value - limit.limit) > 10.0 * FEASIBLE * abs(limit.limit):
-            names.append(f"'{limit.name}'")
-    return " and ".join(names) or "a limit"
-
-
-def _load_limits(problem: Problem, design: _Design, joint: SmoothProgram, best: LocalOptimum) -> tuple[LimitValue, ...]:
-    """How the design stands to limits on loads and masses."""
-    out = []
-    for limit in problem.load_limits:
-        value = design.evaluation.value(limit.measure)
-        active = value >= limit.maximum * (1.0 - 1e-4)
-        price = joint.price(limit.name, best.multipliers) if active else 0.0
-        out.append(LimitValue(limit.name, value, limit.maximum, limit.measure.unit, active, price))
-    return tuple(out)
-
-
 def _none(
     problem: Problem,
     joint: SmoothProgram,
@@ -341,7 +277,7 @@ def _none(
 ) -> Result:
     """No start ended at a design within the limits: not a proof, unless the convex limits alone contradict."""
     conflict = _proven_conflict(problem)
-    result = infeasible_mounts(problem, initial, conflict, timing)
+    result = none_within(problem, initial, conflict, timing)
     if conflict:
         return result
     nearest = min(optima, key=lambda o: o.violation)

@@ -22,14 +22,14 @@ from laufruhe.numerics.norms import RMS
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
-from laufruhe.problem.phasing import Candidate, Method, Phasing
-from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import FLOOR, Certificate, Proof
-from laufruhe.solvers.mount_nonlinear import solve_moved
-from laufruhe.solvers.mounts import solve_mounts
-from laufruhe.solvers.phasing_result import names_of, no_result, phase_decisions
+from laufruhe.problem.phasing import Candidate, Method
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import FLOOR, Certificate, Proof, Reach, certified
+from laufruhe.solvers.conclusion import no_star, with_star
+from laufruhe.solvers.mount_nonlinear import solve_mounts, solve_moved
+from laufruhe.solvers.phasing_result import names_of
 from laufruhe.solvers.ranking import PhasingResult, RankedStar, ranked_orders, ranked_star
-from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.star_answers import MOST_LISTED
 from laufruhe.solvers.star_cuts import search_designs
 from laufruhe.solvers.star_families import Family, families_of
@@ -211,13 +211,11 @@ def _moved(problem: Problem, phasing: Phasing, found: list[_Found], say: Callabl
 def _result(problem: Problem, phasing: Phasing, found: list[_Found], designs: int) -> Result:
     given = evaluate(problem)
     if not found:
-        return no_result(problem, "no star and firing order keeps the firing intervals allowed")
+        return no_star(problem, "no star and firing order keeps the firing intervals allowed")
     best = found[0]
     if best.key[0]:
         return _none(problem, found, given, designs)
     whole = len(found) == designs and not phasing.continuous
-    result, objective = best.result, best.result.objective
-    initial = objective_value(problem, given)
     details = PhasingResult(
         tuple(_entry(phasing, each, whole and each is best) for each in found if not each.key[0]),
         phasing.layout(*best.star.geometry).throw_positions,
@@ -226,32 +224,22 @@ def _result(problem: Problem, phasing: Phasing, found: list[_Found], designs: in
         len(found),
         _method(found, designs),
     )
-    certificate = _certificate(found, whole, details.method)
-    proven = certificate is not None and certificate.kind is Proof.GLOBAL
-    return replace(
-        result,
-        problem=replace(result.problem, phasing=phasing),
-        status=Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=None if objective is None else ObjectiveValue.of(problem, objective.value, initial),
-        certificate=certificate,
-        decisions=(*phase_decisions(problem, phasing, best.candidate, _built(phasing, best)), *result.decisions),
-        initial=replace(given, samples=result.final.samples),
-        phasing=details,
-    )
+    certificate = _certificate(found, whole, details.method, objective_value(problem, given), problem.tolerance)
+    return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
-def _certificate(found: list[_Found], whole: bool, method: str) -> Certificate | None:
-    """Proven only if no star was left out and every one of them is; else the least of their bounds, or none."""
+def _certificate(
+    found: list[_Found], whole: bool, method: str, given: float, tolerance: float
+) -> Certificate | None:  # fmt: skip
+    """By the least of the bounds of all stars; by zero where some were left out."""
     own = [each.result.certificate for each in found]
     best = own[0]
     if best is None:
         return None
-    bound = min((c.lower_bound for c in own if c is not None), default=0.0) if whole and all(own) else 0.0
-    value = found[0].key[1]
-    gap = max(value - bound, 0.0) / (abs(value) or 1.0)
-    proven = whole and all(c is not None and c.kind is Proof.GLOBAL for c in own)
+    bounds = [c.lower_bound for c in own if c is not None]
+    bound = min(bounds) if whole and len(bounds) == len(own) else 0.0
     text = f"{method}; of the best: {best.method}"
-    return Certificate(Proof.GLOBAL if proven else Proof.LOCAL, bound, gap, best.kkt_residual, text)
+    return certified(found[0].key[1], bound, given, tolerance, Reach.ASIDE, best.kkt_residual, text)
 
 
 def _method(found: list[_Found], designs: int) -> str:

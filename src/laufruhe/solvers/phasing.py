@@ -10,15 +10,15 @@ from dataclasses import dataclass, replace
 from laufruhe.errors import SolverError
 from laufruhe.machine.layouts import Layout
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.phasing import Candidate, Phasing
-from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Certificate, Proof, gap_unit
-from laufruhe.solvers.phasing_result import final_result, names_of, no_design, no_result, phase_decisions, solve_fixed
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import Reach, certified, gap_unit
+from laufruhe.solvers.conclusion import KEPT, no_star, with_star
+from laufruhe.solvers.phasing_result import final_result, names_of, no_design, solve_fixed
 from laufruhe.solvers.ranking import ORDERS_LISTED, PhasingResult, RankedOrder, ranked_orders, ranked_star
-from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.star_answers import searched
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.unbalances import KEPT
 
 
 def solve_phasing(problem: Problem) -> Result:
@@ -52,7 +52,7 @@ def solve_phasing(problem: Problem) -> Result:
 def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
     even, slack = phasing.even_interval, 1e-9
     if phasing.intervals.least > even + slack or phasing.intervals.most < even - slack:
-        return no_result(
+        return no_star(
             problem,
             f"no star can meet the intervals: {phasing.cylinders} cylinders fire {math.degrees(even):g} deg apart on "
             f"average, phasing.intervals allows {math.degrees(phasing.intervals.least):g} to "
@@ -61,20 +61,14 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
     families, reason = families_of(phasing)
     if not families:
         return (
-            no_result(problem, f"no star exists: {reason}")
-            if not phasing.continuous
-            else _uneven(problem, phasing, None)
+            no_star(problem, f"no star exists: {reason}") if not phasing.continuous else _uneven(problem, phasing, None)
         )
     answer = searched(problem, phasing, families)
     if not answer.designs:
         if answer.complete:
             return no_design(problem, answer)
-        return replace(
-            no_result(
-                problem, f"no feasible design was found in phasing.time_limit = {phasing.time_limit:g} s; raise it"
-            ),
-            status=Status.FAILED,
-        )
+        why = f"no feasible design was found in phasing.time_limit = {phasing.time_limit:g} s; raise it"
+        return no_star(problem, why, Status.FAILED)
     result = final_result(problem, phasing, answer)
     return _uneven(problem, phasing, result) if phasing.continuous else result
 
@@ -86,16 +80,15 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     layout = phasing.layout(bank, split)
     orders, count = ranked_orders(phasing, layout, throws, None)
     if not orders:
-        return no_result(problem, _no_order(phasing, layout, throws))
+        return no_star(problem, _no_order(phasing, layout, throws))
     # the small ones first: a shaft that buys nothing is not built
     sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
     told = orders if problem.feels_gas and not all(_is_even(order) for order in orders) else orders[:1]
     designs = [(order, built) for built in sets for order in told]
     solved, complete = _solved(problem, phasing, throws, designs)
     if not solved:
-        return no_result(problem, "no firing order and no set of shafts that may be built keeps the limits")
-    given = evaluate(problem)
-    initial = objective_value(problem, given)
+        return no_star(problem, "no firing order and no set of shafts that may be built keeps the limits")
+    initial = objective_value(problem, evaluate(problem))
     best = solved[0]
     for design in solved[1:]:
         if design.value < best.value - _share(problem) * gap_unit(best.value, initial):
@@ -106,24 +99,11 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     rest = tuple(order for order in orders if order != best.order)
     entry = replace(entry, firing_orders=(best.order, *rest)[:ORDERS_LISTED], even=_is_even(best.order))
     method = f"{len(told)} of {count} firing order(s), {len(sets)} set(s) of shafts looked at"
-    gap = (best.value - bound) / gap_unit(best.value, initial)
-    proven = gap <= problem.tolerance
     own = best.result.certificate
-    certificate = Certificate(
-        Proof.GLOBAL if proven else Proof.WITHIN_GAP, bound, gap, own.kkt_residual if own else 0.0,
-        f"{own.method}; {method}" if own else method,
-    )  # fmt: skip
-    candidate = Candidate(throws, best.order.order, bank, split)
-    return replace(
-        best.result,
-        problem=replace(best.result.problem, phasing=phasing),
-        status=Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=ObjectiveValue.of(problem, best.value, initial),
-        certificate=certificate,
-        decisions=(*phase_decisions(problem, phasing, candidate, names), *best.result.decisions),
-        initial=replace(given, samples=best.result.final.samples),
-        phasing=PhasingResult((entry,), layout.throw_positions, layout.banks, count * len(sets), len(solved), method),
-    )
+    how, residual = (f"{own.method}; {method}", own.kkt_residual) if own else (method, 0.0)
+    certificate = certified(best.value, bound, initial, problem.tolerance, Reach.WHOLE, residual, how)
+    details = PhasingResult((entry,), layout.throw_positions, layout.banks, count * len(sets), len(solved), method)
+    return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +112,7 @@ class _Solved:
 
     order: RankedOrder
     built: tuple[int, ...]
+    candidate: Candidate
     result: Result
 
     @property
@@ -161,21 +142,17 @@ def _solved(
         left_out = tuple(n for group in phasing.shafts.optional for n in group if n not in names)
         candidate = Candidate(throws, order.order, bank, split, left_out)
         result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem)))
-        kept = result.status in (Status.OPTIMAL, Status.FEASIBLE) and _keeps(result)
+        # of a design without decisions nobody has looked at the limits
+        met = result.final.excess(result.problem.limits) <= KEPT
+        kept = met and result.status in (Status.OPTIMAL, Status.FEASIBLE)
         if kept and result.objective is not None:
-            found.append(_Solved(order, built, result))
+            found.append(_Solved(order, built, candidate, result))
     return found, True
 
 
 def _share(problem: Problem) -> float:
     """Tolerance of one design, and by how much another has to be better: both together are what was asked."""
     return 0.5 * problem.tolerance
-
-
-def _keeps(result: Result) -> bool:
-    """Whether a design keeps its limits; those of a design without decisions nobody has looked at."""
-    limits = result.problem.limits
-    return all(result.final.value(limit.measure) <= limit.maximum * (1.0 + KEPT) for limit in limits)
 
 
 def _is_even(order: RankedOrder) -> bool:

@@ -12,7 +12,8 @@ import numpy as np
 from laufruhe.machine import firing
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.turns import as_turn, star_sum
-from laufruhe.problem.phasing import OrderCriterion, Phasing
+from laufruhe.problem.phasing import OrderCriterion
+from laufruhe.problem.problem import Phasing
 
 ORDERS = (1, 2, 4)
 ORDERS_LISTED = 6

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.ranking import PhasingResult
@@ -141,6 +141,14 @@ class Result:
     def _repr_html_(self) -> str:
         lines = [html.escape(line.strip()) for line in repr(self).strip("<>").splitlines()]
         return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"
+
+
+def objective_of(problem: Problem, initial: Evaluation, final: Evaluation) -> ObjectiveValue | None:
+    """The objective of the design and of the one given; None where nothing is minimised."""
+    if not problem.objective:
+        return None
+    value = objective_value(problem, final)
+    return ObjectiveValue.of(problem, value, value if final is initial else objective_value(problem, initial))
 
 
 def infeasible(

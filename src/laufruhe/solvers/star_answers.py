@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import SolverError
+from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.load_models.star_objective import amplitude_objective
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.phasing import Method, Phasing
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.phasing import Method
+from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import FLOOR
 from laufruhe.solvers.star_cuts import CutsFound, owners_of, search_designs, solve_design
 from laufruhe.solvers.star_families import Family

@@ -13,7 +13,8 @@ from laufruhe.machine.firing import even_patterns, firing_lattice, star_throws
 from laufruhe.machine.layouts import Layout, even_throws
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
-from laufruhe.problem.phasing import Candidate, Phasing
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Phasing
 
 
 @dataclass(frozen=True, eq=False)

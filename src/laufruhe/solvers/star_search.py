@@ -17,44 +17,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.physics.crank_stars import Array, Stars, phase_waves, star_sums
+from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
+from laufruhe.physics.crank_stars import Array, Stars, phase_waves
 from laufruhe.physics.star_space import Partial, StarSpace
 
-DIRECTIONS = 400
 SLACK = 1e-9
-
-
-@dataclass(frozen=True)
-class AmplitudeTerm:
-    """w sqrt(sum_h (f_h |F_h|)^2 + (c_h |C_h|)^2), one norm of the objective (S3).
-
-    Attributes
-    ----------
-    force, couple
-        f_h and c_h of every order.
-    """
-
-    weight: float
-    force: tuple[float, ...]
-    couple: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class AmplitudeObjective:
-    """A sum of norms of forces and couples of a star by order (S3)."""
-
-    orders: tuple[int, ...]
-    terms: tuple[AmplitudeTerm, ...]
-
-    def values(self, space: StarSpace, stars: Stars) -> Array:
-        """Of many stars, shape (n,)."""
-        sums = star_sums(stars, space.phases, space.places, self.orders)
-        squares = np.square(sums.real) + np.square(sums.imag)
-        out = np.zeros(len(stars))
-        for term in self.terms:
-            factors = np.stack([np.square(term.force), np.square(term.couple)], axis=-1)
-            out += term.weight * np.sqrt(np.einsum("nhc,hc->n", squares, factors))
-        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,51 +215,6 @@ def _placed_sums(placed: Stars, x: Array, phases: int, orders: Sequence[int]) ->
     for column, lever in enumerate(x):
         total += lever * waves[placed[:, column]]
     return np.concatenate([total.real, total.imag], axis=1)
-
-
-def directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
-    """Points of the dual ball: v_h = sum_t w_t c_th u_th with sum_h |u_th|^2 <= 1 (S4).
-
-    Returns
-    -------
-    Shape (directions, orders). The orders that weigh little are left at zero, which is
-    allowed and costs tightness only.
-    """
-    total = np.sum([np.multiply(t.weight, t.couple) for t in objective.terms], axis=0)
-    heavy = [int(h) for h in np.argsort(total)[::-1] if total[h] > 0.0][:3]
-    if not heavy:
-        return np.zeros((1, len(objective.orders)), dtype=complex)
-    angles = max(4, int((DIRECTIONS / 3 if len(heavy) > 1 else DIRECTIONS) ** (1.0 / len(heavy))))
-    out = []
-    for shares in _shares(objective, heavy):
-        for turn in itertools.product(range(angles), repeat=len(heavy)):
-            v = np.zeros(len(objective.orders), dtype=complex)
-            for h, size, t in zip(heavy, shares, turn, strict=True):
-                v[h] = size * np.exp(2j * np.pi * t / angles)
-            out.append(v)
-    return np.unique(np.array(out), axis=0)
-
-
-def _shares(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Array]:
-    """Sizes of v on the heavy orders: a term of several orders divides its unit between them."""
-    grid = [np.array(s) for s in itertools.product((0.25, 0.6, 0.95), repeat=len(heavy))] if len(heavy) > 1 else []
-    grid = (
-        [np.ones(len(heavy)), *grid]
-        if any(_orders_of(t, heavy) > 1 for t in objective.terms)
-        else [np.ones(len(heavy))]
-    )
-    for raw in grid:
-        sizes = np.zeros(len(heavy))
-        for term in objective.terms:
-            mine = np.array([term.couple[h] for h in heavy])
-            unit = np.where(mine > 0.0, raw, 0.0)
-            length = float(np.sqrt((unit**2).sum()))
-            sizes += term.weight * mine * (unit / length if length > 0.0 else unit)
-        yield sizes
-
-
-def _orders_of(term: AmplitudeTerm, heavy: Sequence[int]) -> int:
-    return sum(1 for h in heavy if term.couple[h] > 0.0)
 
 
 def _good_starts(space: StarSpace, objective: AmplitudeObjective) -> Iterator[Stars]:

@@ -10,14 +10,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm, AffineProblem
-from laufruhe.problem.decision import Domain
-from laufruhe.problem.evaluation import BETWEEN, Evaluation, evaluate, objective_value
+from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
+from laufruhe.problem.evaluation import BETWEEN, evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Bound, Certificate, Proof, best_bound, gap_unit, kkt_residual
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_unit, kkt_residual
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, concluded, judged, none_within
 from laufruhe.solvers.direct_cones import ConicSolution
-from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible
+from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
 ConeSolver: TypeAlias = Callable[[AffineProblem], ConicSolution]
@@ -26,8 +25,6 @@ MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
 MOST_ROWS = 60_000
 NEGLIGIBLE = 1e-6
-KEPT = 10.0 * FEASIBLE
-ACTIVE = 1e-5
 SAME_LOAD = 1e-10
 
 
@@ -82,16 +79,16 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
         conflict = _conflict(_tightened(model.at(samples), 0.0), [limit.name for limit in problem.limits])
-        return _infeasible(problem, conflict, initial, timing)
+        return none_within(problem, initial, conflict, timing)
     hopeless = _hopeless(problem, optimum)
     if hopeless:
-        return _infeasible(problem, hopeless, initial, timing)
+        return none_within(problem, initial, hopeless, timing)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
-    final = evaluate(problem, problem.design(values), cycle_samples)
+    design = judged(problem, values, cycle_samples)
     initial = replace(initial, samples=cycle_samples)
-    result = _result(problem, optimum, initial, final)
-    return replace(result, timing={**timing, "evaluate": time.perf_counter() - solved})
+    shown = _shown(optimum, gap_unit(design.value, objective_value(problem, initial)))
+    return concluded(design, initial, shown, {**timing, "evaluate": time.perf_counter() - solved})
 
 
 def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSolver) -> tuple[_Optimum | None, int]:
@@ -251,78 +248,16 @@ def _triangle(slope: Array) -> Array:
     return triangle / (float(np.abs(triangle).max()) or 1.0)
 
 
-def _result(problem: Problem, optimum: _Optimum, initial: Evaluation, final: Evaluation) -> Result:
-    value, given = objective_value(problem, final), objective_value(problem, initial)
+def _shown(optimum: _Optimum, unit: float) -> Shown:
     bound = optimum.bound
-    residual = kkt_residual(optimum.problem, optimum.x, bound, gap_unit(value, given))
-    certificate = Certificate(
-        kind=Proof.GLOBAL if optimum.gap <= problem.tolerance else Proof.WITHIN_GAP,
-        lower_bound=bound.value,
-        gap=optimum.gap,
-        kkt_residual=residual,
+    return Shown(
+        bound=bound.value,
+        reach=Reach.WHOLE,
+        kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
         method=f"second-order cones at {optimum.samples} angles, dual bound at {optimum.problem.samples}",
+        prices=bound.multipliers.shadow_prices(optimum.problem),
+        slopes={domain.decision.name: bound.gradient[domain.columns] for domain in optimum.problem.domains},
     )
-    prices = bound.multipliers.shadow_prices(optimum.problem)
-    limits = tuple(
-        _limit_value(limit.name, limit.measure.unit, final.value(limit.measure), limit.maximum, price, value)
-        for limit, price in zip(problem.limits, prices, strict=True)
-    )
-    feasible = all(limit.value <= limit.limit * (1.0 + KEPT) + 1e-12 for limit in limits)
-    return Result(
-        problem=problem,
-        status=Status.OPTIMAL
-        if feasible and certificate.kind is Proof.GLOBAL
-        else Status.FEASIBLE
-        if feasible
-        else Status.FAILED,
-        objective=ObjectiveValue.of(problem, value, given),
-        certificate=certificate,
-        decisions=tuple(
-            entry for domain in optimum.problem.domains for entry in decision_values(domain, optimum.x, bound.gradient)
-        ),
-        limits=limits,
-        initial=initial,
-        final=final,
-        message="" if feasible else "the design found breaks a limit between the angles it was solved at",
-        error_estimate=error_of(problem, final),
-    )
-
-
-def _limit_value(name: str, unit: str, value: float, maximum: float, price: float, objective: float) -> LimitValue:
-    active = value >= maximum * (1.0 - ACTIVE)
-    # a price that would not move the objective by its rounding is none
-    felt = active and price * maximum > 1e-7 * objective
-    return LimitValue(name, value, maximum, unit, active, price if felt else 0.0)
-
-
-def decision_values(domain: Domain, x: Array, gradient: Array) -> tuple[DecisionValue, ...]:
-    """Size and, where open, angle of one decision; the gradient prices its bound."""
-    decision = domain.decision
-    size, angle = decision.set.split(domain.complex_value(x))
-    given_size, given_angle = decision.set.split(decision.start)
-    reach = domain.scale * ACTIVE
-    high, low = size >= decision.upper - reach, size <= decision.lower + reach
-    slope = gradient[domain.columns]
-    price = float(np.hypot(*slope)) if domain.width == 2 else float(-slope[0] if high else slope[0])
-    at_bound = high or (domain.width == 1 and low)
-    entry = DecisionValue(
-        decision.name, size, decision.unit, decision.lower, decision.upper, given_size, at_bound,
-        max(price, 0.0) if at_bound else 0.0,
-    )  # fmt: skip
-    if domain.width == 1:
-        return (entry,)
-    low_angle, high_angle = decision.set.angles
-    edge = not decision.set.free_angle and size > reach and min(angle - low_angle, high_angle - angle) < 1e-6
-    name = decision.name.rsplit(".", 1)[0] + ".angle"
-    return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
-
-
-def _infeasible(problem: Problem, conflict: tuple[str, ...], initial: Evaluation, timing: dict[str, float]) -> Result:
-    limits = tuple(
-        LimitValue(limit.name, initial.value(limit.measure), limit.maximum, limit.measure.unit, False, 0.0)
-        for limit in problem.limits
-    )
-    return infeasible(problem, initial, limits, conflict, timing)
 
 
 def _conflict(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:

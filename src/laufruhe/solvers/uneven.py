@@ -16,20 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.load_models.star_objective import amplitude_objective
+from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.machine.firing import firing_turns, intervals_of
 from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, Phasing, bounded_stars
-from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Certificate, Proof, gap_unit
+from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, bounded_stars
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import Reach, certified, gap_unit
 from laufruhe.prove.uneven_bound import steady_bound, uneven_bound
+from laufruhe.solvers.conclusion import FEASIBLE, no_star, with_star
 from laufruhe.solvers.mount_starts import columns_of, unbalances_of
 from laufruhe.solvers.nonlinear import solve_nonlinear
-from laufruhe.solvers.phasing_result import no_result, phase_decisions, solve_fixed
+from laufruhe.solvers.phasing_result import solve_fixed
 from laufruhe.solvers.ranking import PhasingResult, RankedStar, TradePoint, ranked_orders, ranked_star
-from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth_program import TURN, SmoothProgram
 from laufruhe.solvers.star_families import families_of
 
@@ -37,7 +38,6 @@ Array = NDArray[np.float64]
 
 STARTS = 6
 ORDERS_WITH_GAS = 2
-FEASIBLE = 1e-6
 # share that keeps a design that stands on a limit from breaking it by a rounding
 SOFT_LIMIT = 1e-7
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
@@ -88,7 +88,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     """
     starts = starts_of(phasing, even, problem.feels_gas)
     if not starts:
-        return no_result(problem, "no star and firing order to start from keeps the firing intervals allowed")
+        return no_star(problem, "no star and firing order to start from keeps the firing intervals allowed")
     found = [answer for start in starts[:STARTS] if (answer := local_optimum(phasing, start, phasing.intervals))]
     if not found:
         raise SolverError("no start of the nonlinear program ended at a design that keeps the limits")
@@ -145,10 +145,9 @@ def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: b
         result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
     except ModelError:
         return None
-    limits = result.problem.limits
     if result.objective is None or result.status in (Status.INFEASIBLE, Status.FAILED):
         return None
-    if any(result.final.value(limit.measure) > limit.maximum * (1.0 + FEASIBLE) for limit in limits):
+    if result.final.excess(result.problem.limits) > FEASIBLE:
         return None
     return Uneven(candidate, result, residual, moved)
 
@@ -276,16 +275,13 @@ def _result(
 ) -> Result:
     best = found[0]
     layout = phasing.layout(best.candidate.bank_angle, best.candidate.split_pin)
-    given = even.initial if even is not None else evaluate(problem)
-    initial = objective_value(problem, given)
+    initial = objective_value(problem, even.initial if even is not None else evaluate(problem))
     bound, source = _bound(problem, phasing, phasing.intervals)
-    bound = min(bound, best.value)
-    # no norm lies under zero: who reaches it is done
-    gap = (best.value - bound) / gap_unit(best.value, initial)
-    proven = gap <= problem.tolerance
-    shafts = [n for names in phasing.shafts.optional for n in names if n not in best.candidate.left_out]
     method = f"IPOPT from {len(found)} start(s), firing orders kept; bound from {source}"
-    certificate = Certificate(Proof.GLOBAL if proven else Proof.LOCAL, bound, gap, best.kkt_residual, method)
+    # no norm lies under zero: who reaches it is done
+    certificate = certified(
+        best.value, bound, initial, problem.tolerance, Reach.ASIDE, best.kkt_residual, method
+    )  # fmt: skip
     details = PhasingResult(
         ranking=tuple(_entry(phasing, answer) for answer in found),
         places=layout.throw_positions,
@@ -296,17 +292,7 @@ def _result(
         trade=trade,
         even_value=even.objective.value if even is not None and even.objective is not None else None,
     )
-    result = best.result
-    return replace(
-        result,
-        problem=replace(result.problem, phasing=phasing),
-        status=Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=ObjectiveValue.of(problem, best.value, initial),
-        certificate=certificate,
-        decisions=(*phase_decisions(problem, phasing, best.candidate, shafts), *result.decisions),
-        initial=replace(given, samples=result.final.samples),
-        phasing=details,
-    )
+    return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
 def _entry(phasing: Phasing, answer: Uneven) -> RankedStar:

@@ -2,21 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, Role
 from laufruhe.machine.firing import even_patterns
 from laufruhe.numerics.norms import NORMS
+from laufruhe.physics.crank_stars import Array, Stars, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Term
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.star_search import AmplitudeObjective, AmplitudeTerm
 
 NEGLIGIBLE = 1e-13
+DIRECTIONS = 400
+
+
+@dataclass(frozen=True)
+class AmplitudeTerm:
+    """w sqrt(sum_h (f_h |F_h|)^2 + (c_h |C_h|)^2), one norm of the objective (S3).
+
+    Attributes
+    ----------
+    force, couple
+        f_h and c_h of every order.
+    """
+
+    weight: float
+    force: tuple[float, ...]
+    couple: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class AmplitudeObjective:
+    """A sum of norms of forces and couples of a star by order (S3)."""
+
+    orders: tuple[int, ...]
+    terms: tuple[AmplitudeTerm, ...]
+
+    def values(self, space: StarSpace, stars: Stars) -> Array:
+        """Of many stars, shape (n,)."""
+        sums = star_sums(stars, space.phases, space.places, self.orders)
+        squares = np.square(sums.real) + np.square(sums.imag)
+        out = np.zeros(len(stars))
+        for term in self.terms:
+            factors = np.stack([np.square(term.force), np.square(term.couple)], axis=-1)
+            out += term.weight * np.sqrt(np.einsum("nhc,hc->n", squares, factors))
+        return out
 
 
 def amplitude_objective(problem: Problem) -> AmplitudeObjective | None:
@@ -102,3 +141,48 @@ def _factors(term: Term, alone: Evaluation, orders: Sequence[int], x: float) -> 
     if term.measure.channel is channels.SHAKING_FORCE:
         return AmplitudeTerm(term.weight, tuple(values), none)
     return AmplitudeTerm(term.weight, none, tuple(v / x for v in values))
+
+
+def directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
+    """Points of the dual ball: v_h = sum_t w_t c_th u_th with sum_h |u_th|^2 <= 1 (S4).
+
+    Returns
+    -------
+    Shape (directions, orders). The orders that weigh little are left at zero, which is
+    allowed and costs tightness only.
+    """
+    total = np.sum([np.multiply(t.weight, t.couple) for t in objective.terms], axis=0)
+    heavy = [int(h) for h in np.argsort(total)[::-1] if total[h] > 0.0][:3]
+    if not heavy:
+        return np.zeros((1, len(objective.orders)), dtype=complex)
+    angles = max(4, int((DIRECTIONS / 3 if len(heavy) > 1 else DIRECTIONS) ** (1.0 / len(heavy))))
+    out = []
+    for shares in _shares(objective, heavy):
+        for turn in itertools.product(range(angles), repeat=len(heavy)):
+            v = np.zeros(len(objective.orders), dtype=complex)
+            for h, size, t in zip(heavy, shares, turn, strict=True):
+                v[h] = size * np.exp(2j * np.pi * t / angles)
+            out.append(v)
+    return np.unique(np.array(out), axis=0)
+
+
+def _shares(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Array]:
+    """Sizes of v on the heavy orders: a term of several orders divides its unit between them."""
+    grid = [np.array(s) for s in itertools.product((0.25, 0.6, 0.95), repeat=len(heavy))] if len(heavy) > 1 else []
+    grid = (
+        [np.ones(len(heavy)), *grid]
+        if any(_orders_of(t, heavy) > 1 for t in objective.terms)
+        else [np.ones(len(heavy))]
+    )
+    for raw in grid:
+        sizes = np.zeros(len(heavy))
+        for term in objective.terms:
+            mine = np.array([term.couple[h] for h in heavy])
+            unit = np.where(mine > 0.0, raw, 0.0)
+            length = float(np.sqrt((unit**2).sum()))
+            sizes += term.weight * mine * (unit / length if length > 0.0 else unit)
+        yield sizes
+
+
+def _orders_of(term: AmplitudeTerm, heavy: Sequence[int]) -> int:
+    return sum(1 for h in heavy if term.couple[h] > 0.0)

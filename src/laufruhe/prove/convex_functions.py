@@ -1,0 +1,185 @@
+"""Convex functions of mount stiffness, and what they prove (E16-E19).
+
+K is linear in the stiffnesses, and in coordinates in which the mass is one it is called A.
+Then, x the stiffnesses and any of y, V >= 0 with trace one, z with |z| <= 1 given,
+
+    w' A^-1 w    >= 2 y' w - y' A(x) y          sag                                     (E16)
+    lambda_max A >= <V, A(x)>                   highest natural frequency               (E17)
+   -lambda_min A >= -<V, A(x)>                  lowest natural frequency                (E18)
+    |A t / W2 - t| >= z' (A(x) t / W2 - t)      torque-roll residual                    (E19)
+
+with equality at the right y, V, z. Right sides are linear in x, so a weighted sum of them,
+limits included, is bounded over the box of x in closed form: a lower bound of the
+objective that holds whatever a solver says.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class ConvexFunction(Protocol):
+    """A convex function of the stiffnesses."""
+
+    def value(self, x: Array) -> float:
+        """At x."""
+
+    def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
+        """Constant and gradient of a linear function nowhere above this one, best at x."""
+
+
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """A(x) = base + sum_j x_j slopes_j, shapes (6, 6) and (n, 6, 6) (E16)."""
+
+    base: Array
+    slopes: Array
+
+    def at(self, x: Array) -> Array:
+        """A(x), shape (6, 6)."""
+        return np.asarray(self.base + np.tensordot(x, self.slopes, axes=1))
+
+    def between(self, left: Array, right: Array) -> tuple[float, Array]:
+        """Constant and gradient of left' A(x) right."""
+        return float(left @ self.base @ right), np.asarray(np.einsum("i,nij,j->n", left, self.slopes, right))
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """constant + gradient . x."""
+
+    constant: float
+    gradient: Array
+
+    def value(self, x: Array) -> float:
+        """At x."""
+        return self.constant + float(self.gradient @ x)
+
+    def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:  # noqa: ARG002
+        """Itself."""
+        return self.constant, self.gradient
+
+
+@dataclass(frozen=True, eq=False)
+class Compliance:
+    """factor w' A(x)^-1 w (E16)."""
+
+    matrices: Matrices
+    load: Array
+    factor: float
+
+    def value(self, x: Array) -> float:
+        """At x; infinite where a mode is free."""
+        matrix = self.matrices.at(x)
+        if np.linalg.eigvalsh(matrix)[0] <= 0.0:
+            return math.inf
+        return self.factor * float(self.load @ np.linalg.solve(matrix, self.load))
+
+    def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:  # noqa: ARG002
+        """The tangent at x, which lies under it everywhere (E16)."""
+        y = np.asarray(np.linalg.solve(self.matrices.at(x), self.load), dtype=np.float64)
+        constant, gradient = self.matrices.between(y, y)
+        return self.factor * (2.0 * float(y @ self.load) - constant), -self.factor * gradient
+
+
+@dataclass(frozen=True, eq=False)
+class Eigenvalue:
+    """sign x the largest of sign x the eigenvalues of A(x) (E17, E18): sign 1 the highest, -1 the lowest negated."""
+
+    matrices: Matrices
+    sign: float
+
+    def value(self, x: Array) -> float:
+        """At x."""
+        return float(np.linalg.eigvalsh(self.sign * self.matrices.at(x))[-1])
+
+    def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
+        """sign <V, A(x)> with V from the dual matrix, or from the eigenvector at x."""
+        _, vectors = np.linalg.eigh(self.sign * self.matrices.at(x))
+        weights, columns = np.eye(6)[-1], vectors
+        if dual is not None:
+            found, columns = np.linalg.eigh(0.5 * (dual + dual.T))
+            clipped = np.maximum(found, 0.0)
+            weights = clipped / clipped.sum() if clipped.sum() > 0.0 else weights
+        pairs = [self.matrices.between(v, v) for v in columns.T]
+        constant = sum(w * c for w, (c, _) in zip(weights, pairs, strict=True))
+        gradient = np.sum([w * g for w, (_, g) in zip(weights, pairs, strict=True)], axis=0)
+        return self.sign * constant, self.sign * gradient
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """|A(x) t / square - t| (E19)."""
+
+    matrices: Matrices
+    along: Array
+    square: float
+
+    def rows(self, x: Array) -> Array:
+        """A(x) t / square - t."""
+        return np.asarray(self.matrices.at(x) @ self.along / self.square - self.along)
+
+    def value(self, x: Array) -> float:
+        """At x."""
+        return float(np.linalg.norm(self.rows(x)))
+
+    def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
+        """The linear function of a z of length one at most: the dual vector's, or along the residual."""
+        z = self.rows(x) if dual is None else dual
+        size = float(np.linalg.norm(z))
+        z = z / max(size, 1.0) if dual is not None else z / (size or 1.0)
+        constant, gradient = self.matrices.between(z, self.along)
+        return constant / self.square - float(z @ self.along), gradient / self.square
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexLimit:
+    """function <= maximum, and the limit of the problem that it comes from."""
+
+    function: ConvexFunction
+    maximum: float
+    source: int
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexProgram:
+    """Least weighted sum of convex functions in a box, some limited."""
+
+    matrices: Matrices
+    lower: Array
+    upper: Array
+    terms: tuple[tuple[float, ConvexFunction], ...]
+    limits: tuple[ConvexLimit, ...]
+
+    def objective(self, x: Array) -> float:
+        """Weighted sum at x."""
+        return sum(weight * term.value(x) for weight, term in self.terms)
+
+
+@dataclass(frozen=True, eq=False)
+class ConvexDuals:
+    """What a solver proposes: dual vectors of the terms, prices and dual arrays of the limits."""
+
+    terms: tuple[Array | None, ...]
+    prices: tuple[float, ...]
+    limits: tuple[Array | None, ...]
+
+
+def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[float, Array]:
+    """Least objective that these duals leave possible, and the gradient of the bound's function (E16-E19)."""
+    constant, gradient = 0.0, np.zeros(len(x))
+    for (weight, term), dual in zip(program.terms, duals.terms, strict=True):
+        c, g = term.minorant(x, dual)
+        constant, gradient = constant + weight * c, gradient + weight * g
+    for limit, price, dual in zip(program.limits, duals.prices, duals.limits, strict=True):
+        c, g = limit.function.minorant(x, dual)
+        constant, gradient = constant + price * (c - limit.maximum), gradient + price * g
+    least = np.minimum(gradient * program.lower, gradient * program.upper)
+    return constant + float(least.sum()), gradient

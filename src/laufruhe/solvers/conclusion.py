@@ -1,0 +1,260 @@
+"""From a decided design to a result: judged by the exact model, priced, and certified in one way (P5, E15)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.problem.decision import Decision, Value
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
+from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.ranking import PhasingResult
+from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible, objective_of
+
+Array = NDArray[np.float64]
+
+FEASIBLE = 1e-6
+"""Relative excess over a limit that counts as none."""
+KEPT = 10.0 * FEASIBLE
+"""Relative excess that a design may have and be called one."""
+ACTIVE = 1e-5
+# share of the objective under which a price is a rounding
+_FELT = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Decisions and what the exact model says of them.
+
+    Attributes
+    ----------
+    problem
+        With the star and the firing order of the design.
+    values
+        Of its decisions.
+    value
+        Objective.
+    excess
+        Largest relative excess over a limit.
+    """
+
+    problem: Problem
+    values: tuple[Value, ...]
+    evaluation: Evaluation
+    value: float
+    excess: float
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What a method shows of the best design that it proposes.
+
+    Attributes
+    ----------
+    bound
+        What no design allowed goes under.
+    reach
+        What such a bound can prove.
+    kkt_residual, method
+        As in a certificate.
+    prices
+        Fall of the objective per unit by which each limit is relaxed.
+    slopes
+        Of the bound over the columns of a decision, by its name: they price the decision's own bounds.
+    """
+
+    bound: float
+    reach: Reach
+    kkt_residual: float
+    method: str
+    prices: Sequence[float] = ()
+    slopes: Mapping[str, Array] = field(default_factory=dict)
+
+
+def judged(problem: Problem, values: Sequence[Value], samples: int | None = None) -> Design:
+    """A design by the exact model.
+
+    Raises
+    ------
+    ModelError
+        If it has no loads, as on a resonance that nothing damps.
+    """
+    evaluation = evaluate(problem, problem.design(values), samples)
+    value = objective_value(problem, evaluation)
+    return Design(problem, tuple(values), evaluation, value, evaluation.excess(problem.limits))
+
+
+def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[str, float]) -> Result:
+    """The result of a design."""
+    problem = design.problem
+    given = objective_value(problem, initial)
+    met = design.excess <= KEPT
+    certificate = certified(
+        design.value, shown.bound, given, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
+    )
+    limits = limit_values(problem, design.evaluation, shown.prices, design.value)
+    proven = certificate.kind is Proof.GLOBAL
+    message = f"the design as given has no finite loads: {initial.resonance}" if initial.resonance else ""
+    if not met:
+        message = f"the best design found breaks {_broken(problem, design)}; relax it, or open more"
+    return Result(
+        problem=problem,
+        status=Status.FAILED if not met else Status.OPTIMAL if proven else Status.FEASIBLE,
+        objective=ObjectiveValue.of(problem, design.value, given),
+        certificate=certificate,
+        decisions=tuple(
+            entry
+            for decision, value in zip(problem.decisions, design.values, strict=True)
+            for entry in decision_values(decision, value, shown.slopes.get(decision.name))
+        ),
+        limits=limits,
+        initial=initial,
+        final=design.evaluation,
+        message=message,
+        error_estimate=error_of(problem, design.evaluation),
+        timing=timing,
+    )
+
+
+def state(problem: Problem, to_start_from: bool = False) -> Result:
+    """The design as given, evaluated and not changed.
+
+    Parameters
+    ----------
+    to_start_from
+        Whether it is only where a search starts, so that it may stand on a resonance.
+    """
+    started = time.perf_counter()
+    evaluation = evaluate_start(problem) if to_start_from else evaluate(problem)
+    return Result(
+        problem=problem,
+        status=Status.FEASIBLE,
+        objective=objective_of(problem, evaluation, evaluation),
+        certificate=None,
+        decisions=(),
+        limits=(),
+        initial=evaluation,
+        final=evaluation,
+        error_estimate=0.0 if evaluation.resonance else error_of(problem, evaluation),
+        timing={"evaluate": time.perf_counter() - started},
+    )
+
+
+def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...], timing: dict[str, float]) -> Result:
+    """No design exists: which limits cannot be met together, and how the one given stands to them."""
+    return infeasible(problem, initial, limit_values(problem, initial), conflict, timing)
+
+
+def _broken(problem: Problem, design: Design) -> str:
+    """Names of the limits that a design breaks."""
+    names = [f"'{x.name}'" for x in problem.limits if design.evaluation.standing(x).excess > KEPT]
+    return " and ".join(names) or "a limit"
+
+
+def limit_values(
+    problem: Problem, evaluation: Evaluation, prices: Sequence[float] = (), value: float = 0.0
+) -> tuple[LimitValue, ...]:
+    """How a design stands to the limits (E15); a price that would not move the objective by its rounding is none."""
+    out = []
+    for k, limit in enumerate(problem.limits):
+        found = evaluation.standing(limit)
+        active = bool(found.excess >= -ACTIVE)
+        price = prices[k] if active and prices else 0.0
+        price = price if price * abs(found.edge) > _FELT * value else 0.0
+        out.append(LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side))
+    return tuple(out)
+
+
+def decision_values(decision: Decision, value: Value, slope: Array | None = None) -> tuple[DecisionValue, ...]:
+    """Size and, where open, angle of one decision; the slope of the bound prices the side that it stands at."""
+    own = decision.set
+    (size, angle), (given_size, given_angle) = own.split(value), own.split(decision.start)
+    reach = own.scale * ACTIVE if decision.is_affine else (own.upper - own.lower) * ACTIVE
+    high, low = size >= own.upper - reach, size <= own.lower + reach
+    at_bound = high or (own.width == 1 and low)
+    price = 0.0
+    if slope is not None and at_bound:
+        price = float(np.hypot(*slope)) if own.width > 1 else float(-slope[0] if high else slope[0])
+    entry = DecisionValue(
+        decision.name, size, decision.unit, own.lower, own.upper, given_size, at_bound, max(price, 0.0)
+    )
+    if own.width == 1:
+        return (entry,)
+    low_angle, high_angle = own.angles
+    edge = not own.free_angle and size > reach and min(angle - low_angle, high_angle - angle) < 1e-6
+    name = decision.name.rsplit(".", 1)[0] + ".angle"
+    return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
+
+
+def with_star(
+    problem: Problem, phasing: Phasing, best: Result, candidate: Candidate, certificate: Certificate | None,
+    details: PhasingResult,
+) -> Result:  # fmt: skip
+    """The result of one star as that of all of them.
+
+    Parameters
+    ----------
+    problem
+        As given, its phasing open.
+    best
+        Of the star, nothing of the phasing open.
+    """
+    given = evaluate(problem)
+    proven = certificate is not None and certificate.kind is Proof.GLOBAL
+    status = best.status
+    if status in (Status.OPTIMAL, Status.FEASIBLE):
+        status = Status.OPTIMAL if proven else Status.FEASIBLE
+    initial = replace(given, samples=best.final.samples)
+    value = best.objective.value if best.objective else objective_value(problem, best.final)
+    return replace(
+        best,
+        problem=replace(best.problem, phasing=phasing),
+        status=status,
+        objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
+        certificate=certificate,
+        decisions=(*phase_decisions(problem, phasing, candidate), *best.decisions),
+        initial=initial,
+        phasing=details,
+    )
+
+
+def phase_decisions(problem: Problem, phasing: Phasing, candidate: Candidate) -> tuple[DecisionValue, ...]:
+    """Throws, banks and shafts as entries of the result."""
+    out = []
+    if phasing.throws is None:
+        given = [part.throw for part in problem.engine.slider_cranks]
+        layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
+        before = [
+            given[layout.pins.index(pin)] - layout.pin_offsets[layout.pins.index(pin)] for pin in set(layout.pins)
+        ]
+        for k, (angle, was) in enumerate(zip(candidate.throws, before, strict=True)):
+            low, high = phasing.throw_bounds[k] if phasing.throw_bounds else (0.0, math.tau)
+            out.append(DecisionValue(f"throw {k + 1}", angle, "rad", low, high, was % math.tau, False))
+    for name, bounds, value in (
+        ("bank angle", phasing.bank, candidate.bank_angle),
+        ("split pin angle", phasing.split, candidate.split_pin),
+    ):
+        if bounds is not None and value is not None and bounds[0] < bounds[1]:
+            edge = min(value - bounds[0], bounds[1] - value) <= 1e-9
+            out.append(DecisionValue(name, value, "rad", *bounds, bounds[0], edge))
+    optional = (name for names in phasing.shafts.optional for name in names)
+    out += [
+        DecisionValue(f"{name} built", float(name not in candidate.left_out), "", 0.0, 1.0, 1.0, False)
+        for name in optional
+    ]
+    return tuple(out)
+
+
+def no_star(problem: Problem, why: str, status: Status = Status.INFEASIBLE, conflict: tuple[str, ...] = ()) -> Result:
+    """No star, and why."""
+    given = evaluate(problem)
+    return Result(problem, status, None, None, (), (), given, given, why, conflict)
