@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, OperatingPoint, Role, Rotor, Seiliger, Shaft
 from laufruhe.machine.layouts import Mechanism, build, inline
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.decision import Decision
+from laufruhe.problem.decision import Decision, RotorDrive, Sector
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Limit, Term
 from laufruhe.problem.problem import Problem
 
@@ -44,7 +44,7 @@ def engine(
 
 def free_unbalance(rotor: str, upper: float = 0.3) -> Decision:
     """Size and angle of one rotor open."""
-    return Decision(f"{rotor}.unbalance", "kg m", 0.0, upper, (0.0, math.tau), 0j, (Drive(rotor, 1.0),))
+    return Decision(f"{rotor}.unbalance", "kg m", Sector(upper), 0j, (RotorDrive(rotor, 1.0),))
 
 
 def shaft_rotor(name: str, ratio: float, x: float, y: float = 0.0, z: float = 0.0) -> Rotor:

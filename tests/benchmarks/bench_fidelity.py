@@ -28,12 +28,13 @@ from laufruhe.load_models.batch import Designs, prepare, random_decisions  # noq
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
 from laufruhe.machine.layouts import Mechanism, boxer, build, inline  # noqa: E402
 from laufruhe.numerics.batch_norms import BatchNorm  # noqa: E402
-from laufruhe.numerics.norms import (Norm  # noqa: E402)
+from laufruhe.numerics.norms import NORMS  # noqa: E402
 from laufruhe.physics.fidelity import Fidelity  # noqa: E402
 from laufruhe.physics.shaking_loads import forget  # noqa: E402
-from laufruhe.problem.evaluation import (evaluate, objective_value  # noqa: E402)
-from laufruhe.problem.measure import (Measure, Subject  # noqa: E402)
-from laufruhe.problem.problem import (Problem, Term  # noqa: E402)
+from laufruhe.problem import channels  # noqa: E402
+from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
+from laufruhe.problem.measure import Measure, Term  # noqa: E402
+from laufruhe.problem.problem import Problem  # noqa: E402
 
 OUT = PAGES / "fidelity.md"
 DESIGNS = 100_000

@@ -18,8 +18,6 @@ from laufruhe.problem.evaluation import objective_value
 
 sys.path.insert(0, str(ROOT / "tests"))
 
-from laufruhe.solvers.mount_program import JointProgram
-
 from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.cores import processors
@@ -30,6 +28,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint
 from laufruhe.solvers.mount_starts import start_points
 from laufruhe.solvers.nonlinear import NonlinearProgram, solve_nonlinear
+from laufruhe.solvers.smooth_program import SmoothProgram
 from mounts.test_moving_block import simulated_forces
 
 PROBLEM = ROOT / "problems" / "tractor-four-elastic.toml"
@@ -146,7 +145,7 @@ def joint(problem: Problem) -> list[str]:
 
 
 def _program(problem: Problem) -> tuple[NonlinearProgram, list[np.ndarray]]:
-    program = JointProgram(problem)
+    program = SmoothProgram(problem)
     return program.program, [program.start(mounts, columns) for mounts, columns in start_points(problem)]
 
 
@@ -168,7 +167,7 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
         x = low + y * (high - low)
         unbalances = [complex(a, b) for a, b in x[count:].reshape(-1, 2)]
         at = evaluate(problem, problem.design(unbalances, x[:count].tolist()), SAMPLES)
-        rooms = [-excess(limit, at) for limit in design.limits]
+        rooms = [-at.standing(limit).excess for limit in design.limits]
         rooms += [1.0 - at.value(limit.measure) / limit.maximum for limit in problem.limits]
         rooms += [1.0 - abs(u) / d.upper for d, u in zip(problem.decisions, unbalances, strict=True)]
         return objective_value(problem, at), np.array(rooms)

@@ -24,7 +24,7 @@ from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.problem import channels
-from laufruhe.problem.decision import Decision
+from laufruhe.problem.decision import Decision, RotorDrive, Sector
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
 
@@ -75,9 +75,7 @@ class Scene:
     def designs(self) -> Callable[[FloatArray], FloatArray]:
         """Exact mount forces at the same angles of the same engine with other counterweights (P1)."""
         weights = tuple(Rotor(name, x, 0j, radius=0.08) for name, x in (("front", 0.2), ("rear", -0.2)))
-        decisions = tuple(
-            Decision(w.name, "kg m", 0.0, 0.1, (0.0, math.tau), 0j, (Drive(w.name, 1.0),)) for w in weights
-        )
+        decisions = tuple(Decision(w.name, "kg m", Sector(0.1), 0j, (RotorDrive(w.name, 1.0),)) for w in weights)
         engine = replace(self.engine, rotors=(*self.engine.rotors, *weights))
         objective = (Term(Measure(channels.MOUNT_FORCE, NORMS["mean"])),)
         model = AffineModel(Problem("bench", "bench", engine, (self.point,), decisions, objective))

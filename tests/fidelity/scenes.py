@@ -80,7 +80,7 @@ def random_elastic_problem(rng: random.Random, gas: bool | None = None) -> Probl
         )  # fmt: skip
     elastic = replace(problem, engine=replace(engine, mounts=mounts, block=block))
     subject = rng.choice([channels.MOUNT_FORCE, channels.MOUNT_FORCE, channels.MOUNT_TRAVEL])
-    quantity = replace(problem.objective[0].quantity, subject=subject)
+    quantity = replace(problem.objective[0].measure, channel=subject)
     return replace(elastic, objective=(Term(quantity),))
 
 

@@ -70,7 +70,7 @@ def test_automatic_holds_over_the_bounds() -> None:
 def test_engines_agree_with_evaluations(with_gas: bool) -> None:
     problem = load(PROBLEMS / "tractor-three.toml")
     gas = problem.points[0].gas if with_gas else None
-    quantity = problem.objective[0].quantity
+    quantity = problem.objective[0].measure
     template = replace(
         problem.engine,
         slider_cranks=tuple(
@@ -112,6 +112,6 @@ def test_engines_agree_with_evaluations(with_gas: bool) -> None:
 
 def test_rod_ratios_do_not_go_with_gas() -> None:
     problem = load(PROBLEMS / "tractor-three.toml")
-    family = EngineFamily(problem.engine, problem.objective[0].quantity, Fidelity(samples=360), problem.points[0].gas)
+    family = EngineFamily(problem.engine, problem.objective[0].measure, Fidelity(samples=360), problem.points[0].gas)
     with pytest.raises(ModelError, match="rod ratios"):
         family.values(EngineArrays(np.ones(2), rod_ratio=np.array([0.2, 0.3])))

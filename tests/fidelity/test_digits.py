@@ -38,8 +38,8 @@ def test_a_wrong_number_shows(part: str, monkeypatch: pytest.MonkeyPatch) -> Non
         replace(p, rotating_mass=0.5, rod_inertia_deficit=0.004, offset=0.002) for p in problem.engine.slider_cranks
     )
     problem = replace(problem, engine=replace(problem.engine, slider_cranks=parts))
-    quantity = replace(problem.objective[0].quantity, subject=rigid_digits.channels.MOUNT_FORCE)
-    problem = replace(problem, objective=(replace(problem.objective[0], quantity=quantity),))
+    quantity = replace(problem.objective[0].measure, channel=rigid_digits.channels.MOUNT_FORCE)
+    problem = replace(problem, objective=(replace(problem.objective[0], measure=quantity),))
     assert rigid_part(problem).error <= 1e-14
     exact = rigid_digits.wrench_in_digits
 

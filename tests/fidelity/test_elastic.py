@@ -25,7 +25,7 @@ from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.measure import Measure
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from problem_files import written
@@ -79,9 +79,9 @@ def test_estimate_on_many_engines(share: int) -> None:
 
 def _held(path: Path) -> Problem:
     """A ready problem with its mounts as given, and a load to judge."""
-    problem = load(path)
-    objective = problem.objective or load(PROBLEMS / "tractor-four-elastic.toml").objective
-    return replace(problem, mount_design=NOTHING_ASKED, limits=(), objective=objective)
+    held = load(path).balance
+    objective = held.objective or load(PROBLEMS / "tractor-four-elastic.toml").balance.objective
+    return replace(held, limits=(), objective=objective)
 
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
@@ -284,8 +284,8 @@ def test_a_question_about_modes_needs_no_loads() -> None:
 def test_a_transmissibility_needs_its_loads() -> None:
 
     problem = load(PROBLEMS / "powertrain-torque-roll.toml")
-    asked = ((Measure(channels.TRANSMISSIBILITY), 1.0),)
-    choice = needs(replace(problem, mount_design=replace(problem.mount_design, terms=asked, limits=())))
+    asked = (*problem.load_terms, Term(Measure(channels.TRANSMISSIBILITY)))
+    choice = needs(replace(problem, objective=asked, limits=problem.load_limits))
     kept = " ".join(choice.kept)
     assert "gas" in kept
     assert "crank speed" in kept

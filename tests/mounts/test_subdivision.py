@@ -84,7 +84,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
         corners = generator.integers(0, 2, (3, len(below))).astype(float)
         found = []
         for share in (*generator.random((3, len(below))), *corners):
-            engine = problem.mount_design.applied(problem.engine, (below + share * (above - below)).tolist())
+            engine = problem.design((below + share * (above - below)).tolist())
             found.append(objective_value(problem, remounted(given, engine)))
         assert bound <= min(found) * (1.0 + 1e-9)
         tight.append(bound / min(found))
@@ -101,7 +101,7 @@ def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
     for share in (1e-2, 1e-3):
         low, high = centre * (1.0 - share), centre * (1.0 + share)
         at = search.model.expanded(search.model.lines(), low[None], high[None])
-        under = search.model.under(problem.objective[0].quantity, search.model.lines(), at)
+        under = search.model.under(problem.objective[0].measure, search.model.lines(), at)
         assert float(under.value[0]) == pytest.approx(value, rel=1e-10)
         lacking.append(float(under.rest[0]) / value)
     assert lacking[1] < 1.1e-2 * lacking[0]
@@ -136,10 +136,10 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
     generator = np.random.default_rng(4)
     allowed_ones = 0
     for below, above, bound in zip(low, high, bounds, strict=True):
-        engine = problem.mount_design.applied(problem.engine, generator.uniform(below, above).tolist())
+        engine = problem.design(generator.uniform(below, above).tolist())
         design = remounted(given, engine)
-        broken = any(excess(limit, design) > 1e-5 for limit in problem.mount_limits)
-        broken |= any(design.value(limit.measure) > limit.maximum for limit in problem.limits)
+        broken = any(design.standing(limit).excess > 1e-5 for limit in problem.mount_limits)
+        broken |= any(design.value(limit.measure) > limit.maximum for limit in problem.load_limits)
         allowed_ones += not broken
         assert np.isfinite(bound) or broken
     assert 20 < np.count_nonzero(np.isinf(bounds)) < 130
@@ -166,8 +166,8 @@ def test_few_open_stiffnesses_are_decided_with_proof(text: str, tmp_path: Path) 
     axes = [np.geomspace(d.lower, d.upper, 25) for d in problem.mount_decisions]
     values = []
     for x in itertools.product(*axes):
-        design = remounted(given, problem.mount_design.applied(problem.engine, list(x)))
-        if all(excess(each, design) <= 0.0 for each in problem.mount_limits):
+        design = remounted(given, problem.design(list(x)))
+        if all(design.standing(each).excess <= 0.0 for each in problem.mount_limits):
             values.append(objective_value(problem, design))
     assert len(values) > 100
     assert min(values) >= result.certificate.lower_bound
@@ -196,4 +196,4 @@ def test_what_is_not_divided(tmp_path: Path) -> None:
     assert divides(many)
     assert divided_bound(many, 13.1, 1e-3).boxes == 0
     assert not divides(load(PROBLEMS / "tractor-four-elastic.toml"))
-    assert divided_bound(replace(many, mount_design=replace(many.mount_design, boxes=3)), 13.1, 1e-3).boxes >= 3
+    assert divided_bound(replace(many, search=replace(many.search, boxes=3)), 13.1, 1e-3).boxes >= 3

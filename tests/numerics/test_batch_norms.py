@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from laufruhe.numerics.batch_norms import BatchNorm
-from laufruhe.numerics.norms import NORMS, Norm
+from laufruhe.numerics.norms import NORMS, Grid, Norm
 
 DESIGNS, FEATURES, ROWS = 70, 5, 40
 
@@ -17,11 +17,11 @@ def _batch(norm: Norm, components: int) -> tuple[BatchNorm, np.ndarray]:
     return BatchNorm(norm, rows, rng.uniform(0.1, 1.0, ROWS)), rng.normal(size=(DESIGNS, FEATURES))
 
 
-@pytest.mark.parametrize("norm", list(Norm))
+@pytest.mark.parametrize("norm", NORMS.values())
 @pytest.mark.parametrize("components", [1, 2, 3])
 def test_norm_of_each_design(norm: Norm, components: int) -> None:
     batch, features = _batch(norm, components)
-    wanted = [mixed_norms.value(norm, batch.weights, np.einsum("cfk,f->kc", batch.rows, design)) for design in features]
+    wanted = [norm.value(Grid(batch.weights, 1), np.einsum("cfk,f->kc", batch.rows, design)) for design in features]
     np.testing.assert_allclose(batch.values(features), wanted, rtol=1e-13)
     np.testing.assert_allclose([batch.value(design) for design in features], wanted, rtol=1e-13)
 

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from laufruhe.numerics.norms import NORMS, Norm, dual_feasible, dual_norm, lengths, subgradient, value
+from laufruhe.numerics.norms import NORMS, Grid, Norm, lengths
 
-every_norm = pytest.mark.parametrize("norm", list(Norm), ids=str)
+every_norm = pytest.mark.parametrize("norm", NORMS.values(), ids=str)
 ROUNDING = 1e-12
 FINITE = st.floats(-1e3, 1e3, allow_subnormal=False)
 
@@ -41,16 +41,16 @@ class TestEveryNorm:
     @given(rows())
     def test_value_is_the_definition(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         weights, v, _ = data
-        assert value(norm, weights, v) == pytest.approx(naive(norm, weights, v), rel=ROUNDING)
+        assert norm.value(Grid(weights, 1), v) == pytest.approx(naive(norm, weights, v), rel=ROUNDING)
 
     @given(rows())
     def test_dual_inequality(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         """<Z, V> <= dual(Z) norm(V) for every Z and V (P3)."""
         weights, v, z = data
-        dual = dual_norm(norm, weights, z)
+        dual = norm.dual_norm(Grid(weights, 1), z)
         if math.isfinite(dual):
             slack = ROUNDING * (1.0 + float(np.abs(z * v).sum()))
-            assert float((z * v).sum()) <= dual * value(norm, weights, v) + slack
+            assert float((z * v).sum()) <= dual * norm.value(Grid(weights, 1), v) + slack
 
     @given(rows())
     def test_dual_norm_is_attained(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
@@ -64,42 +64,42 @@ class TestEveryNorm:
             v = z / np.where(size > 0.0, size, 1.0)[:, None]
         else:
             v = z / weights[:, None]
-        dual = dual_norm(norm, weights, z)
-        assert float((z * v).sum()) == pytest.approx(dual * value(norm, weights, v), rel=ROUNDING)
+        dual = norm.dual_norm(Grid(weights, 1), z)
+        assert float((z * v).sum()) == pytest.approx(dual * norm.value(Grid(weights, 1), v), rel=ROUNDING)
 
     @given(rows())
     def test_subgradient_attains_the_norm(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         """<Z, V> = norm(V) with dual(Z) at most one (P2)."""
         weights, v, _ = data
-        z = subgradient(norm, weights, v)
-        whole = value(norm, weights, v)
+        z = norm.subgradient(Grid(weights, 1), v)
+        whole = norm.value(Grid(weights, 1), v)
         assert float((z * v).sum()) == pytest.approx(whole, rel=ROUNDING, abs=1e-300)
-        assert dual_norm(norm, weights, z) <= 1.0 + ROUNDING
+        assert norm.dual_norm(Grid(weights, 1), z) <= 1.0 + ROUNDING
         assert not z[lengths(v) == 0.0].any()
 
     @given(rows())
     def test_subgradient_lies_below_the_norm(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         """norm(W) >= norm(V) + <Z, W - V> for any W."""
         weights, v, w = data
-        z = subgradient(norm, weights, v)
+        z = norm.subgradient(Grid(weights, 1), v)
         slack = ROUNDING * (1.0 + float(np.abs(z * w).sum() + np.abs(z * v).sum()))
-        assert value(norm, weights, w) >= value(norm, weights, v) + float((z * (w - v)).sum()) - slack
+        assert norm.value(Grid(weights, 1), w) >= norm.value(Grid(weights, 1), v) + float((z * (w - v)).sum()) - slack
 
     @given(rows(), st.floats(1e-3, 1e3))
     def test_dual_feasible_is_feasible(self, norm: Norm, data: tuple[np.ndarray, ...], scale: float) -> None:
         """Whatever is proposed, what comes out is in the unit ball; what is in it already is left alone."""
         weights, _, z = data
-        inside = dual_feasible(norm, weights, scale * z)
-        assert dual_norm(norm, weights, inside) <= 1.0 + ROUNDING
-        assert dual_norm(norm, weights, dual_feasible(norm, weights, 1.5 * inside)) <= 1.0 + ROUNDING
-        again = dual_feasible(norm, weights, 0.9 * inside)
+        inside = norm.dual_feasible(Grid(weights, 1), scale * z)
+        assert norm.dual_norm(Grid(weights, 1), inside) <= 1.0 + ROUNDING
+        assert norm.dual_norm(Grid(weights, 1), norm.dual_feasible(Grid(weights, 1), 1.5 * inside)) <= 1.0 + ROUNDING
+        again = norm.dual_feasible(Grid(weights, 1), 0.9 * inside)
         assert np.array_equal(again, 0.9 * inside)
 
     @given(rows())
     def test_dual_feasible_keeps_directions(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         """Rows are shortened, never turned."""
         weights, _, z = data
-        inside = dual_feasible(norm, weights, z)
+        inside = norm.dual_feasible(Grid(weights, 1), z)
         assert (lengths(inside) <= lengths(z) * (1.0 + ROUNDING)).all()
         along = (inside * z).sum(axis=1)
         np.testing.assert_allclose(along, lengths(inside) * lengths(z), rtol=ROUNDING, atol=1e-300)
@@ -111,15 +111,17 @@ class TestEveryNorm:
         v = np.array([[3.0, 4.0], [0.0, 0.0], [-1.0, 2.0]])
         scaled = size * v
         assert lengths(scaled) == pytest.approx(size * lengths(v), rel=ROUNDING, abs=0.0)
-        assert value(norm, weights, scaled) == pytest.approx(size * value(norm, weights, v), rel=ROUNDING, abs=0.0)
-        assert dual_norm(norm, weights, scaled) == pytest.approx(
-            size * dual_norm(norm, weights, v), rel=ROUNDING, abs=0.0
+        assert norm.value(Grid(weights, 1), scaled) == pytest.approx(
+            size * norm.value(Grid(weights, 1), v), rel=ROUNDING, abs=0.0
         )
-        z = subgradient(norm, weights, scaled)
-        np.testing.assert_allclose(z, subgradient(norm, weights, v), rtol=ROUNDING, atol=0.0)
-        inside = dual_feasible(norm, weights, scaled)
-        assert dual_norm(norm, weights, inside) == pytest.approx(
-            min(1.0, size * dual_norm(norm, weights, v)), rel=ROUNDING, abs=0.0
+        assert norm.dual_norm(Grid(weights, 1), scaled) == pytest.approx(
+            size * norm.dual_norm(Grid(weights, 1), v), rel=ROUNDING, abs=0.0
+        )
+        z = norm.subgradient(Grid(weights, 1), scaled)
+        np.testing.assert_allclose(z, norm.subgradient(Grid(weights, 1), v), rtol=ROUNDING, atol=0.0)
+        inside = norm.dual_feasible(Grid(weights, 1), scaled)
+        assert norm.dual_norm(Grid(weights, 1), inside) == pytest.approx(
+            min(1.0, size * norm.dual_norm(Grid(weights, 1), v)), rel=ROUNDING, abs=0.0
         )
 
     def test_sizes_side_by_side(self, norm: Norm) -> None:
@@ -127,16 +129,16 @@ class TestEveryNorm:
         weights = np.array([0.5, 0.5])
         v = np.array([[1e200, 0.0], [0.0, 1e-200]])
         expected = {NORMS["mean"]: 0.5e200, NORMS["maximum"]: 1e200, NORMS["rms"]: math.sqrt(0.5) * 1e200}[norm]
-        assert value(norm, weights, v) == pytest.approx(expected, rel=ROUNDING)
+        assert norm.value(Grid(weights, 1), v) == pytest.approx(expected, rel=ROUNDING)
         assert lengths(v).tolist() == [1e200, 1e-200]
 
     def test_no_rows_at_all(self, norm: Norm) -> None:
         """An engine without rotors has the mass zero."""
         empty, none = np.zeros((0, 2)), np.zeros(0)
-        assert value(norm, none, empty) == 0.0
-        assert dual_norm(norm, none, empty) == 0.0
-        assert subgradient(norm, none, empty).shape == (0, 2)
-        assert dual_feasible(norm, none, empty).shape == (0, 2)
+        assert norm.value(Grid(none, 1), empty) == 0.0
+        assert norm.dual_norm(Grid(none, 1), empty) == 0.0
+        assert norm.subgradient(Grid(none, 1), empty).shape == (0, 2)
+        assert norm.dual_feasible(Grid(none, 1), empty).shape == (0, 2)
 
 
 class TestWeightless:
@@ -144,8 +146,8 @@ class TestWeightless:
     def test_a_row_without_weight_bounds_nothing(self, norm: Norm) -> None:
         """No multiple of the norm bounds a row that it does not count."""
         weights, z = np.array([1.0, 0.0]), np.array([[1.0], [1.0]])
-        assert dual_norm(norm, weights, z) == math.inf
-        assert not dual_feasible(norm, weights, z)[1].any()
+        assert norm.dual_norm(Grid(weights, 1), z) == math.inf
+        assert not norm.dual_feasible(Grid(weights, 1), z)[1].any()
 
     def test_a_maximum_has_no_weights(self) -> None:
-        assert dual_norm(NORMS["maximum"], np.zeros(2), np.array([[3.0], [4.0]])) == 7.0
+        assert NORMS["maximum"].dual_norm(Grid(np.zeros(2), 1), np.array([[3.0], [4.0]])) == 7.0

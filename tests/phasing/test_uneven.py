@@ -7,11 +7,10 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from laufruhe.solvers.uneven_program import rides_of
 
 from laufruhe.files.reader import load
 from laufruhe.load_models.amplitudes import amplitude_objective
-from laufruhe.load_models.uneven_model import Symbols, UnevenModel
+from laufruhe.load_models.uneven_model import Symbols, UnevenModel, rides_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.prove.certificate import Proof
@@ -21,6 +20,7 @@ from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_search import search_stars
 from laufruhe.solvers.uneven import local_optimum
 from phasing import engines
+from smooth import AtItsValues, smooth_value
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPLIT = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"
@@ -83,7 +83,7 @@ def test_no_optimum_lies_above_its_start(tmp_path, seed):
     order = tuple(int(k) + 1 for k in np.argsort([-angle % math.tau for angle in throws]))
     start = Candidate(throws, order)
     problem = phasing.realise(start)
-    given = evaluate(problem).value(problem.objective[0].quantity)
+    given = evaluate(problem).value(problem.objective[0].measure)
     found = local_optimum(phasing, start, phasing.intervals)
     assert found.value <= given
     assert found.moved
@@ -125,14 +125,14 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     bank, split = (math.radians(70.0), math.radians(41.0)) if layout == "vee" else (None, None)
     columns = np.concatenate([[0.0], *(0.3 * d.scale * rng.uniform(0.1, 1.0, d.width) for d in model.domains)])[1:]
     at = Symbols([ca.DM(angle) for angle in moved], bank, split, ca.DM(columns))
-    quantity = problem.objective[0].quantity
-    smooth = float(model.norm(quantity, at, 1e-9))
+    quantity = problem.objective[0].measure
+    smooth = float(smooth_value(model, quantity, at, 1e-9))
     exact = phasing.realise(Candidate(moved, None, bank, split))
     design = exact.design([d.complex_value(columns) for d in model.domains])
     assert smooth == pytest.approx(evaluate(exact, design).value(quantity), rel=tolerance)
-    squares = model.squares(quantity, at)
-    if squares is not None:
-        assert float(squares) == pytest.approx(smooth**2, rel=1e-6)
+    rows, grid = model.rows(quantity, at)
+    value, most, _ = quantity.norm.limited(AtItsValues(), grid, rows, smooth, 1e-9)
+    assert float(ca.mmax(value)) == pytest.approx(most, rel=1e-6)
 
 
 def test_throws_between_bounds_of_their_own(tmp_path):

@@ -209,7 +209,7 @@ class TestCounterweights:
         angle = {{ between = {between} }}
         """
         (decision,) = problem_of(folder, text).decisions
-        assert (decision.fixed_angle, decision.free_angle) == (fixed, free)
+        assert (decision.set.width == 1, decision.set.free_angle) == (fixed, free)
 
     @given(st.floats(0.0, 1.0), st.sampled_from([(0.0, math.tau), (0.2, 1.2), (-3.0, -1.0)]), st.floats(0.0, 1.0))
     def test_split_names_size_and_angle(
@@ -226,9 +226,9 @@ class TestCounterweights:
         """
         (decision,) = problem_of(folder, text).decisions
         value = cmath.rect(size, bounds[0] + share * (bounds[1] - bounds[0]))
-        found, angle = decision.split(value)
+        found, angle = decision.set.split(value)
         assert cmath.rect(found, angle) == pytest.approx(value, abs=1e-15)
-        assert angle >= decision.angle[0]
+        assert angle >= decision.set.angles[0]
 
 
 @given(VALUES)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import cmath
-import math
 from dataclasses import replace
 from functools import lru_cache
 
@@ -14,19 +13,21 @@ from hypothesis import strategies as st
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.machine import OperatingPoint
-from laufruhe.numerics.norms import NORMS, Norm, lengths
+from laufruhe.numerics.norms import NORMS, lengths
 from laufruhe.problem import channels
-from laufruhe.problem.decision import Decision
+from laufruhe.problem.channels import LoadChannel, MassChannel
+from laufruhe.problem.decision import Decision, Interval, RotorDrive, Sector
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
 from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 
 # travel needs elastic mounts, and is tested with them
-LOADS = tuple(subject for subject in Subject if subject not in (*MASSES, channels.MOUNT_TRAVEL))
+LOADS = tuple(c for c in channels.CHANNELS.values() if isinstance(c, LoadChannel) and c is not channels.MOUNT_TRAVEL)
+MASSES = tuple(c for c in channels.CHANNELS.values() if isinstance(c, MassChannel))
 HALF_ORDERS = Measure(channels.ROLL_MOMENT, NORMS["rms"], orders=(0.5, 1.5), points=("slow",))
 QUANTITIES = (
-    *(Measure(subject, norm) for subject in LOADS for norm in Norm),
+    *(Measure(subject, norm) for subject in LOADS for norm in NORMS.values()),
     *(Measure(subject, NORMS["mean"]) for subject in MASSES),
     Measure(channels.ADDED_MASS, NORMS["mean"], rotors=("rear", "left")),
     Measure(channels.MOUNT_FORCE, NORMS["mean"], mounts=("rear left", "front right")),
@@ -52,15 +53,15 @@ def scene(cylinders: int) -> Problem:
     starts = {"left": cmath.rect(0.004, 0.5), "slow shaft": cmath.rect(-0.003, 0.7), "front": cmath.rect(0.01, 2.0)}
     decisions = (
         Decision(
-            "pair", "kg m", 0.0, 0.02, (0.0, math.tau), starts["left"],
-            (Drive("left", 1.0), Drive("right", -1.0, mirrored=True)),
+            "pair", "kg m", Sector(0.02), starts["left"],
+            (RotorDrive("left", 1.0), RotorDrive("right", -1.0, mirrored=True)),
         ),
         Decision(
-            "shaft", "kg m", -0.01, 0.01, (0.7, 0.7), starts["slow shaft"], (Drive("slow shaft", 1.0),),
+            "shaft", "kg m", Interval(-0.01, 0.01, 0.7), starts["slow shaft"], (RotorDrive("slow shaft", 1.0),),
         ),
         Decision(
-            "webs", "kg", 0.0, 0.5, (1.0, 2.5), starts["front"] / 0.08,
-            (Drive("front", 0.08j), Drive("rear", -0.08, mirrored=True)),
+            "webs", "kg", Sector(0.5, (1.0, 2.5)), starts["front"] / 0.08,
+            (RotorDrive("front", 0.08j), RotorDrive("rear", -0.08, mirrored=True)),
         ),
     )  # fmt: skip
     given_so = {rotor.name: 0j for rotor in rotors}
@@ -116,7 +117,7 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
         )
         again = 1 if quantity.is_mass else periods
         whole = expected.vectors.reshape(
-            -1, again, len(norm.weights) if again == 1 else samples, expected.vectors.shape[1]
+            -1, again, len(norm.grid.weights) if again == 1 else samples, expected.vectors.shape[1]
         )
         for k in range(again):
             one = whole[:, k].reshape(len(found), -1)
@@ -125,7 +126,7 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
             used = one.any(axis=0)
             if used.sum() == found.shape[1]:
                 np.testing.assert_allclose(found, one[:, used], rtol=0.0, atol=1e-12 * size)
-        assert norm.weights.sum() == pytest.approx(expected.weights.sum(), rel=1e-12)
+        assert norm.grid.weights.sum() == pytest.approx(expected.grid.weights.sum(), rel=1e-12)
         assert norm.value(x) == pytest.approx(expected.value, rel=1e-11, abs=1e-11 * size)
 
 
@@ -175,5 +176,5 @@ def test_nothing_to_decide() -> None:
     p = problem(flat, [])
     affine = AffineModel(p).at(96)
     assert affine.size == 0
-    exact = evaluate(p, samples=96 * 4).value(p.objective[0].quantity)
+    exact = evaluate(p, samples=96 * 4).value(p.objective[0].measure)
     assert affine.objective(np.zeros(0)) == pytest.approx(exact, rel=1e-12)

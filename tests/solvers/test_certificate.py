@@ -12,21 +12,21 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
-from laufruhe.numerics.norms import Norm
-from laufruhe.problem.decision import Decision, Domain, domains_of
+from laufruhe.numerics.norms import NORMS, Grid, Norm
+from laufruhe.problem.decision import Decision, Domain, Interval, Sector, domains_of
 from laufruhe.prove.certificate import Multipliers, best_bound, kkt_residual, lower_bound
 
 Array = NDArray[np.float64]
 SEEDS = st.integers(0, 2**32 - 1)
-NORMS = tuple(Norm)
+EVERY = tuple(NORMS.values())
 
 
 def random_norm(rng: np.random.Generator, size: int) -> AffineNorm:
     rows, width = int(rng.integers(1, 9)), int(rng.integers(1, 4))
-    norm = NORMS[int(rng.integers(3))]
+    norm = EVERY[int(rng.integers(len(EVERY)))]
     weights = rng.random(rows) + 0.01
     slope = rng.standard_normal((rows, width, size)) * (rng.random(size) < 0.8)
-    return AffineNorm(norm, rng.standard_normal((rows, width)), slope, weights / weights.sum())
+    return AffineNorm(norm, rng.standard_normal((rows, width)), slope, Grid(weights / weights.sum(), 1))
 
 
 def random_domains(rng: np.random.Generator) -> tuple[Domain, ...]:
@@ -36,7 +36,8 @@ def random_domains(rng: np.random.Generator) -> tuple[Domain, ...]:
         width = (0.0, math.tau, float(rng.uniform(0.1, math.pi)))[kind]
         lower = float(rng.uniform(-2, 1)) if kind == 0 else 0.0
         upper = max(lower, 0.0) + float(rng.uniform(0.1, 3))
-        decisions.append(Decision(f"d{k}", "kg m", lower, upper, (low, low + width), 0j, ()))
+        own = Interval(lower, upper, low) if kind == 0 else Sector(upper, (low, low + width))
+        decisions.append(Decision(f"d{k}", "kg m", own, 0j, ()))
     return domains_of(tuple(decisions))
 
 
@@ -65,7 +66,7 @@ def random_multipliers(rng: np.random.Generator, problem: AffineProblem, x: Arra
     """Anything at all, or something near what a solver would say."""
 
     def rows(norm: AffineNorm) -> Array:
-        own = mixed_norms.subgradient(norm.norm, norm.weights, norm.rows(x))
+        own = norm.subgradient(x)
         noise = rng.standard_normal(norm.constant.shape)
         return np.asarray(rng.choice([0.0, 1.0]) * own + 10.0 ** rng.uniform(-8, 3) * rng.choice([0.0, 1.0]) * noise)
 
@@ -111,8 +112,8 @@ class TestBound:
 
     def test_is_tight_where_it_can_be(self) -> None:
         """|x - 1| on [2, 3]: the bound is 1, the objective at 2, and nothing more is to be won."""
-        norm = AffineNorm(NORMS["mean"], np.array([[-1.0]]), np.array([[[1.0]]]), np.array([1.0]))
-        domains = domains_of((Decision("d", "kg m", 2.0, 3.0, (0.0, 0.0), 0j, ()),))
+        norm = AffineNorm(NORMS["mean"], np.array([[-1.0]]), np.array([[[1.0]]]), Grid(np.ones(1), 1))
+        domains = domains_of((Decision("d", "kg m", Interval(2.0, 3.0), 0j, ()),))
         problem = AffineProblem(((1.0, norm),), (), domains, 1)
         bound = lower_bound(problem, Multipliers((np.array([[1.0]]),), ()))
         assert bound.value == problem.objective(np.array([2.0])) == 1.0
@@ -124,9 +125,9 @@ class TestBound:
     def test_limits_raise_it(self) -> None:
         """|x - 3| with |x| <= 1 on a disc: the price of the limit is the slope, and the bound is 2."""
         unit = np.eye(2)[None]
-        far = AffineNorm(NORMS["mean"], np.array([[-3.0, 0.0]]), unit, np.array([1.0]))
-        near = AffineNorm(NORMS["maximum"], np.zeros((1, 2)), unit, np.array([1.0]))
-        domains = domains_of((Decision("d", "kg m", 0.0, 5.0, (0.0, math.tau), 0j, ()),))
+        far = AffineNorm(NORMS["mean"], np.array([[-3.0, 0.0]]), unit, Grid(np.ones(1), 1))
+        near = AffineNorm(NORMS["maximum"], np.zeros((1, 2)), unit, Grid(np.ones(1), 1))
+        domains = domains_of((Decision("d", "kg m", Sector(5.0), 0j, ()),))
         problem = AffineProblem(((1.0, far),), ((1.0, near),), domains, 1)
         multipliers = Multipliers((np.array([[-1.0, 0.0]]),), (np.array([[1.0, 0.0]]),))
         bound = lower_bound(problem, multipliers)
@@ -144,14 +145,15 @@ class TestBound:
         rng = np.random.default_rng(seed)
         domains = random_domains(rng)
         size, samples, groups = sum(d.width for d in domains), 8, 2
-        norm = NORMS[int(rng.integers(3))]
+        norm = EVERY[int(rng.integers(len(EVERY)))]
         waves = rng.standard_normal((groups, 3, 2, size + 1)) + 1j * rng.standard_normal((groups, 3, 2, size + 1))
 
         def at(count: int) -> AffineProblem:
             turns = np.exp(2j * np.pi * np.outer(np.arange(count), np.arange(3)) / count)
             rows = np.einsum("sh,ghdn->gsdn", turns, waves).real.reshape(groups * count, 2, size + 1)
             weights = np.full(groups * count, 1.0 / (groups * count))
-            return AffineProblem(((1.0, AffineNorm(norm, rows[..., 0], rows[..., 1:], weights)),), (), domains, count)
+            found = AffineNorm(norm, rows[..., 0], rows[..., 1:], Grid(weights, count))
+            return AffineProblem(((1.0, found),), (), domains, count)
 
         coarse, fine = at(samples), at(2 * samples)
         x = random_point(rng, coarse)
@@ -168,14 +170,14 @@ class TestBound:
 
 
 class TestPrices:
-    @pytest.mark.parametrize("norm", NORMS, ids=str)
+    @pytest.mark.parametrize("norm", EVERY, ids=str)
     def test_price_is_the_dual_norm(self, norm: Norm) -> None:
         """mu Z with Z in the unit sphere of the dual norm has the price mu (P5)."""
         rng = np.random.default_rng(3)
-        weights = np.array([0.2, 0.3, 0.5])
+        grid = Grid(np.array([0.2, 0.3, 0.5]), 1)
         v = rng.standard_normal((3, 2))
-        z = mixed_norms.subgradient(norm, weights, v)
-        limit = AffineNorm(norm, v, np.zeros((3, 2, 1)), weights)
-        domains = domains_of((Decision("d", "kg m", 0.0, 1.0, (0.0, 0.0), 0j, ()),))
+        z = norm.subgradient(grid, v)
+        limit = AffineNorm(norm, v, np.zeros((3, 2, 1)), grid)
+        domains = domains_of((Decision("d", "kg m", Interval(0.0, 1.0), 0j, ()),))
         problem = AffineProblem((), ((1.0, limit),), domains, 1)
         assert Multipliers((), (7.0 * z,)).shadow_prices(problem) == (pytest.approx(7.0),)

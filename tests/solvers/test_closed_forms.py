@@ -16,6 +16,7 @@ from laufruhe.machine import Cycle, Engine
 from laufruhe.machine.layouts import Mechanism, build, vee
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
+from laufruhe.problem.decision import RotorDrive
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
@@ -98,7 +99,7 @@ def test_moment_pair() -> None:
     roll = Measure(channels.ROLL_MOMENT, NORMS["mean"], orders=(2.0,))
     force = Measure(channels.SHAKING_FORCE, NORMS["mean"], orders=(2.0,))
     pure = problem(machine, ["left"], objective=[Term(roll)])
-    drives = (Drive("left", 1.0), Drive("right", -1.0))
+    drives = (RotorDrive("left", 1.0), RotorDrive("right", -1.0))
     coupled = replace(pure, decisions=(replace(free_unbalance("left"), drives=drives),))
     result = solve(coupled)
     assert result.objective is not None

@@ -27,11 +27,11 @@ NAMES = ("tractor-single", "tractor-two", "tractor-four-lanchester", "tractor-fo
 def measured_by(problem: Problem, norm: Norm) -> Problem:
     return replace(
         problem,
-        objective=tuple(replace(t, quantity=replace(t.measure, norm=norm)) for t in problem.objective),
+        objective=tuple(replace(t, measure=replace(t.measure, norm=norm)) for t in problem.objective),
     )
 
 
-@pytest.mark.parametrize("norm", list(Norm))
+@pytest.mark.parametrize("norm", NORMS.values())
 @pytest.mark.parametrize("name", NAMES)
 def test_same_optimum_and_bound_as_cvxpy(name: str, norm: Norm) -> None:
     affine = AffineModel(measured_by(load(PROBLEMS / f"{name}.toml"), norm)).at(96)
@@ -65,7 +65,7 @@ def test_limits_and_their_prices_as_cvxpy() -> None:
 
 def test_contradiction_is_told() -> None:
     problem = limited(0.5)
-    least = Limit("force", problem.objective[0].quantity, 1.0)
+    least = Limit("force", problem.objective[0].measure, 1.0)
     affine = AffineModel(replace(problem, limits=(*problem.limits, least))).at(96)
     assert solve_direct(affine).x is None
 

@@ -11,14 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from laufruhe.problem.decision import Decision, Domain, domains_of
+from laufruhe.problem.decision import Decision, Domain, Interval, Sector, domains_of
 
 Array = NDArray[np.float64]
 OFFSET = 3  # columns of others before this one
 
 
 def domain(lower: float, upper: float, low: float, high: float) -> Domain:
-    return Domain(Decision("d", "kg m", lower, upper, (low, high), 0j, ()), OFFSET)
+    own = Interval(lower, upper, low) if low == high else Sector(upper, (low, high))
+    return Domain(Decision("d", "kg m", own, 0j, ()), OFFSET)
 
 
 INTERVALS = st.tuples(st.floats(-5.0, 5.0), st.floats(0.0, 5.0), st.floats(-7.0, 7.0)).map(
@@ -43,7 +44,7 @@ def points(d: Domain) -> Array:
     decision = d.decision
     if d.width == 1:
         return np.linspace(decision.lower, decision.upper, 201)[:, None]
-    low, high = decision.angle
+    low, high = d.set.angles
     sizes, angles = np.linspace(0.0, decision.upper, 9), np.linspace(low, high, 4001)
     grid = (sizes[:, None] * np.exp(1j * angles)).ravel()
     return np.column_stack([grid.real, grid.imag])
@@ -97,8 +98,8 @@ class TestProject:
             return
         size = float(np.hypot(*found))
         assert size <= decision.upper * (1.0 + 1e-14)
-        if size > 1e-9 * d.scale and not decision.free_angle:
-            low, high = decision.angle
+        if size > 1e-9 * d.scale and not d.set.free_angle:
+            low, high = d.set.angles
             behind = (cmath.phase(complex(*found)) - low) % math.tau
             assert min(behind, math.tau - behind) < 1e-6 or behind <= high - low + 1e-6
 
@@ -115,7 +116,7 @@ class TestColumns:
         u = d.complex_value(x)
         np.testing.assert_allclose(d.columns_of(u), x[d.columns], atol=1e-15 * 10)
         if d.width == 1:
-            assert u == pytest.approx(cmath.rect(factors[0], d.decision.angle[0]))
+            assert u == pytest.approx(cmath.rect(factors[0], d.set.angles[0]))
         else:
             assert u == complex(*factors)
 

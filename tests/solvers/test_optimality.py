@@ -13,7 +13,8 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem import channels
-from laufruhe.problem.decision import Decision
+from laufruhe.problem.channels import LoadChannel
+from laufruhe.problem.decision import Decision, Sector
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Limit, Measure, Term
 from laufruhe.problem.problem import Problem
@@ -102,7 +103,7 @@ def test_gap_is_computed_from_the_exact_model() -> None:
 
 @pytest.mark.parametrize("samples", [48, 96, 360])
 @pytest.mark.parametrize("subject", [channels.MOUNT_FORCE, channels.ROLL_MOMENT, channels.SHAKING_FORCE])
-def test_bound_of_a_mean_holds_over_the_whole_cycle(subject: Subject, samples: int) -> None:
+def test_bound_of_a_mean_holds_over_the_whole_cycle(subject: LoadChannel, samples: int) -> None:
     """However few the angles: the mean over the cycle of the design found, and of any near it, is not below (P7)."""
     p = replace(four(Measure(subject, NORMS["mean"]), tolerance=0.3), fidelity=Fidelity("exact", samples))
     result = solve(p)
@@ -316,7 +317,7 @@ def test_brute_force_over_size_and_angle() -> None:
 def test_bounds_far_from_the_answer(magnitude: float) -> None:
     """Huge and tiny bounds beside each other leave the program solvable and the proof honest."""
     p = four()
-    odd = Decision("x", "kg m", 0.0, 0.01 * magnitude, (0.0, math.tau), 0j, p.decisions[1].drives)
+    odd = Decision("x", "kg m", Sector(0.01 * magnitude), 0j, p.decisions[1].drives)
     result = solve(replace(p, decisions=(p.decisions[0], odd)))
     assert result.objective is not None
     assert result.certificate is not None

@@ -1,0 +1,35 @@
+"""Smooth forms of norms, taken as functions of what they are made of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from laufruhe.load_models.uneven_model import Symbols, UnevenModel
+from laufruhe.problem.measure import Measure
+
+
+class AtItsValues:
+    """A program whose heads are the values that they stand for; what it holds is kept."""
+
+    def __init__(self) -> None:
+        self.held: list[Any] = []
+
+    def head(self, value: Any) -> Any:
+        """The value itself."""
+        return value
+
+    def hold(self, expression: Any) -> None:
+        """Nothing but kept."""
+        self.held.append(expression)
+
+
+def smooth_value(model: UnevenModel, measure: Measure, at: Symbols, share: float) -> Any:
+    """What a program would minimise of a measure, softened by this much of one."""
+    rows, grid = model.rows(measure, at)
+    program = AtItsValues()
+    value = measure.norm.least(program, grid, rows, 1.0, share)
+    for expression in program.held:
+        assert float(ca.mmax(expression)) <= 1e-9 * float(value)
+    return value
