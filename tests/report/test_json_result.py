@@ -13,8 +13,9 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from cli import scenes
+from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
-from laufruhe.problem.measure import MEASURES, Measure
+from laufruhe.problem.measure import Measure
 from laufruhe.report.json_result import as_json
 from laufruhe.solvers import Result
 from report.result_schema import SCHEMA
@@ -70,7 +71,7 @@ def test_mounts_agree_with_the_model() -> None:
     assert [mount["name"] for mount in mounts] == result.final.mount_names
     for mount in mounts:
         for measure, key in (("mean", "mean"), ("maximum", "max"), ("rms", "rms")):
-            quantity = Measure(channels.MOUNT_FORCE, MEASURES[measure], mounts=(mount["name"],))
+            quantity = Measure(channels.MOUNT_FORCE, NORMS[measure], mounts=(mount["name"],))
             assert mount[key] == pytest.approx(result.final.value(quantity), rel=1e-12)
             assert mount["initial"][key] == pytest.approx(result.initial.value(quantity), rel=1e-12)
 
