@@ -50,6 +50,7 @@ def test_slightly_uneven_angles_cut_the_couple(name):
         assert result.objective.value <= 1e-6 * result.phasing.even_value
 
 
+@pytest.mark.slow
 def test_zero_is_reached_cleanly():
     """Four-stroke nine: both couples vanish within the intervals, and below zero there is nothing."""
     result = engines.solved("inline-nine-uneven")
@@ -192,6 +193,7 @@ def test_no_uneven_star_goes_under_the_bound(tmp_path, cycle, cylinders):
     assert 0.95 * best - 1e-9 <= tight <= best * (1.0 + 1e-9) + 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["inline-seven-uneven", "two-stroke-eight-uneven"])
 def test_the_trade_lies_between_its_bounds(name):
     result = engines.solved(name)

@@ -19,8 +19,8 @@ FUNCTION_LINES = 45
 # anything late, so that `--help` answers at once, and so may the package itself, for `import laufruhe`.
 HEAVY = {"casadi", "clarabel", "cvxpy", "matplotlib", "mpmath", "netCDF4", "pint", "pyscipopt", "scipy", "xarray"}
 LATE_ROOMS = ("", "cli")
-# Kinds that answer for themselves: nobody but their own file asks which one it is.
-KINDS = {"Norm": ("laufruhe.numerics.norms",), "MountMeasure": ("laufruhe.problem.measure",)}
+# Modules whose objects answer for themselves: nobody outside asks which one it is.
+NORMS, CHANNELS = "laufruhe.numerics.norms", "laufruhe.problem.channels"
 LAYOUTS = {"inline", "vee", "boxer", "opposed-piston", "parts"}
 LAYOUT_ROOM = "laufruhe.machine"
 
@@ -69,10 +69,18 @@ def imported(node: ast.AST, module: str, known: Trees) -> set[str]:
     return set()
 
 
+def run_nodes(tree: ast.AST) -> Iterator[ast.AST]:
+    """Every node but those that only a type checker reads."""
+    for node in ast.iter_child_nodes(tree):
+        if not (isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"):
+            yield node
+            yield from run_nodes(node)
+
+
 def own_imports(known: Trees) -> dict[str, set[str]]:
-    """Modules of the project that each module imports, anywhere in its text."""
+    """Modules of the project that each module imports when it runs, inside functions too."""
     return {
-        module: {name for node in ast.walk(tree) for name in imported(node, module, known) if name in known} - {module}
+        module: {name for node in run_nodes(tree) for name in imported(node, module, known) if name in known} - {module}
         for module, tree in known.items()
     }
 
@@ -152,32 +160,27 @@ def operands(tree: ast.Module) -> Iterator[ast.expr]:
             yield from expression.elts if isinstance(expression, ast.Tuple | ast.Set | ast.List) else (expression,)
 
 
-def norm_classes(known: Trees) -> set[str]:
-    """Names of the classes below `numerics.norms`, once norms are classes."""
-    return {
-        node.name
-        for module, tree in known.items()
-        if module.startswith("laufruhe.numerics.norms")
-        for node in tree.body
-        if isinstance(node, ast.ClassDef) and node.name != "Norm"
-    }
+def names_of(tree: ast.Module, home: str) -> set[str]:
+    """Names that a module has from `home`, or from what is below it, and the name of `home` itself."""
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            names = {alias.asname or alias.name: f"{base}.{alias.name}" for alias in node.names}
+            found |= {name for name, whole in names.items() if whole == home or whole.startswith(f"{home}.")}
+    return found
 
 
-def asked_kind(operand: ast.expr, classes: set[str]) -> str:
-    """Kind whose member `operand` is, empty when it is none."""
-    if isinstance(operand, ast.Attribute) and isinstance(operand.value, ast.Name) and operand.value.id in KINDS:
-        return operand.value.id
-    return "Norm" if isinstance(operand, ast.Name) and operand.id in classes else ""
-
-
-def questions_of_kind(known: Trees) -> set[str]:
-    """Modules that ask which norm or measure they hold, with how often they ask."""
-    classes = norm_classes(known)
+def questions_of(known: Trees, home: str) -> set[str]:
+    """Modules outside `home` that ask which of its objects they hold, with how often they ask."""
     found: dict[str, int] = {}
     for module, tree in known.items():
+        names = names_of(tree, home)
         for operand in operands(tree):
-            kind = asked_kind(operand, classes)
-            if kind and not module.startswith(KINDS[kind]):
+            # NORMS["rms"], channels.SAG and Mean are all asked for by their first name
+            while isinstance(operand, ast.Attribute | ast.Subscript):
+                operand = operand.value
+            if isinstance(operand, ast.Name) and operand.id in names and not module.startswith(home):
                 found[module] = found.get(module, 0) + 1
     return {f"{module}: {count}" for module, count in found.items()}
 
@@ -200,7 +203,8 @@ def measured() -> dict[str, set[str]]:
         "long_functions": long_functions(known),
         "late_imports": late_imports(known),
         "circles": {module for circle in circles(own_imports(known)) for module in circle},
-        "questions_of_norm": questions_of_kind(known),
+        "questions_of_norm": questions_of(known, NORMS),
+        "questions_of_channel": questions_of(known, CHANNELS),
         "questions_of_layout": questions_of_layout(known),
     }
 

@@ -13,7 +13,8 @@ RULES = {
     "long_functions": f"functions over {source_shape.FUNCTION_LINES} lines",
     "late_imports": "imports inside a function, of what is neither a heavy library nor wanted by a command",
     "circles": "modules in a circle of imports, those inside functions included",
-    "questions_of_norm": "modules that ask which norm or measure they hold, with how often",
+    "questions_of_norm": "modules that ask which norm they hold, with how often",
+    "questions_of_channel": "modules that ask which channel they measure, with how often",
     "questions_of_layout": "modules that ask for a layout by its name, with how often",
 }
 

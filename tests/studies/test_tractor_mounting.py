@@ -64,7 +64,6 @@ def test_free_force(figure: Data) -> None:
 class TestGasTrace:
     """What the study says of its trace: 300 kp, 7 m/s, Phi = 50 %, -70 %, -53 %."""
 
-    @pytest.mark.slow
     def test_no_fired_trace_cancels_at_seven(self, figure: Data) -> None:
         speed = figure("gas-trace")["cancelling_speed"]
         assert float(speed.sel(case=trace.ASSUMED_CASE)) == pytest.approx(8.98, abs=0.05)
