@@ -23,7 +23,7 @@ def explained(path: Path, tolerance: float) -> tuple[str, str]:
     from laufruhe.report import explain
 
     problem = _with_objective(path)
-    if problem.objective:
+    if problem.load_terms:
         choice, times = choose(problem, tolerance), _load_times
     else:
         choice, times = needs(problem), _mount_times
@@ -90,7 +90,7 @@ def _with_objective(path: Path) -> Problem:
     from laufruhe.files.reader import load
 
     problem = load(path)
-    if not problem.objective and not problem.mount_terms:
+    if not problem.objective:
         rule, remedy = "is missing: accuracy is that of an objective", "add [objective] or mounts"
         raise InputError(str(path), (Complaint("objective", "", rule, remedy),))
     return problem

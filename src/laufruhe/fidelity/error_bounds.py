@@ -1,6 +1,6 @@
 """How far a cheaper model can be from the reference, without a guess (F6-F9).
 
-Every quantity is a norm, so the value of a signal and that of the same signal with
+Every measure of a load is a norm, so the value of a signal and that of the same signal with
 something left out differ by no more than the norm of what was left out. Of a sampled
 mean or maximum the curvature of the signal bounds what the samples miss.
 """
@@ -8,15 +8,18 @@ mean or maximum the curvature of the signal bounds what the samples miss.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Engine
-from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.channels import LoadChannel
+from laufruhe.numerics.spectrum import Spectrum, as_order
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.shaking_loads import rotor_wrench
+from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, selected
 from laufruhe.problem.problem import Problem
@@ -31,48 +34,143 @@ ROUNDING = 2e-13
 
 def reference(problem: Problem, engine: Engine | None = None, samples: int = REFERENCE_SAMPLES) -> Evaluation:
     """The highest fidelity: every order, rigid rod, gas at many steps, every mode; uneven speed where it was asked."""
-    f = problem.fidelity
-    best = replace(f, kinematics="exact", samples=samples, orders=None, rod="rigid", gas=True,
-                   gas_samples=None, mounts="frequency", modes=None, tolerance=None)  # fmt: skip
+    best = replace(EXACT, samples=samples, crank_inertia=problem.fidelity.crank_inertia)
     return evaluate(replace(problem, fidelity=best), engine)
 
 
-def signals(quantity: Measure, evaluation: Evaluation) -> list[Spectrum]:
-    """What a quantity measures at every operating point, (n, mounts or 1, d), on a common lowest order."""
-    base = evaluation.engine.cycle.base_order
-    found = over(base, evaluation.signals(quantity.channel)) if isinstance(quantity.channel, LoadChannel) else []
-    return [selected(quantity, signal, evaluation.mount_names) for signal in found]
+def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
+    """What a load is at every operating point, (n, places, d), on a common lowest order; of all else nothing."""
+    channel = measure.channel
+    found = evaluation.signals(channel) if isinstance(channel, LoadChannel) else []
+    cycle = evaluation.engine.cycle
+    return [selected(measure, signal, evaluation.mount_names) for signal in over(cycle.base_order, found)]
 
 
-def shares(quantity: Measure, evaluation: Evaluation) -> Array:
-    """Weight of every operating point in a quantity, zero where it does not count."""
-    return quantity.shares([loads.point for loads in evaluation.loads])
+def shares(measure: Measure, evaluation: Evaluation) -> Array:
+    """Weight of every operating point in a measure, zero where it does not count."""
+    return measure.shares([loads.point for loads in evaluation.loads])
 
 
-def difference(a: Sequence[Spectrum], b: Sequence[Spectrum]) -> list[Spectrum]:
-    """a - b at every operating point."""
-    return [x + Spectrum(y.base, -y.coefficients) for x, y in zip(a, b, strict=True)]
+def sampling_bound(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
+    """Largest error of a load that its samples can make (F7, F8), in its own unit."""
+    found, share = signals(measure, evaluation), shares(measure, evaluation)
+    return measure.norm.sampling_bound(found, share, evaluation.samples, finest)
 
 
-def sampling_bound(quantity: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-    """Largest error of a quantity that its samples can make (F7, F8), in its own unit.
+def left_out(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
+    """What a load can at most change by when their signals take the place of ours (F6)."""
+    pairs = zip(signals(measure, ours), signals(measure, theirs), strict=True)
+    difference = [x + Spectrum(y.base, -y.coefficients) for x, y in pairs]
+    return measure.norm.above(difference, shares(measure, theirs))
 
-    Compared with many more samples, at every place that the coarse ones could have
-    stood, plus what the curvature of the signal lets the many miss.
+
+def relative(bound: float, value: float) -> float:
+    """A bound over a value; infinite where that is zero and the bound is not."""
+    return bound / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
+
+
+class Scale:
+    """Objective of a design at the reference, and bounds beside it.
+
+    Attributes
+    ----------
+    terms
+        Those of the objective that a fidelity can change.
     """
-    if quantity.is_mass:
-        return 0.0
-    found, share = signals(quantity, evaluation), shares(quantity, evaluation)
-    return quantity.norm.sampling_bound(found, share, evaluation.samples, finest)
+
+    def __init__(self, problem: Problem, best: Evaluation) -> None:
+        self.problem, self.best = problem, best
+        self.terms = [term for term in problem.objective if term.measure.is_load]
+        self.value = _loads(problem, best)
+
+    def evaluation(self, fidelity: Fidelity) -> Evaluation:
+        """The same design at another fidelity."""
+        return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)
+
+    def lost(self, ours: Evaluation, theirs: Evaluation) -> float:
+        """What the objective can at most change by when their signals take the place of ours (F6)."""
+        return sum(term.weight * left_out(term.measure, ours, theirs) for term in self.terms)
+
+    def missed(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
+        """What the samples of an evaluation miss of the objective at most (F7, F8)."""
+        return sum(term.weight * sampling_bound(term.measure, evaluation, finest) for term in self.terms)
+
+    @cached_property
+    def doubted(self) -> float:
+        """What the reference itself may miss of gas torque between its steps (F9).
+
+        Torque bends where valves and heat act, so its orders converge with the square of
+        the step: the change from half the steps is three times what is left.
+        """
+        whole = self.best.fidelity
+        if all(whole.gas_of(loads.point) is None for loads in self.best.loads):
+            return 0.0
+        return self.lost(self.evaluation(replace(whole, gas_samples=whole.gas_steps // 2)), self.best)
+
+    @property
+    def doubt(self) -> float:
+        """What the reference itself may be off by, relative (F9)."""
+        return relative(self.doubted, self.value) + ROUNDING
+
+    def loses(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
+        """What a fidelity leaves out at most, relative, of the reference or of another evaluation (F6)."""
+        return relative(self.lost(self.evaluation(fidelity), than or self.best), self.value)
+
+    def misses(self, fidelity: Fidelity) -> float:
+        """What its samples miss at most, relative (F7, F8)."""
+        return relative(self.missed(self.evaluation(fidelity)), self.value)
+
+    @cached_property
+    def repeats(self) -> int:
+        """Times that all measured signals repeat within the cycle, whatever is decided."""
+        ratios = tuple(
+            as_order(abs(rotor.shaft.ratio))
+            for rotor in self.problem.engine.rotors
+            if rotor.unbalance != 0 or rotor.name in self.open_rotors
+        )
+        bases = [loads.wrench.reduced(ratios).base for loads in self.best.loads]
+        return int(min(bases) / self.problem.engine.cycle.base_order) if bases else 1
+
+    @property
+    def open_rotors(self) -> set[str]:
+        """Rotors whose unbalance is decided."""
+        return {drive.rotor for decision in self.problem.decisions for drive in decision.rotor_drives}
+
+    @cached_property
+    def mounting(self) -> ElasticMounting | None:
+        """Block and mounts; None where the mounts are rigid."""
+        return None if self.best.engine.block is None else mounting_in(self.best.engine)
+
+    @cached_property
+    def decided_modes(self) -> set[int]:
+        """Modes that an open rotor drives, 1 the lowest: what is small now may not stay so."""
+        rotors = [replace(r, unbalance=1.0) for r in self.problem.engine.rotors if r.name in self.open_rotors]
+        if self.mounting is None or not rotors:
+            return set()
+        wrenches = np.array([rotor_wrench(rotor, 1.0) for rotor in rotors])
+        driven = self.mounting.excited(Spectrum(self.problem.engine.cycle.base_order, wrenches))
+        return {mode + 1 for mode in driven}
+
+    @cached_property
+    def excited_modes(self) -> tuple[int, ...]:
+        """Modes that the loads or an open rotor drive, 1 the lowest (E12)."""
+        if self.mounting is None:
+            return ()
+        found = {mode + 1 for loads in self.best.loads for mode in self.mounting.excited(loads.wrench)}
+        return tuple(sorted(found | self.decided_modes))
+
+    @cached_property
+    def strengths(self) -> dict[int, float]:
+        """What every excited mode adds at most to the objective, relative (F6)."""
+        others = {mode: tuple(m for m in self.excited_modes if m != mode) for mode in self.excited_modes}
+        return {mode: self.loses(replace(self.best.fidelity, modes=rest)) for mode, rest in others.items()}
 
 
 def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> float:
-    """Relative error of the objective that is not exceeded (F6-F9).
+    """Relative error of the objective of an evaluation that is not exceeded (F6-F9).
 
     Parameters
     ----------
-    problem
-        Its objective.
     evaluation
         Of a design, at any fidelity and samples.
     best
@@ -82,42 +180,11 @@ def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> f
     -------
     Over the objective of `evaluation`; infinite where that is zero and the bound is not.
     """
-    bound = value = 0.0
-    half = half_gas(problem, best)
-    for term in problem.objective:
-        value += term.weight * evaluation.value(term.measure)
-        if not term.measure.is_mass:
-            bound += term.weight * (
-                left_out(term.measure, evaluation, best)
-                + sampling_bound(term.measure, evaluation, best.samples)
-                + gas_doubt(term.measure, best, half)
-            )
+    scale, value = Scale(problem, best), _loads(problem, evaluation)
+    bound = scale.lost(evaluation, best) + scale.missed(evaluation, best.samples) + scale.doubted
     return relative(bound + ROUNDING * value, value)
 
 
-def relative(bound: float, value: float) -> float:
-    """A bound over a value; infinite where that is zero and the bound is not."""
-    return bound / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
-
-
-def left_out(quantity: Measure, evaluation: Evaluation, best: Evaluation) -> float:
-    """What a quantity can at most change by when the reference's signals take the place of these (F6)."""
-    ours, theirs = signals(quantity, evaluation), signals(quantity, best)
-    return quantity.norm.above(difference(ours, theirs), shares(quantity, best))
-
-
-def half_gas(problem: Problem, best: Evaluation) -> Evaluation | None:
-    """The reference with gas torque at half as many steps; None without gas."""
-    if not best.fidelity.gas or all(loads.point.gas is None for loads in best.loads):
-        return None
-    less = replace(best.fidelity, gas_samples=best.fidelity.gas_steps // 2)
-    return evaluate(replace(problem, fidelity=less), best.engine)
-
-
-def gas_doubt(quantity: Measure, best: Evaluation, half: Evaluation | None) -> float:
-    """What the reference itself may miss of gas torque between its steps (F9).
-
-    Torque bends where valves and heat act, so its orders converge with the square of
-    the step: the change from half the steps is three times what is left.
-    """
-    return 0.0 if half is None else left_out(quantity, half, best)
+def _loads(problem: Problem, evaluation: Evaluation) -> float:
+    """Objective without what is asked of a block on its mounts, which no fidelity changes."""
+    return sum(term.weight * evaluation.value(term.measure) for term in problem.load_terms)

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.fidelity.automatic import Choice
-from laufruhe.fidelity.left_out import LeftOut, mode_names
+from laufruhe.fidelity.knob import LeftOut
+from laufruhe.fidelity.knobs import KNOBS, mode_names
 from laufruhe.machine import Engine
 from laufruhe.machine.mount import Matrix3
-from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
@@ -80,14 +80,10 @@ def _moved(before: Array, after: Array) -> float:
 
 def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
     """Parts of the loads, each with the problem that lacks it."""
-    fidelity = problem.fidelity
     quick = tuple(replace(point, speed=MORE * point.speed) for point in problem.points)
     yield "crank speed", replace(problem, points=quick)
-    if any(point.gas is not None for point in problem.points):
-        yield "gas", _at(problem, replace(fidelity, gas=False))
-    if any(part.rod_inertia_deficit for part in problem.engine.slider_cranks):
-        yield "inertia of the rods beyond two masses", _at(problem, replace(fidelity, rod="mass-only"))
-    yield "orders above 2", _at(problem, replace(fidelity, orders=2))
+    for knob in KNOBS:
+        yield from ((name, replace(problem, fidelity=fidelity)) for name, fidelity in knob.away(problem))
 
 
 def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
@@ -126,10 +122,6 @@ def _numbers(problem: Problem, with_loads: bool) -> tuple[int, int]:
     """Mount force components sampled for what is asked, and by an evaluation with all loads."""
     whole = problem.fidelity.samples * 3 * len(problem.engine.mounts) * len(problem.points)
     return (whole if with_loads else 0), whole
-
-
-def _at(problem: Problem, fidelity: Fidelity) -> Problem:
-    return replace(problem, fidelity=fidelity)
 
 
 def _with(problem: Problem, engine: Engine) -> Problem:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
+from laufruhe.fidelity.knobs import KNOBS
 from laufruhe.files import fields as f
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.measure import MEASURES
@@ -16,6 +17,7 @@ CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
 Place: TypeAlias = Annotated[list[f.Length], Field(min_length=3, max_length=3)]
 Triple: TypeAlias = Annotated[list[f.NonNegative], Field(min_length=3, max_length=3)]
+T = TypeVar("T", bound=BaseModel)
 Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60)]
 
 
@@ -358,6 +360,17 @@ class ConstraintTable(QuantityTable):
     of: list[str] | None = Field(default=None, description="Counterweights or balancers whose mass counts.")
 
 
+def _with_knobs(table: type[T]) -> type[T]:
+    """A table with a key for every choice of fidelity that it does not name itself."""
+    keys: dict[str, Any] = {}
+    for knob in KNOBS:
+        if knob.key not in table.model_fields:
+            kind = Annotated[knob.kind, f.Number(knob.unit, above=0.0)] if knob.unit else knob.kind
+            keys[knob.key] = (kind | None, Field(default=None, **knob.told))
+    return create_model(table.__name__, __base__=table, __doc__=table.__doc__, __module__=__name__, **keys)
+
+
+@_with_knobs
 class FidelityTable(Table):
     """Speed against accuracy."""
 
@@ -365,18 +378,6 @@ class FidelityTable(Table):
         default="exact", description="auto: the cheapest choice that keeps the objective within the tolerance."
     )
     tolerance: f.Positive | None = Field(default=None, description="Relative error of the objective, for auto.")
-    samples: int | None = Field(default=None, ge=48, le=100_000, description="Steps over the working cycle.")
-    orders: int | None = Field(default=None, ge=1, description="Last order kept of pistons, rods and gas.")
-    rod: Literal["rigid", "mass-only"] | None = None
-    gas: bool | None = Field(default=None, description="false leaves the working gas out.")
-    gas_samples: int | None = Field(default=None, ge=48, le=100_000, description="Steps for the gas torque.")
-    crank_inertia: f.PositiveInertia | None = Field(
-        default=None, description="Of all that turns with the crank: its speed varies within the cycle."
-    )
-    mounts: Literal["frequency", "rigid", "time"] | None = Field(
-        default=None, description="Elastic mounts order by order, as if they gave no way, or integrated in time."
-    )
-    modes: list[int] | None = Field(default=None, description="Natural modes that answer, 1 the lowest.")
 
 
 class SearchTable(Table):

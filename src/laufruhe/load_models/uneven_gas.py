@@ -49,8 +49,8 @@ class GasMoments:
         gain
             What a moment of an order counts for; the same for all when left out.
         """
-        gas, fidelity = point.gas, self._problem.fidelity
-        if gas is None or not fidelity.gas:
+        gas = self._problem.fidelity.gas_of(point)
+        if gas is None:
             return []
         total: dict[float, Any] = {}
         for k, (part, star) in enumerate(zip(self._problem.engine.slider_cranks, stars, strict=True)):
@@ -71,8 +71,7 @@ class GasMoments:
         parts, fidelity = self._problem.engine.slider_cranks, self._problem.fidelity
         alike = next(j for j, other in enumerate(parts) if _mechanism(other) == _mechanism(parts[k]))
         if (gas, alike) not in self._kept:
-            whole = gas_coefficients(gas, parts[alike], self._problem.engine.cycle, fidelity)
-            whole = whole if fidelity.orders is None else whole.kept(fidelity.orders)
+            whole = fidelity.kept(gas_coefficients(gas, parts[alike], self._problem.engine.cycle, fidelity))
             self._kept[gas, alike] = _felt(whole, lambda _: 1.0, self._left_out)
         return self._kept[gas, alike]
 

@@ -1,17 +1,30 @@
-"""What of the physics is kept: choices with names, each free of the others (F1)."""
+"""What of the physics is kept: choices with names, each free of the others (F1).
+
+`fidelity.knobs` says of every field how a problem file tells it, what it costs and when it pays.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from laufruhe.errors import ModelError
+from laufruhe.machine import GasModel, OperatingPoint
+from laufruhe.numerics.spectrum import Spectrum
 
 Kinematics = Literal["exact", "two-order"]
 RodModel = Literal["rigid", "mass-only"]
 MountModel = Literal["frequency", "rigid", "time"]
 MODES = 6
+
+
+class ChoiceError(ModelError):
+    """A choice that means nothing, or contradicts another."""
+
+    def __init__(self, key: str, value: Any, rule: str, remedy: str) -> None:
+        self.key, self.rule, self.remedy = key, rule, remedy
+        super().__init__(f"{key.replace('_', ' ')} {value} {rule}; {remedy}")
 
 
 @dataclass(frozen=True)
@@ -48,7 +61,7 @@ class Fidelity:
 
     Raises
     ------
-    ModelError
+    ChoiceError
         If a choice means nothing, or two contradict each other.
     """
 
@@ -65,17 +78,19 @@ class Fidelity:
 
     def __post_init__(self) -> None:
         if self.orders is not None and self.orders < 1:
-            raise ModelError(f"orders {self.orders} must be at least 1; leave it out to keep all")
+            raise ChoiceError("orders", self.orders, "must be at least 1", "leave it out to keep all")
         if not self.crank_inertia > 0.0:
-            raise ModelError(f"crank inertia {self.crank_inertia:g} kg m2 must be positive")
+            raise ChoiceError("crank_inertia", self.crank_inertia, "must be positive", "give kg m2")
         if self.is_uneven and self.kinematics != "exact":
-            raise ModelError("an uneven crank speed goes with exact kinematics only; leave kinematics out")
+            rule = "goes with exact kinematics only"
+            raise ChoiceError("crank_inertia", self.crank_inertia, rule, "leave kinematics out")
         if self.modes is None:
             return
-        if len(set(self.modes)) != len(self.modes) or not all(1 <= mode <= MODES for mode in self.modes):
-            raise ModelError(f"modes {list(self.modes)} must be different numbers from 1 to {MODES}, 1 the lowest")
+        modes = list(self.modes)
         if self.mounts != "frequency":
-            raise ModelError(f"modes go with mounts in the frequency domain, not with '{self.mounts}'; leave modes out")
+            raise ChoiceError("modes", modes, "go with mounts in the frequency domain", "leave one of the two out")
+        if len(set(modes)) != len(modes) or not all(1 <= mode <= MODES for mode in modes):
+            raise ChoiceError("modes", modes, f"must be different numbers from 1 to {MODES}", "1 is the lowest mode")
 
     @property
     def is_uneven(self) -> bool:
@@ -87,29 +102,33 @@ class Fidelity:
         """Steps over the cycle at which gas torque is taken."""
         return self.samples if self.gas_samples is None else self.gas_samples
 
-    @property
-    def summary(self) -> str:
-        """The choices in words, those that are usual left out."""
-        words = [f"{self.kinematics} kinematics"]
-        if self.orders is not None:
-            words.append(f"orders to {self.orders}")
-        if self.rod == "mass-only":
-            words.append("rod of two masses")
-        if not self.gas:
-            words.append("no gas")
-        if self.is_uneven:
-            words.append(f"uneven crank speed ({self.crank_inertia:g} kg m2)")
-        if self.mounts == "rigid":
-            words.append("mounts that do not give way")
-        if self.mounts == "time":
-            words.append("mounts in the time domain")
-        if self.modes is not None:
-            words.append("modes " + ", ".join(map(str, self.modes)) if self.modes else "no mode")
-        return ", ".join(words)
+    def gas_of(self, point: OperatingPoint) -> GasModel | None:
+        """The working gas that loads the engine."""
+        return point.gas if self.gas else None
+
+    def kept(self, loads: Spectrum, least: float = 1.0) -> Spectrum:
+        """Loads without the orders that are not kept; those up to `least` are."""
+        return loads if self.orders is None else loads.kept(max(self.orders, least))
 
     def local_orders(self, ratio: float) -> int | None:
         """Last order kept in the angle of a crank of this ratio to the crankshaft."""
         return None if self.orders is None else max(1, math.ceil(self.orders / abs(ratio)))
+
+    @property
+    def summary(self) -> str:
+        """The choices in words, those that are usual left out."""
+        modes = "no mode" if not self.modes else "modes " + ", ".join(map(str, self.modes))
+        words = (
+            (True, f"{self.kinematics} kinematics"),
+            (self.orders is not None, f"orders to {self.orders}"),
+            (self.rod == "mass-only", "rod of two masses"),
+            (not self.gas, "no gas"),
+            (self.is_uneven, f"uneven crank speed ({self.crank_inertia:g} kg m2)"),
+            (self.mounts == "rigid", "mounts that do not give way"),
+            (self.mounts == "time", "mounts in the time domain"),
+            (self.modes is not None, modes),
+        )
+        return ", ".join(text for is_said, text in words if is_said)
 
 
 EXACT = Fidelity()

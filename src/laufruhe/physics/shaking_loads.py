@@ -52,7 +52,8 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
         from laufruhe.physics.uneven_speed import uneven_loads
 
         return uneven_loads(engine, point, fidelity)
-    moving = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, point.gas, fidelity)
+    gas = fidelity.gas_of(point)
+    moving = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, gas, fidelity)
     return moving + rotating_loads(engine, point.speed)
 
 
@@ -63,9 +64,9 @@ def _slider_crank_loads(
     """Pistons, rods and gas: the same for every design that differs in its rotors alone."""
     engine = Engine("pistons, rods and gas", cycle, parts)
     total = reciprocating_loads(engine, speed, fidelity) + rod_inertia_loads(engine, speed, fidelity)
-    if gas is not None and fidelity.gas:
+    if gas is not None:
         total = total + gas_loads(engine, gas, fidelity)
-    kept = _kept(total, fidelity)
+    kept = fidelity.kept(total)
     kept.coefficients.setflags(write=False)
     return kept
 
@@ -73,11 +74,6 @@ def _slider_crank_loads(
 def forget() -> None:
     """Drop the loads that are remembered, for whoever measures what they cost."""
     _slider_crank_loads.cache_clear()
-
-
-def _kept(loads: Spectrum, fidelity: Fidelity) -> Spectrum:
-    """The orders that a fidelity keeps (F1)."""
-    return loads if fidelity.orders is None else loads.kept(fidelity.orders)
 
 
 def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:

@@ -28,7 +28,8 @@ def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXAC
     Inertia [N s2, N m s2] and gas [N, N m], both of shape (n, 6).
     """
     inertia = shaking_loads(engine, replace(point, speed=1.0, gas=None), fidelity)
-    return inertia, None if point.gas is None else gas_loads(engine, point.gas, fidelity)
+    gas = fidelity.gas_of(point)
+    return inertia, None if gas is None else fidelity.kept(gas_loads(engine, gas, fidelity))
 
 
 @dataclass(frozen=True, eq=False)

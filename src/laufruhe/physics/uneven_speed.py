@@ -112,10 +112,11 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
     _, torque = _work_series(engine, point, fidelity)
     if torque is not None:
         wrench[:, 3] += torque.values(motion.angle)
-    if point.gas is not None and fidelity.gas:
-        wrench[:, 3] += _mean_torque(engine, point, fidelity)
-    loads = spectrum_of(wrench, engine.cycle.base_order)
-    return loads if fidelity.orders is None else loads.kept(max(fidelity.orders, _last_rotor_order(engine)))
+    gas = fidelity.gas_of(point)
+    if gas is not None:
+        wrench[:, 3] += gas_loads(engine, gas, fidelity).coefficients[0, 3].real
+    last_rotor = max((math.ceil(abs(rotor.shaft.ratio)) for rotor in engine.rotors), default=1)
+    return fidelity.kept(spectrum_of(wrench, engine.cycle.base_order), last_rotor)
 
 
 def uneven_rotor_loads(rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -124,21 +125,13 @@ def uneven_rotor_loads(rotors: Sequence[Rotor], engine: Engine, point: Operating
     return spectrum_of(_rotor_loads(rotors, motion), engine.cycle.base_order)
 
 
-def _last_rotor_order(engine: Engine) -> int:
-    return max((math.ceil(abs(rotor.shaft.ratio)) for rotor in engine.rotors), default=1)
-
-
-def _mean_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> float:
-    assert point.gas is not None
-    return float(gas_loads(engine, point.gas, fidelity).coefficients[0, 3].real)
-
-
 def _work_series(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum | None, Spectrum | None]:
     """Work of gas less load over the crank angle, and the torque that does it (F2)."""
-    if point.gas is None or not fidelity.gas:
+    gas = fidelity.gas_of(point)
+    if gas is None:
         return None, None
     # the roll moment of the gas is its torque (L5); the load takes the mean of it
-    torque = gas_loads(engine, point.gas, fidelity).coefficients[:, 3].copy()
+    torque = gas_loads(engine, gas, fidelity).coefficients[:, 3].copy()
     torque[0] = 0.0
     orders = np.arange(len(torque)) * float(engine.cycle.base_order)
     work = np.zeros_like(torque)

@@ -154,7 +154,7 @@ class Problem:
     @property
     def feels_gas(self) -> bool:
         """Whether gas loads what is minimised or limited: its roll moment alone, and all where it drives the speed."""
-        has_gas = self.fidelity.gas and any(point.gas is not None for point in self.points)
+        has_gas = any(self.fidelity.gas_of(point) is not None for point in self.points)
         return has_gas and (any(measure.feels_gas for measure in self.measures) or self.fidelity.is_uneven)
 
     @property

@@ -162,7 +162,7 @@ def _named(found: Trade, name: str) -> Row | None:
 
 def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
     """What a fidelity costs of the number and of the design, at worst and in the middle."""
-    rows = [row for found in trades if found.problem.objective and (row := _named(found, name)) is not None]
+    rows = [row for found in trades if found.problem.load_terms and (row := _named(found, name)) is not None]
     errors = sorted(row.error for row in rows)
     regrets = sorted(max(row.regret, 0.0) for row in rows if not math.isnan(row.regret))
     if not errors:

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
+from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, error_bound, reference
+from laufruhe.fidelity.knobs import TIME_ORDERS, TIME_SAMPLES
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.physics.fidelity import Fidelity
@@ -22,7 +24,6 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.rigid_digits import RigidPart, rigid_part
-from laufruhe.studies.trade_ladder import TIME_ORDERS, TIME_SAMPLES, ladder
 from laufruhe.studies.trade_optima import is_open, optimum
 
 Array = NDArray[np.float64]
@@ -123,7 +124,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     ModelError
         If the problem has no objective.
     """
-    if not problem.objective and not problem.mount_terms:
+    if not problem.objective:
         raise ModelError("a trade needs an objective; add [objective]")
     best = reference(problem)
     truth = objective_value(problem, best)
@@ -139,7 +140,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     say("uneven crank speed")
     return Trade(
         problem, tuple(rows), truth, least, rigid_part(problem),
-        _price_of_constant_speed(problem) if problem.objective else None, _price_of_time(problem),
+        _price_of_constant_speed(problem) if problem.load_terms else None, _price_of_time(problem),
     )  # fmt: skip
 
 
@@ -177,7 +178,7 @@ def _from_nothing(own: Problem) -> float:
 
 def _prepared_times(own: Problem) -> tuple[float, float]:
     """Seconds of another design and of its gradient; NaN where loads are not asked or not linear."""
-    if not own.objective or own.fidelity.mounts == "time":
+    if not own.load_terms or own.fidelity.mounts == "time":
         return math.nan, math.nan
     model = AffineModel(own)
     affine = model.at(model.full_samples)

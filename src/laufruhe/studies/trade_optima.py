@@ -23,7 +23,7 @@ def is_open(problem: Problem) -> bool:
 
 def is_local(problem: Problem) -> bool:
     """Whether its optimum is one of many: mounts decided for loads, searched from the design as given alone."""
-    return bool(problem.mount_decisions and problem.objective)
+    return bool(problem.mount_decisions and problem.load_terms)
 
 
 def optimum(problem: Problem, samples: int | None = None) -> Engine | None:

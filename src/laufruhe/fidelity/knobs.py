@@ -1,0 +1,314 @@
+"""Every choice of fidelity: how a file tells it, when it pays, what it costs, where it is tried (F1, F10, F13).
+
+The automatic choice, `explain`, the trade, the schema and the reader of problem files go through `KNOBS`, in that
+order, and know nothing of a choice but what its knob says. One more is a field of `physics.fidelity.Fidelity`, the line
+of physics that obeys it, and a class here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from laufruhe.errors import UncarriedLoadError
+from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale
+from laufruhe.fidelity.knob import Knob, LeftOut, Rungs, first_enough, part_left_out
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.fidelity import EXACT, Fidelity, Kinematics, MountModel, RodModel
+from laufruhe.physics.shaking_loads import WRENCH
+from laufruhe.problem.problem import Problem
+
+ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256, 384)
+SAMPLES = tuple(48 * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 20, 24, 30, 40, 60, 80, 120))
+GAS_SAMPLES = (720, 1440, 2880, REFERENCE_SAMPLES)
+PHYSICS_SHARE, GAS_SHARE, PART_SHARE = 0.5, 0.25, 0.1
+"""Shares of the tolerance that all physics, the steps of the gas, and one whole part may use."""
+TIME_ORDERS, TIME_SAMPLES = 12, 360
+"""Of a rung in the time domain: more orders cost minutes."""
+
+
+class _Kinematics(Knob):
+    key, kind = "kinematics", Kinematics
+    is_decided = False
+
+    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+        return [f"exact kinematics, {_orders(fidelity)} of pistons and rods"]
+
+    def rungs(self, scale: Scale) -> Rungs:
+        quick = Fidelity("two-order", 48, gas_samples=_gas_steps(scale.problem))
+        return [("two-order, 48 steps", quick), ("two-order, 720 steps", Fidelity("two-order", 720))]
+
+
+class _WholePart(Knob):
+    """A part of the loads that is there or not.
+
+    Attributes
+    ----------
+    less, whole
+        Fields that take it away, and that put it back.
+    """
+
+    what: ClassVar[str]
+    rung: ClassVar[str]
+    less: ClassVar[Mapping[str, Any]]
+    whole: ClassVar[Mapping[str, Any]]
+
+    def is_there(self, problem: Problem) -> bool:
+        raise NotImplementedError
+
+    def is_kept(self, problem: Problem, fidelity: Fidelity) -> bool:
+        """Whether the problem has it and a fidelity keeps it."""
+        return self.is_there(problem) and getattr(fidelity, self.key) == getattr(EXACT, self.key)
+
+    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+        # where the speed is uneven, gas and inertia drive it: they are a part of everything
+        if fidelity.is_uneven or not self.is_there(scale.problem):
+            return fidelity
+        less = replace(fidelity, **self.less)
+        return less if scale.loses(less) - scale.loses(fidelity) <= PART_SHARE * room else fidelity
+
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+        if not self.is_there(scale.problem):
+            return [LeftOut(self.what, "the problem describes none")]
+        if self.is_kept(scale.problem, fidelity):
+            return []
+        why = "the objective hardly sees its roll moment"
+        return [part_left_out(scale, fidelity, replace(fidelity, **self.whole), self.what, why)]
+
+    def rungs(self, scale: Scale) -> Rungs:
+        return [(self.rung, Fidelity(samples=720, **self.less))] if self.is_there(scale.problem) else []
+
+    def away(self, problem: Problem) -> Rungs:
+        return [(self.what, replace(problem.fidelity, **self.less))] if self.is_there(problem) else []
+
+
+class _Rod(_WholePart):
+    key, kind = "rod", RodModel
+    what, rung = "inertia of the rods beyond two masses", "exact, rod of two masses, 720 steps"
+    less: ClassVar = {"rod": "mass-only"}
+    whole: ClassVar = {"rod": "rigid"}
+
+    def is_there(self, problem: Problem) -> bool:
+        return any(part.rod_inertia_deficit != 0.0 for part in problem.engine.slider_cranks)
+
+    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+        return ["inertia of the rods beyond that of two masses"] if self.is_kept(scale.problem, fidelity) else []
+
+
+class _Gas(_WholePart):
+    key, kind = "gas", bool
+    told: ClassVar = {"description": "false leaves the working gas out."}
+    what, rung = "gas", "exact without gas, 720 steps"
+    less: ClassVar = {"gas": False}
+    whole: ClassVar = {"gas": True, "gas_samples": REFERENCE_SAMPLES}
+
+    def is_there(self, problem: Problem) -> bool:
+        return any(point.gas is not None for point in problem.points)
+
+    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+        if not self.is_kept(scale.problem, fidelity):
+            return []
+        return [f"gas, its torque taken at {fidelity.gas_steps} steps over the cycle, {_orders(fidelity)} of it"]
+
+
+class _GasSamples(Knob):
+    key, kind = "gas_samples", int
+    told: ClassVar = {"description": "Steps for the gas torque.", "ge": 48, "le": 100_000}
+
+    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+        if not GAS.is_kept(scale.problem, fidelity):
+            return replace(fidelity, gas_samples=None)
+        return first_enough(fidelity, self.key, GAS_SAMPLES, lambda f: scale.loses(f) <= GAS_SHARE * room)
+
+
+class _Orders(Knob):
+    key, kind = "orders", int
+    told: ClassVar = {"description": "Last order kept of pistons, rods and gas.", "ge": 1}
+
+    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+        if fidelity.is_uneven:
+            return fidelity
+        return first_enough(fidelity, self.key, (*ORDERS, None), lambda f: scale.loses(f) <= PHYSICS_SHARE * room)
+
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+        wrenches = [loads.wrench for loads in scale.best.loads]
+        found = []
+        idle = [name for k, name in enumerate(WRENCH) if not any(w.coefficients[:, k].any() for w in wrenches)]
+        if idle:
+            found.append(LeftOut("loads " + ", ".join(idle), "nothing drives them"))
+        last = min(float(fidelity.orders or 8), 12.0)
+        orders = [order for order in wrenches[0].orders if 0.0 < order <= last]
+        silent = [f"{order:g}" for order in orders if not any(w.at(order).any() for w in wrenches)]
+        if silent:
+            found.append(LeftOut("orders " + ", ".join(silent), "the crank star cancels them, or nothing has them"))
+        if fidelity.orders is not None:
+            what, restored = f"orders above {fidelity.orders}", replace(fidelity, orders=None)
+            found.append(part_left_out(scale, fidelity, restored, what, "their forces are small"))
+        return found
+
+    def rungs(self, scale: Scale) -> Rungs:
+        gas = _gas_steps(scale.problem)
+        return [
+            (f"orders to {orders}, {samples} steps", Fidelity(samples=samples, orders=orders, gas_samples=gas))
+            for orders, samples in ((4, 96), (8, 192), (24, 360))
+        ]
+
+    def away(self, problem: Problem) -> Rungs:
+        return [("orders above 2", replace(problem.fidelity, orders=2))]
+
+
+class _CrankInertia(Knob):
+    key, kind, unit = "crank_inertia", float, "kg m^2"
+    told: ClassVar = {"description": "Of all that turns with the crank: its speed varies within the cycle."}
+    is_decided = False
+
+    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+        return ["crank speed that varies within the cycle"] if fidelity.is_uneven else []
+
+
+class _OfElasticMounts(Knob):
+    """How a block on elastic mounts answers: only one choice of it leaves mounts to be decided."""
+
+    def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
+        if value == getattr(EXACT, self.key):
+            return None
+        if problem.engine.block is None:
+            return "is a choice of elastic mounts", 'leave it out, or add mounts of kind "elastic"'
+        if problem.mount_decisions:
+            return "would change with the mounts that are open", "leave it out, or fix the mounts"
+        return None
+
+    def is_open(self, scale: Scale) -> bool:
+        """Whether the automatic choice has one here."""
+        return scale.mounting is not None and not scale.problem.mount_decisions
+
+
+class _Mounts(_OfElasticMounts):
+    key, kind = "mounts", MountModel
+    told: ClassVar = {"description": "Elastic mounts order by order, as if they gave no way, or integrated in time."}
+
+    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+        if not self.is_open(scale):
+            return fidelity
+        rigid = replace(fidelity, mounts="rigid")
+        try:
+            lost = scale.loses(rigid)
+        except UncarriedLoadError:
+            return fidelity
+        return rigid if lost <= scale.loses(fidelity) + PART_SHARE * room else fidelity
+
+    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+        return ["mounts as if they gave no way"] if scale.mounting and fidelity.mounts == "rigid" else []
+
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+        if scale.mounting is None or fidelity.mounts != "rigid":
+            return []
+        restored = replace(fidelity, mounts="frequency")
+        return [
+            part_left_out(
+                scale, fidelity, restored, "motion of the block", "its mounts hardly give way at these orders"
+            )
+        ]
+
+    def rungs(self, scale: Scale) -> Rungs:
+        if scale.mounting is None or not scale.terms:
+            return []
+        cut, every = Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS), f"orders to {TIME_ORDERS}"
+        return [
+            ("rigid mounts, 720 steps", Fidelity(samples=720, mounts="rigid")),
+            (f"{every}, {TIME_SAMPLES} steps", cut),
+            (f"in time, {every}", replace(cut, mounts="time")),
+        ]
+
+
+class _Modes(_OfElasticMounts):
+    key, kind = "modes", list[int]
+    told: ClassVar = {"description": "Natural modes that answer, 1 the lowest."}
+
+    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+        """Without the modes that hardly answer; what an open rotor drives stays, for its answer is not known yet."""
+        if fidelity.mounts != "frequency" or not self.is_open(scale):
+            return fidelity
+        allowed = scale.loses(fidelity) + PART_SHARE * room
+        chosen, kept = fidelity, scale.excited_modes
+        for mode in sorted(set(kept) - scale.decided_modes, key=lambda mode: scale.strengths[mode]):
+            kept = tuple(m for m in kept if m != mode)
+            candidate = replace(fidelity, modes=kept)
+            if scale.loses(candidate) > allowed:
+                break
+            chosen = candidate
+        return chosen
+
+    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+        if scale.mounting is None or fidelity.mounts != "frequency":
+            return []
+        modes = scale.excited_modes if fidelity.modes is None else fidelity.modes
+        return [f"mode(s) {mode_names(scale.mounting, modes)} of the block on its mounts"]
+
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+        if scale.mounting is None:
+            return []
+        found, still = [], [mode for mode in range(1, 7) if mode not in scale.excited_modes]
+        if still:
+            found.append(LeftOut(f"mode(s) {mode_names(scale.mounting, still)} of the block", "nothing excites them"))
+        if fidelity.modes is not None:
+            silent = [mode for mode in scale.excited_modes if mode not in fidelity.modes]
+            what, every = f"mode(s) {mode_names(scale.mounting, silent)} of the block", replace(fidelity, modes=None)
+            found.append(part_left_out(scale, fidelity, every, what, "what they answer is small"))
+        return found
+
+    def rungs(self, scale: Scale) -> Rungs:
+        """The modes that answer most."""
+        if scale.mounting is None or not scale.terms:
+            return []
+        by_strength = sorted(scale.strengths, key=lambda mode: -scale.strengths[mode])
+        most = [tuple(sorted(by_strength[:count])) for count in (1, 3) if count < len(by_strength)]
+        return [(f"mode(s) {', '.join(map(str, m))}, 720 steps", Fidelity(samples=720, modes=m)) for m in most]
+
+
+class _Samples(Knob):
+    key, kind = "samples", int
+    told: ClassVar = {"description": "Steps over the working cycle.", "ge": 48, "le": 100_000}
+
+    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+        if fidelity.is_uneven:
+            return fidelity
+        lost, steps = scale.loses(fidelity), (*SAMPLES, REFERENCE_SAMPLES)
+        return first_enough(fidelity, self.key, steps, lambda f: lost + scale.misses(f) <= room)
+
+    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+        return [f"{fidelity.samples} steps over the cycle"]
+
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+        times = scale.repeats
+        again = LeftOut(f"{times - 1} of {times} parts of the cycle", "the loads repeat after each")
+        finer = replace(fidelity, samples=REFERENCE_SAMPLES, gas_samples=fidelity.gas_steps)
+        share = scale.misses(fidelity) + scale.misses(finer)
+        between = f"angles between {fidelity.samples} steps"
+        missed = LeftOut(between, "the force runs smoothly through them", share, finer)
+        return [again, missed] if times > 1 else [missed]
+
+    def rungs(self, scale: Scale) -> Rungs:
+        return [(f"exact, {samples} steps", Fidelity(samples=samples)) for samples in (720, 1440, 2880)]
+
+
+GAS = _Gas()
+KNOBS: tuple[Knob, ...] = (
+    _Kinematics(), _Rod(), GAS, _GasSamples(), _Orders(), _CrankInertia(), _Mounts(), _Modes(), _Samples(),
+)  # fmt: skip
+
+
+def mode_names(mounting: ElasticMounting, modes: Iterable[int]) -> str:
+    """Modes in words, 1 the lowest: number, motion and natural frequency."""
+    own = mounting.modes
+    return ", ".join(f"{k} ({own.names[k - 1]}, {own.frequencies[k - 1]:.3g} Hz)" for k in modes)
+
+
+def _orders(fidelity: Fidelity) -> str:
+    return "every order" if fidelity.orders is None else f"orders to {fidelity.orders}"
+
+
+def _gas_steps(problem: Problem) -> int | None:
+    """Of a rung whose own steps are too few for gas."""
+    return EXACT.samples if GAS.is_there(problem) else None
