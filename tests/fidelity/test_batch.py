@@ -25,7 +25,7 @@ COUNT = 12
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
 def test_designs_agree_with_evaluations(path: Path) -> None:
-    problem = replace(load(path), fidelity=Fidelity(samples=720))
+    problem = replace(load(path).balance, fidelity=Fidelity(samples=720))
     values = random_decisions(problem, COUNT)
     single = [objective_value(problem, evaluate(problem, problem.design(list(v)))) for v in values]
     for prune in (True, False):

@@ -78,7 +78,7 @@ def rigid_part(problem: Problem) -> RigidPart:
 
 
 def _is_covered(quantity: Measure, engine: Engine) -> bool:
-    if quantity.is_mass or quantity.orders is not None:
+    if not quantity.is_load or quantity.orders is not None:
         return False
     return quantity.channel is not channels.MOUNT_TRAVEL and (
         quantity.channel is not channels.MOUNT_FORCE or engine.block is None
