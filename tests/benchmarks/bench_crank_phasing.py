@@ -22,6 +22,7 @@ from matplotlib.figure import Figure
 from pages import PAGES, ROOT, publish, spent
 
 from laufruhe.files.reader import load
+from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns
@@ -36,8 +37,7 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.mixed_conic import solve_program
 from laufruhe.solvers.star_cuts import owners_of, search_designs, solve_design
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_search import (enumerate_stars, search_stars)
-from laufruhe.load_models.amplitudes import (AmplitudeObjective, AmplitudeTerm)
+from laufruhe.solvers.star_search import enumerate_stars, search_stars
 
 OUT = PAGES / "crank-phasing.md"
 RANKED = (

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from laufruhe.files.reader import load
+from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns, firing_lattice
 from laufruhe.machine.layouts import inline
@@ -18,8 +19,7 @@ from laufruhe.report.json_result import as_dict
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.star_search import (search_stars)
-from laufruhe.load_models.amplitudes import (AmplitudeObjective, AmplitudeTerm)
+from laufruhe.solvers.star_search import search_stars
 from phasing import engines
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
 from laufruhe.machine.layouts import inline
 from laufruhe.physics.star_space import Partial, StarSpace, outside_in
 from laufruhe.solvers import star_search
-from laufruhe.solvers.star_search import (enumerate_stars, search_stars)
-from laufruhe.load_models.amplitudes import (AmplitudeObjective, AmplitudeTerm)
+from laufruhe.solvers.star_search import enumerate_stars, search_stars
 
 NONE = (0.0,) * 4
 ORDERS = (1, 2, 3, 4)
