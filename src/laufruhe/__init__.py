@@ -11,9 +11,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from laufruhe.problem import channels
-from laufruhe.problem.measure import Term
-
 if TYPE_CHECKING:
     from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem.problem import Problem
@@ -53,7 +50,8 @@ def evaluate(design: Problem | Engine, points: Sequence[OperatingPoint] = ()) ->
     points
         Of an engine that stands in no problem.
     """
-    from laufruhe.problem.measure import Measure
+    from laufruhe.problem import channels
+    from laufruhe.problem.measure import Measure, Term
     from laufruhe.problem.problem import Problem
     from laufruhe.solvers import state
 
