@@ -17,7 +17,7 @@ from laufruhe.cli import app
 from laufruhe.errors import SolverError
 from problem_files import written
 
-ALL_FILES = {"result.json", "report.md", "polar.png", "bars.png", "spectrum.png"}
+ALL_FILES = {"result.json", "report.md", "polar.png", "cycle.png", "bars.png", "spectrum.png"}
 
 
 @pytest.fixture

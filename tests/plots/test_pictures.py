@@ -15,8 +15,8 @@ from matplotlib.text import Text
 
 from cli import scenes
 from laufruhe.plots import draw
-from laufruhe.plots.results import bars, polar, spectrum
-from laufruhe.plots.style import DPI, fitted
+from laufruhe.plots.results import bars, cycle, polar, spectrum
+from laufruhe.plots.style import AFTER, BEFORE, DPI, fitted
 from laufruhe.present.measures import mount_orders
 from laufruhe.problem.evaluation import measured, mount_samples
 from laufruhe.solvers import Result
@@ -41,17 +41,17 @@ def size_of(path: Path) -> tuple[int, int]:
 @pytest.mark.parametrize(
     ("text", "names"),
     [
-        (scenes.TIGHT, ("polar.png", "bars.png", "spectrum.png")),
-        (scenes.TWO_POINTS, ("polar.png", "bars.png", "spectrum.png")),
-        (scenes.PARTS, ("polar.png", "bars.png", "spectrum.png")),
-        (scenes.SHAKING_ONLY, ("spectrum.png",)),
+        (scenes.TIGHT, ("polar.png", "cycle.png", "bars.png", "spectrum.png")),
+        (scenes.TWO_POINTS, ("polar.png", "cycle.png", "bars.png", "spectrum.png")),
+        (scenes.PARTS, ("polar.png", "cycle.png", "bars.png", "spectrum.png")),
+        (scenes.SHAKING_ONLY, ("cycle.png", "spectrum.png")),
     ],
 )
 def test_pictures_are_whole(text: str, names: tuple[str, ...], tmp_path: Path) -> None:
     result = scenes.solved(text)
     assert draw(result, tmp_path) == names
     assert {path.name for path in tmp_path.iterdir()} == set(names)
-    makers = {"polar.png": polar.figure, "bars.png": bars.figure, "spectrum.png": spectrum.figure}
+    makers = {f"{maker.__name__.rpartition('.')[2]}.png": maker.figure for maker in (polar, cycle, bars, spectrum)}
     for name in names:
         inches = makers[name](result).get_size_inches()
         assert size_of(tmp_path / name) == tuple(int(DPI * side) for side in inches)
@@ -107,7 +107,7 @@ def test_a_spectrum_is_the_mean_amplitude() -> None:
         assert set(drawn) >= {2.0, 4.0}
 
 
-@pytest.mark.parametrize("maker", [polar.figure, bars.figure, spectrum.figure])
+@pytest.mark.parametrize("maker", [polar.figure, cycle.figure, bars.figure, spectrum.figure])
 def test_an_evaluated_design_has_one_series(maker: object) -> None:
     assert callable(maker)
     given, decided = texts(maker(scenes.stated(scenes.TIGHT))), texts(maker(scenes.solved(scenes.TIGHT)))
@@ -130,6 +130,42 @@ def test_each_operating_point_has_its_bars() -> None:
     figure = bars.figure(scenes.solved(scenes.TWO_POINTS))
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["at idle", "at rated"]
     assert "rated (largest loads of 2 points)" in texts(polar.figure(scenes.solved(scenes.TWO_POINTS)))
+
+
+def test_a_cycle_shows_loads_and_mount_forces_angle_by_angle() -> None:
+    result = scenes.solved(scenes.TIGHT)
+    axes = cycle.figure(result).axes
+    assert [one.get_ylabel() for one in axes[1:]] == [
+        "roll moment\n[N m]", "rocking couple\n[N m]", *(f"{name}\n[N]" for name in result.final.mount_names)
+    ]  # fmt: skip
+    assert any(text.get_text() == "none: balanced" for text in axes[2].texts)
+    for design, colour in ((result.initial, BEFORE), (result.final, AFTER)):
+        loads = design.loads[0]
+        assert loads.mount_forces is not None
+        for k, component in ((0, 2), (1, 3)):
+            line = next(line for line in axes[k].lines if line.get_color() == colour)
+            scale = 1e-3 if "[k" in axes[k].get_ylabel() else 1.0
+            wanted = loads.wrench.values(np.radians(line.get_xdata()))[:, component]
+            assert np.allclose(line.get_ydata(), scale * wanted, rtol=1e-12, atol=1e-9)
+        for m in range(4):
+            line = next(line for line in axes[3 + m].lines if line.get_color() == colour)
+            assert line.get_xdata()[-1] == 720.0
+            size = np.linalg.norm(loads.mount_forces.values(np.radians(line.get_xdata()))[:, m], axis=-1)
+            assert np.allclose(line.get_ydata(), size, rtol=1e-12)
+
+
+def test_a_cycle_marks_the_firings_and_has_a_column_for_each_point() -> None:
+    result = scenes.solved(scenes.TWO_POINTS)
+    axes = cycle.figure(result).axes
+    assert len(axes) == 2 * (3 + len(result.final.mount_names))
+    fired = {text.get_text(): text.xy[0] for text in axes[0].texts if text.get_text().isdigit()}
+    assert fired == pytest.approx({"1": 0.0, "3": 180.0, "4": 360.0, "2": 540.0})
+    assert [one.texts[-1].get_text() for one in axes[:2]] == ["idle", "rated"]
+    many = [replace(point, name=f"at {k}") for point in result.problem.points for k in range(3)]
+    crowded = replace(result, problem=replace(result.problem, points=tuple(many)))
+    loads = tuple(loads for loads in result.final.loads for _ in range(3))
+    crowded = replace(crowded, initial=replace(result.initial, loads=loads), final=replace(result.final, loads=loads))
+    assert "3 of 6 operating points" in texts(cycle.figure(crowded))
 
 
 def drawn_texts(figure: Figure) -> list[Text]:
@@ -166,7 +202,7 @@ def many_mounts(count: int) -> str:
     [scenes.TIGHT, scenes.TWO_POINTS, scenes.PARTS, many_mounts(3), many_mounts(7), many_mounts(20)],
     ids=["tight", "two points", "parts", "three mounts", "seven mounts", "twenty mounts"],
 )
-@pytest.mark.parametrize("maker", [polar.figure, bars.figure, spectrum.figure])
+@pytest.mark.parametrize("maker", [polar.figure, cycle.figure, bars.figure, spectrum.figure])
 def test_no_text_lies_on_another(maker: object, text: str) -> None:
     assert callable(maker)
     result = scenes.solved(text) if text in (scenes.TIGHT, scenes.TWO_POINTS, scenes.PARTS) else scenes.stated(text)
@@ -191,7 +227,7 @@ def renamed(result: Result, name: str) -> Result:
 
 @pytest.mark.parametrize("name", ["$a$ and $b", "\\frac{", "发动机", "a" * 60, "{x}", "%d"])
 def test_any_name_can_be_drawn(name: str, tmp_path: Path) -> None:
-    assert len(draw(renamed(scenes.solved(scenes.TIGHT), name), tmp_path)) == 3
+    assert len(draw(renamed(scenes.solved(scenes.TIGHT), name), tmp_path)) == 4
 
 
 def test_long_lines_are_cut() -> None:

@@ -4,6 +4,7 @@ PICTURES = {
     "star": "The best crank stars, from the front and from the side.",
     "firings": "Firing orders of the best stars over one working cycle.",
     "polar": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",
+    "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
     "spectrum": "What orders of crank speed the loads are made of.",
     "transmissibility": "Force on the elastic mounts over that on the same mounts if they gave no way.",

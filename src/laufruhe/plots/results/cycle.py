@@ -1,0 +1,178 @@
+"""Forces and moments over the crank angle of a cycle, as given and as decided."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, MultipleLocator
+from numpy.typing import NDArray
+
+from laufruhe.machine import Engine
+from laufruhe.plots.style import FAINT, INK, Series, entry, fitted, heading, page, series_of, source_line
+from laufruhe.present.measures import hardest_point
+from laufruhe.solvers.result import Result
+
+Array = NDArray[np.float64]
+
+STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6
+# width of one panel and of several side by side, height, gaps [inch]
+ALONE, BESIDE, HIGH, GAP, ACROSS = 6.8, 3.7, 1.25, 0.24, 0.6
+# from an axis to the middle of its label [inch]
+LABELS = 0.62
+# what did not change is seen under what was decided
+WIDTHS = (2.4, 1.4)
+# width of a digit of 9 points [inch]
+DIGIT = 0.085
+# smaller shares of the largest component of a row, and of all, are roundings
+SHARE, NOTHING = 1e-6, 1e-9
+LARGE = 1e4
+STYLES = ("-", (0, (4, 1.6)), (0, (1.2, 1.2)))
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one panel shows: curves by their names, each of every design, shape (designs, angles), and its ends."""
+
+    label: str
+    unit: str
+    curves: Mapping[str, Array]
+    ends: tuple[float, float]
+
+    @property
+    def words(self) -> str:
+        """What the axis is called: vertical force, where that is the only component."""
+        only = next(iter(self.curves)) if len(self.curves) == 1 else ""
+        return f"{only} {self.label.split()[-1]}" if only else self.label
+
+
+def applies(result: Result) -> bool:
+    """Every result has loads."""
+    return bool(result.problem.points)
+
+
+def figure(result: Result) -> Figure:
+    """A column an operating point; a row each for shaking force, roll moment, rocking couple, and every mount."""
+    shown, mounts, series = _points(result), _mounts(result), series_of(result, loads=True)
+    wide = ALONE if len(shown) == 1 else BESIDE
+    drawn = page(3 + len(mounts), len(shown), (wide, HIGH), gap=GAP, lead=0.12, across=ACROSS)
+    degrees = np.linspace(0.0, math.degrees(result.final.engine.cycle.angle), STEPS + 1)
+    columns = [list(_rows(series, k, mounts, np.radians(degrees))) for k in shown]
+    thousands = [max(abs(end) for row in rows for end in row.ends) >= LARGE for rows in zip(*columns, strict=True)]
+    for column, (k, rows) in enumerate(zip(shown, columns, strict=True)):
+        panels = drawn.panels[column :: len(shown)]
+        for axes, row, large in zip(panels, rows, thousands, strict=True):
+            _draw(axes, row, degrees, [one.colour for one in series], 1e-3 if large else 1.0)
+            axes.tick_params(labelbottom=axes is panels[-1], length=2)
+            if column == 0:
+                words = f"{fitted(row.words, HIGH + 0.6, 9)}\n[{'k' if large else ''}{row.unit}]"
+                axes.set_ylabel(words, parse_math=False, va="center")
+                axes.yaxis.set_label_coords(-LABELS / wide, 0.5)
+        _mark_firings(panels, result.final.engine, wide)
+        panels[-1].set_xlabel("crank angle [deg]")
+        if len(shown) > 1:
+            name = fitted(result.problem.points[k].name, wide + 0.6, 10)
+            panels[0].annotate(name, (0, 1), (0, 20), "axes fraction", "offset points", size=10, parse_math=False)
+    at = "" if len(result.problem.points) > 1 else f" at {result.problem.points[0].name}"
+    what = "Loads on the block and forces on the mounts" if mounts else "Loads on the block"
+    lines = f"{what}{at}; above, the cylinders that fire."
+    firing = entry("a cylinder fires", color=FAINT, linewidth=0.8, linestyle=STYLES[2])
+    legend = [*(one.entry() for one in series), firing]
+    source = source_line(result, _left_out(result, shown, mounts))
+    heading(drawn.figure, "Forces and moments over one working cycle", lines, legend, source)
+    return drawn.figure
+
+
+def _points(result: Result) -> list[int]:
+    """All operating points; of many the slowest, the fastest, and the one with the largest loads or one between."""
+    points = result.problem.points
+    if len(points) <= MOST_POINTS:
+        return list(range(len(points)))
+    first, *between, last = sorted(range(len(points)), key=lambda k: points[k].speed)
+    hardest = hardest_point(result)
+    return sorted({first, hardest if hardest in between else between[len(between) // 2], last})
+
+
+def _mounts(result: Result) -> list[int]:
+    """Mounts in their order; of many those with the largest forces."""
+    forces = result.final.loads[hardest_point(result)].mount_forces
+    if forces is None:
+        return []
+    size = np.abs(forces.coefficients).sum(axis=(0, 2))
+    return sorted(np.argsort(-size, kind="stable")[:MOST_MOUNTS].tolist())
+
+
+def _left_out(result: Result, shown: Sequence[int], mounts: Sequence[int]) -> str:
+    points, names = len(result.problem.points), len(result.final.mount_names)
+    some = f"{len(shown)} of {points} operating points. " if len(shown) < points else ""
+    return some + (f"The {len(mounts)} most loaded of {names} mounts. " if len(mounts) < names else "")
+
+
+def _rows(series: Sequence[Series], k: int, mounts: Sequence[int], angles: Array) -> Iterator[Row]:
+    """Shaking force and moments about the origin (C2, C7), and the magnitude of every mount's force."""
+    loads = [one.design.loads[k] for one in series]
+    x, y, z, roll, pitch, yaw = np.moveaxis(np.stack([load.wrench.values(angles) for load in loads]), -1, 0)
+    nothing = NOTHING * max(float(np.abs(load.wrench.coefficients).max(initial=0.0)) for load in loads)
+    yield _row("shaking force", "N", {"vertical": z, "lateral": y, "longitudinal": x}, nothing)
+    yield _row("roll moment", "N m", {"": roll}, nothing)
+    yield _row("rocking couple", "N m", {"pitch": pitch, "yaw": yaw}, nothing)
+    forces = [load.mount_forces.values(angles) for load in loads if load.mount_forces is not None]
+    sizes = [np.linalg.norm(np.stack([force[:, m] for force in forces]), axis=-1) for m in mounts]
+    # mounts are compared: one scale serves them all
+    top = max((float(size.max()) for size in sizes), default=0.0)
+    for m, size in zip(mounts, sizes, strict=True):
+        yield Row(series[0].design.mount_names[m], "N", {"": size}, (0.0, top))
+
+
+def _row(label: str, unit: str, curves: Mapping[str, Array], nothing: float) -> Row:
+    size = {name: float(np.abs(curve).max()) for name, curve in curves.items()}
+    least = max(SHARE * max(size.values()), nothing)
+    felt = {name: curve for name, curve in curves.items() if size[name] > least}
+    ends = [float(end) for curve in felt.values() for end in (curve.min(), curve.max())]
+    return Row(label, unit, felt, (min(ends, default=0.0), max(ends, default=0.0)))
+
+
+def _draw(axes: Axes, row: Row, degrees: Array, colours: Sequence[str], factor: float) -> None:
+    for (name, designs), style in zip(row.curves.items(), STYLES, strict=False):
+        for curve, colour, width in zip(designs, colours, WIDTHS[-len(colours) :], strict=True):
+            axes.plot(degrees, factor * curve, color=colour, linestyle=style, linewidth=width)
+        axes.plot([], [], color=INK, linestyle=style, linewidth=WIDTHS[-1], label=name)
+    several = len(row.curves) > 1
+    if several:
+        look: Any = {"facecolor": "white", "edgecolor": "none", "framealpha": 0.85, "fontsize": 9}
+        axes.legend(loc="upper right", ncols=3, borderaxespad=0.0, borderpad=0.1, **look)
+    low, high = (factor * end for end in row.ends)
+    room = 0.06 * (high - low) or 1.0
+    axes.set(xlim=(0.0, degrees[-1]), ylim=(low - room if low else 0.0, high + (6.0 if several else 1.0) * room))
+    axes.xaxis.set_major_locator(MultipleLocator(90.0))
+    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
+    axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
+    if not row.curves:
+        axes.set_yticks([])
+        axes.text(0.5, 0.5, "none: balanced", transform=axes.transAxes, ha="center", va="center", color=FAINT)
+
+
+def _firings(engine: Engine) -> dict[float, list[int]]:
+    """Numbers of the cylinders that fire, by the crank angle [deg]."""
+    whole, found = math.degrees(engine.cycle.angle), dict[float, list[int]]()
+    for number, part in enumerate(engine.cylinders, 1):
+        found.setdefault(round(math.degrees(part.firing_angle), 6) % whole, []).append(number)
+    return found
+
+
+def _mark_firings(panels: Sequence[Axes], engine: Engine, wide: float) -> None:
+    """A line at every firing; above the first panel the cylinders, where there is room for their numbers."""
+    firings = _firings(engine)
+    for axes in panels:
+        for angle in firings:
+            axes.axvline(angle, color=FAINT, linewidth=0.8, linestyle=STYLES[2], zorder=0.6)
+    texts = {angle: ",".join(map(str, numbers)) for angle, numbers in firings.items()}
+    if sum(len(text) + 1 for text in texts.values()) * DIGIT <= wide:
+        for angle, text in texts.items():
+            place: Any = {"textcoords": "offset points", "xycoords": panels[0].get_xaxis_transform()}
+            panels[0].annotate(text, (angle, 1.0), (0, 3), ha="center", size=9, color=FAINT, **place)
