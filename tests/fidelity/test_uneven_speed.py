@@ -14,7 +14,8 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine import kinematics as slider_crank
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.shaking_loads import gas_torque, shaking_loads
+from laufruhe.physics.gas_loads import gas_torque
+from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.uneven_speed import crank_motion
 
 POINT = OperatingPoint("rated", tractor.SPEED, tractor.GAS)

@@ -33,10 +33,10 @@ from laufruhe.machine import (
 )
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.numerics.turns import as_turn, cis
+from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.shaking_loads import (
     EXACT,
     Fidelity,
-    gas_loads,
     reciprocating_loads,
     rod_inertia_loads,
     rotating_loads,

@@ -20,8 +20,9 @@ from laufruhe.machine.layouts import Mechanism, boxer, build, inline, vee
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError, elastic_mounting
+from laufruhe.physics.gas_loads import gas_torque
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
-from laufruhe.physics.shaking_loads import gas_torque, reciprocating_loads, shaking_loads
+from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.solvers import solve

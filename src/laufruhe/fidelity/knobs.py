@@ -16,7 +16,7 @@ from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale
 from laufruhe.fidelity.knob import Knob, LeftOut, Rungs, first_enough, part_left_out
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity, Kinematics, MountModel, RodModel
-from laufruhe.physics.shaking_loads import WRENCH
+from laufruhe.physics.wrench import WRENCH
 from laufruhe.problem.problem import Problem
 
 ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256, 384)

@@ -9,14 +9,12 @@ from typing import Any
 
 from laufruhe import units
 from laufruhe.files.complaints import Refused, blamed_on, nearest
+from laufruhe.files.engine_table import EngineTable, RodTable, SliderCrankTable
 from laufruhe.files.fields import Open
 from laufruhe.files.file_models import (
-    EngineTable,
     OperatingPointTable,
     ProblemFile,
-    RodTable,
     SeiligerTable,
-    SliderCrankTable,
     TraceTable,
     WiebeTable,
 )

@@ -10,8 +10,9 @@ from dataclasses import replace
 from laufruhe import units
 from laufruhe.files.assemble_engine import cycle_of, layout_of
 from laufruhe.files.complaints import Refused
+from laufruhe.files.engine_table import EngineTable
 from laufruhe.files.fields import Open
-from laufruhe.files.file_models import BalancerShaftTable, EngineTable, PhasingTable, ProblemFile
+from laufruhe.files.file_models import BalancerShaftTable, PhasingTable, ProblemFile
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import (
     MOST_ORDERS,

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from laufruhe.files.file_models import Name, Table
+from laufruhe.files.fields import Name, Table
 
 Value: TypeAlias = bool | int | float | str
 

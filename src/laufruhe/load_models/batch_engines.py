@@ -18,8 +18,9 @@ from laufruhe.numerics.batch_norms import CACHE_BYTES, BatchNorm
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import order_coefficients
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.mount_forces import rigid_mounting
-from laufruhe.physics.shaking_loads import gas_loads, rotor_loads, unit_star_load
+from laufruhe.physics.shaking_loads import rotor_loads, unit_star_load
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure, load_rows
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from laufruhe.machine import GasModel, OperatingPoint, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.shaking_loads import gas_coefficients
+from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.problem.problem import Problem
 
 LEFT_OUT = 1e-2

@@ -14,7 +14,7 @@ from laufruhe.machine import Mount
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.rigid_body import point_motion
-from laufruhe.physics.shaking_loads import WRENCH
+from laufruhe.physics.wrench import WRENCH
 
 FREE_STRETCH = 1e-10
 UNCARRIED_SHARE = 1e-9

@@ -11,19 +11,18 @@ from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank
-from laufruhe.numerics.spectrum import Spectrum, as_order, spectrum_of
-from laufruhe.numerics.turns import Turn, as_turn, cancelling_sum, cis, star_sum
+from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
+from laufruhe.numerics.spectrum import Spectrum, as_order
+from laufruhe.numerics.turns import as_turn, cancelling_sum, cis, star_sum
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import cylinder_pressure
+from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.mechanism import Direction, Effect, mass_effects, rod_effects
-
-WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+from laufruhe.physics.uneven_speed import uneven_loads, uneven_rotor_loads
+from laufruhe.physics.wrench import ROLL, plane_wrench
 
 
 def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -48,9 +47,6 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
         If the gas model cannot be met, or a gas-loaded cylinder has no bore.
     """
     if fidelity.is_uneven:
-        # late, for it builds on this file
-        from laufruhe.physics.uneven_speed import uneven_loads
-
         return uneven_loads(engine, point, fidelity)
     gas = fidelity.gas_of(point)
     moving = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, gas, fidelity)
@@ -127,8 +123,6 @@ def added_rotor_loads(
 ) -> Spectrum:
     """Loads that rotors alone would add to an engine at an operating point, at even or uneven speed (L1, F5)."""
     if fidelity.is_uneven:
-        from laufruhe.physics.uneven_speed import uneven_rotor_loads
-
         return uneven_rotor_loads(rotors, engine, point, fidelity)
     return rotor_loads(rotors, point.speed, engine.cycle)
 
@@ -142,56 +136,10 @@ def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
     return np.asarray((shaft.ratio * speed) ** 2 * plane_wrench(lateral, vertical, rotor.x, shaft))
 
 
-def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Roll moment of the gas, the reaction to its crank torque (L5; eq. 1). No net force."""
-    turns = engine.cycle.turns
-    # equal mechanisms differ only in when they fire
-    alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
-    for part in engine.slider_cranks:
-        alike[part.path, part.bore, part.shaft.ratio].append(part)
-    total = Spectrum(engine.cycle.base_order, np.zeros((1, 6), dtype=complex))
-    for parts in alike.values():
-        torque = gas_coefficients(gas, parts[0], engine.cycle, fidelity)
-        delays: list[Turn] = [-as_turn(part.firing_angle) / turns for part in parts]
-        multiples = np.arange(len(torque.coefficients))
-        star = star_sum(np.tile(_ROLL, (len(parts), 1)), delays, multiples)
-        total = total + Spectrum(engine.cycle.base_order, torque.coefficients[:, None] * star)
-    return total
-
-
-def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Roll moment of one cylinder's gas [N m] by order, from its firing dead centre on (L5), shape (n,).
-
-    A cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
-    """
-    return spectrum_of(gas_torque(gas, part, cycle, fidelity.gas_steps), cycle.base_order)
-
-
-def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:
-    """Torque of one cylinder's gas on the engine's output, -n A (p - p_crankcase) ds/dalpha (L5).
-
-    Returns
-    -------
-    Shape (samples,) [N m], at equal steps over the cycle from the firing dead centre.
-    """
-    pressure = cylinder_pressure(gas, part, cycle, samples) - gas.crankcase_pressure
-    alpha = part.fires_at + part.shaft.ratio * cycle.angle * np.arange(samples) / samples
-    return np.asarray(-part.shaft.ratio * part.piston_area * pressure * part.velocity(np, alpha))
-
-
-_ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
-
-
-def plane_wrench(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> NDArray[Any]:
-    """Wrench of a force in the plane at x through a shaft's axis, shape (6, ...) of forces (...) (C2)."""
-    roll = shaft.y * vertical - shaft.z * lateral
-    return np.array([lateral - lateral, lateral, vertical, roll, -x * vertical, x * lateral])
-
-
 def _weight(part: SliderCrank, direction: Direction) -> NDArray[np.float64]:
     """Wrench of a unit load of a cylinder: a force along its axis or across it, or a roll moment."""
     if direction is Direction.ROLL:
-        return _ROLL
+        return ROLL
     axis = cis(as_turn(part.bank)) * (1j if direction is Direction.TRANSVERSE else 1.0)
     return plane_wrench(axis.imag, axis.real, part.x, part.shaft).real
 

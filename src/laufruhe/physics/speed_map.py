@@ -13,8 +13,9 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.mount_forces import rigid_mounting
-from laufruhe.physics.shaking_loads import gas_loads, shaking_loads
+from laufruhe.physics.shaking_loads import shaking_loads
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

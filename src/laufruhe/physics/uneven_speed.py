@@ -20,8 +20,9 @@ from laufruhe.machine import Engine, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.mechanism import momentum_loads
-from laufruhe.physics.shaking_loads import gas_loads, plane_wrench
+from laufruhe.physics.wrench import plane_wrench
 
 Array = NDArray[np.float64]
 

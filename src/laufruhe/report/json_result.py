@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.physics.shaking_loads import WRENCH
+from laufruhe.physics.wrench import WRENCH
 from laufruhe.present.measures import PRESENT, is_met, limits_of, mount_orders, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.problem.evaluation import Evaluation, measured

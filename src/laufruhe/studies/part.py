@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import Field
 
-from laufruhe.files.file_models import Table
+from laufruhe.files.fields import Table
 from laufruhe.files.study_parts import CaseTable
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes

@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError
 
 from laufruhe.errors import Complaint, InputError
 from laufruhe.files.complaints import Refused, complaints_of
-from laufruhe.files.file_models import Table
+from laufruhe.files.fields import Table
 from laufruhe.files.reader import tables_of
 from laufruhe.files.study_sweeps import axis_of
 from laufruhe.studies.kinds import KINDS

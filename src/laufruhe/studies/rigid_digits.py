@@ -18,9 +18,10 @@ from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import spectrum_of
 from laufruhe.numerics.turns import Turn, as_turn
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.gas_loads import gas_torque
 from laufruhe.physics.mechanism import momentum_loads
 from laufruhe.physics.rigid_body import point_motion
-from laufruhe.physics.shaking_loads import gas_torque, plane_wrench
+from laufruhe.physics.wrench import plane_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import evaluate

@@ -3,23 +3,13 @@
 Cylinders are counted from the front (C3).
 """
 
-from laufruhe.machine.layouts.base import (
-    Asked,
-    Key,
-    Layout,
-    LayoutKind,
-    Mechanism,
-    Throw,
-    build,
-    even_throws,
-    firing_angles,
-    stations,
-    throw_rotors,
-)
+from laufruhe.machine.layouts.base import Asked, Key, LayoutKind
 from laufruhe.machine.layouts.boxer import Boxer, boxer
+from laufruhe.machine.layouts.build import Mechanism, Throw, build, even_throws, firing_angles, throw_rotors
 from laufruhe.machine.layouts.inline import Inline, inline
 from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_pistons
 from laufruhe.machine.layouts.parts import Parts
+from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.layouts.vee import Vee, vee
 
 LAYOUTS: dict[str, LayoutKind] = {

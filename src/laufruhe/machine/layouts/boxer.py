@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from laufruhe.errors import KeyedError
-from laufruhe.machine.layouts.base import SPACING, Asked, Layout, LayoutKind, check_even, stations
+from laufruhe.machine.layouts.base import SPACING, Asked, LayoutKind
+from laufruhe.machine.layouts.places import Layout, check_even, stations
 from laufruhe.machine.layouts.vee import STAGGER
 
 

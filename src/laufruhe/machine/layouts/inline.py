@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from laufruhe.machine.layouts.base import Asked, Layout, LayoutKind, stations
+from laufruhe.machine.layouts.base import Asked, LayoutKind
+from laufruhe.machine.layouts.places import Layout, stations
 
 
 def inline(cylinders: int, spacing: float) -> Layout:

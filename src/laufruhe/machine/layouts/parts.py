@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.layouts.base import Asked, Layout, LayoutKind
+from laufruhe.machine.layouts.base import Asked, LayoutKind
+from laufruhe.machine.layouts.places import Layout
 
 
 class Parts(LayoutKind):

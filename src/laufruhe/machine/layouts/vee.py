@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from laufruhe.errors import KeyedError
-from laufruhe.machine.layouts.base import SPACING, Asked, Key, Layout, LayoutKind, check_even, stations
+from laufruhe.machine.layouts.base import SPACING, Asked, Key, LayoutKind
+from laufruhe.machine.layouts.places import Layout, check_even, stations
 
 STAGGER = Key("bank_stagger", "length")
 

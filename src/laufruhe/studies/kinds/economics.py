@@ -14,7 +14,7 @@ from pydantic import Field, field_validator, model_validator
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import nearest
-from laufruhe.files.file_models import Name, Table
+from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_parts import CaseTable
 from laufruhe.present.numbers import percent
 from laufruhe.problem.problem import Problem

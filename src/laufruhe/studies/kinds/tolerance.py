@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from laufruhe.files import fields as f
-from laufruhe.files.file_models import Name, Table
+from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_parts import CaseTable
 from laufruhe.physics.modes import GRAVITY
 from laufruhe.present.numbers import percent

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.mount_forces import rigid_mounting
-from laufruhe.physics.shaking_loads import gas_loads, reciprocating_loads, rod_inertia_loads
+from laufruhe.physics.shaking_loads import reciprocating_loads, rod_inertia_loads
 from laufruhe.problem.decision import Decision, Interval, RotorDrive
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor.designs import ASSUMED, given, optimum

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from laufruhe.machine import Cycle, Engine, GasModel, Seiliger
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.gas_loads import gas_torque
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.order_coefficients import inertia_roll_orders
 from laufruhe.physics.seiliger_cycle import compression_end_pressure, motored_cycle, seiliger_imep
-from laufruhe.physics.shaking_loads import gas_torque, rotor_loads, shaking_loads
+from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
 from laufruhe.studies.tractor import engines as study
 from laufruhe.studies.tractor import shafts
 

@@ -1,0 +1,219 @@
+"""Slider-cranks and throws at the places of a layout."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.engine import Cycle
+from laufruhe.machine.layouts.places import Layout
+from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
+from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.numerics.turns import SAME_TURN, Turn, angle_of, as_turn, cis, within
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """What all cylinders of an engine share.
+
+    Attributes
+    ----------
+    crank_radius, rod_length, offset, bore
+        [m]; see `SliderCrank`.
+    reciprocating_mass
+        Per cylinder [kg].
+    rotating_mass
+        Per throw, at the crank radius [kg].
+    rod_rotating_mass
+        The rod's share per cylinder [kg].
+    rod_inertia_deficit
+        [kg m2] (eq. 10).
+    """
+
+    crank_radius: float
+    rod_length: float
+    reciprocating_mass: float
+    rotating_mass: float = 0.0
+    rod_rotating_mass: float = 0.0
+    rod_inertia_deficit: float = 0.0
+    offset: float = 0.0
+    bore: float | None = None
+
+    def cylinder(
+        self,
+        number: int,
+        x: float,
+        throw: float,
+        bank: float,
+        firing_angle: float,
+        pin_mass: float = 0.0,
+        shaft: Shaft = CRANKSHAFT,
+    ) -> SliderCrank:
+        """One cylinder of an engine.
+
+        Parameters
+        ----------
+        number
+            Of the cylinder (C3).
+        x, throw, bank, firing_angle, shaft
+            Place [m] and angles [rad]; see `SliderCrank`.
+        pin_mass
+            What turns at the crank pin beside the rod's share [kg].
+        """
+        return SliderCrank(
+            name=f"cylinder {number}",
+            x=x,
+            crank_radius=self.crank_radius,
+            rod_length=self.rod_length,
+            reciprocating_mass=self.reciprocating_mass,
+            throw=throw,
+            bank=bank,
+            offset=self.offset,
+            rotating_mass=pin_mass + self.rod_rotating_mass,
+            rod_inertia_deficit=self.rod_inertia_deficit,
+            bore=self.bore,
+            firing_angle=firing_angle,
+            shaft=shaft,
+        )
+
+
+def firing_angles(
+    cycle: Cycle, layout: Layout, throws: Sequence[float], firing_order: Sequence[int]
+) -> tuple[float, ...]:
+    """Crank angle at which every cylinder fires [rad], each at the first dead centre after the one before.
+
+    Raises
+    ------
+    ModelError
+        If these throws cannot fire in this order within one cycle.
+    """
+    previous: Turn = Fraction(-1)
+    angles = [0.0] * len(layout.positions)
+    start: Turn | None = None
+    for number in firing_order:
+        k = number - 1
+        centre = within(layout.dead_centre(throws, k), 1)
+        while centre <= previous + SAME_TURN:
+            centre += 1
+        start = centre if start is None else start
+        if centre >= start + cycle.turns - SAME_TURN:
+            raise ModelError(
+                f"throws {[round(math.degrees(t), 3) for t in throws]} deg cannot fire in the order "
+                f"{list(firing_order)} within {cycle.turns} turn(s): cylinder {number} would come after "
+                f"{math.degrees(angle_of(centre)):.6g} deg"
+            )
+        angles[k] = angle_of(centre)
+        previous = centre
+    return tuple(angles)
+
+
+def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tuple[float, ...]:
+    """Angles of the throws that fire evenly in this order, from cylinder 1's dead centre at phi = 0.
+
+    Raises
+    ------
+    ModelError
+        If cylinders on one throw ask for two different angles.
+    """
+    step = Fraction(cycle.turns, len(firing_order))
+    asked: dict[int, Turn] = {}
+    for place, number in enumerate(firing_order):
+        k = number - 1
+        turn = (layout.own_turn(k) - place * step) % 1
+        first = asked.setdefault(layout.pins[k], turn)
+        if abs(math.remainder(float(first - turn), 1.0)) > SAME_TURN:
+            raise ModelError(
+                f"firing order {list(firing_order)} cannot be even with these pins and banks: cylinder {number} "
+                f"wants its throw at {math.degrees(angle_of(turn)):.6g} deg, another on it at "
+                f"{math.degrees(angle_of(first)):.6g} deg; give the throws"
+            )
+    return tuple(angle_of(asked[pin]) for pin in range(len(layout.throw_positions)))
+
+
+@dataclass(frozen=True)
+class Throw:
+    """One throw of the crankshaft.
+
+    Attributes
+    ----------
+    x
+        Place along the crank axis [m].
+    angle
+        At phi = 0 [rad] (C3).
+    cylinders
+        Indices of the slider-cranks that work on it.
+    unbalance
+        Of its rotating mass, rods not included [kg m].
+    """
+
+    x: float
+    angle: float
+    cylinders: tuple[int, ...]
+    unbalance: complex = 0.0
+
+
+def throw_rotors(throws: Sequence[Throw]) -> tuple[Rotor, ...]:
+    """The rotating masses of the throws."""
+    return tuple(
+        Rotor(f"throw {k + 1}", throw.x, throw.unbalance, role=Role.THROW)
+        for k, throw in enumerate(throws)
+        if throw.unbalance != 0.0
+    )
+
+
+def build(
+    cycle: Cycle,
+    layout: Layout,
+    mechanism: Mechanism,
+    angles: Sequence[float],
+    firing_order: Sequence[int] | None = None,
+) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
+    """Slider-cranks and the throws that they work on.
+
+    Parameters
+    ----------
+    angles
+        Angle of every throw when phi = 0 [rad] (C3).
+    firing_order
+        Cylinder numbers; without it every cylinder is taken to fire at its first dead
+        centre, which matters to gas loads alone.
+
+    Raises
+    ------
+    ModelError
+        If the order cannot be met by the throws.
+    """
+    if len(angles) != len(layout.throw_positions):
+        raise ModelError(f"{len(angles)} throw(s) given where the layout has {len(layout.throw_positions)}")
+    cylinders = range(len(layout.positions))
+    fires = (
+        firing_angles(cycle, layout, angles, firing_order)
+        if firing_order
+        else tuple(angle_of(within(layout.dead_centre(angles, k), 1)) for k in cylinders)
+    )
+    slider_cranks = tuple(
+        mechanism.cylinder(
+            k + 1,
+            layout.positions[k],
+            angles[layout.pins[k]] + layout.pin_offsets[k],
+            layout.banks[k],
+            fires[k],
+        )
+        for k in cylinders
+    )
+    return slider_cranks, _throws_of(layout, mechanism, angles)
+
+
+def _throws_of(layout: Layout, mechanism: Mechanism, angles: Sequence[float]) -> tuple[Throw, ...]:
+    return tuple(
+        Throw(
+            x,
+            angles[pin],
+            tuple(k for k, own in enumerate(layout.pins) if own == pin),
+            mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angles[pin])),
+        )
+        for pin, x in enumerate(layout.throw_positions)
+    )

@@ -1,0 +1,19 @@
+"""Wrenches (Fx, Fy, Fz, Mx, My, Mz) about the origin of C2."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Shaft
+
+WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+
+
+def plane_wrench(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> NDArray[Any]:
+    """Wrench of a force in the plane at x through a shaft's axis, shape (6, ...) of forces (...) (C2)."""
+    roll = shaft.y * vertical - shaft.z * lateral
+    return np.array([lateral - lateral, lateral, vertical, roll, -x * vertical, x * lateral])
