@@ -10,6 +10,7 @@ from laufruhe.machine.layouts.inline import Inline, inline
 from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_pistons
 from laufruhe.machine.layouts.parts import Parts
 from laufruhe.machine.layouts.places import Layout, stations
+from laufruhe.machine.layouts.radial import Radial
 from laufruhe.machine.layouts.vee import Vee, vee
 
 LAYOUTS: dict[str, LayoutKind] = {
@@ -19,6 +20,7 @@ LAYOUTS: dict[str, LayoutKind] = {
         Vee(),
         Boxer(),
         OpposedPiston(),
+        Radial(),
         Parts(),
     )
 }

@@ -1,0 +1,165 @@
+"""A piston on a rod that is hinged to the master rod of another cylinder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import kinematics
+from laufruhe.machine.slider_crank import Motion, SliderCrank
+
+_ROUNDS = 60
+_STEPS = 720
+
+
+@dataclass(frozen=True)
+class Knuckle:
+    """A pin on a master rod.
+
+    Attributes
+    ----------
+    master
+        The cylinder whose rod it is.
+    radius
+        From the crank pin [m].
+    angle
+        From the line of the master rod's pins, positive as the crank turns [rad].
+    """
+
+    master: SliderCrank
+    radius: float
+    angle: float
+
+    def motion(self, lib: Any, alpha: Any, bank: float) -> tuple[Any, Any, Any]:
+        """Place with first and second derivative, in the plane of a cylinder at `bank` and its angle alpha (K11)."""
+        zero, lead = 0.0 * alpha, bank - self.master.bank
+        radius = zero + self.master.crank_radius
+        length = zero + self.master.rod_length
+        shape = (lib, alpha + lead, radius / length, self.master.offset / length)
+        rod = kinematics.cos_psi(*shape) - 1j * kinematics.sin_psi(*shape)
+        rate, swing = -kinematics.rod_rate(*shape), -kinematics.rod_acceleration(*shape)
+        turn = zero + (self.angle - lead)
+        arm = self.radius * rod * (lib.cos(turn) + 1j * lib.sin(turn))
+        pin = radius * (lib.cos(alpha) + 1j * lib.sin(alpha))
+        return pin + arm, 1j * (pin + rate * arm), (1j * swing - rate * rate) * arm - pin
+
+    def length_to(self, reach: complex, bank: float) -> float:
+        """Length of a rod whose piston pin comes as far as `reach` on its axis and no farther (K13)."""
+
+        def slope(alpha: float) -> tuple[float, float]:
+            place, velocity, acceleration = self.motion(np, alpha, bank)
+            way = (place - reach).conjugate()
+            return float((way * velocity).real), float(abs(velocity) ** 2 + (way * acceleration).real)
+
+        place, _, _ = self.motion(np, _root(slope, 0.0), bank)
+        return float(abs(reach - place))
+
+    def scaled(self, length: float, mass: float) -> Knuckle:
+        """The same in another size."""
+        return Knuckle(self.master.scaled(length, mass), self.radius * length, self.angle)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArticulatedCrank(SliderCrank):
+    """A cylinder whose rod works on a knuckle pin; `rotating_mass` is the rod's share there."""
+
+    knuckle: Knuckle
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        place, _, _ = self.knuckle.motion(np, np.arange(_STEPS) * (math.tau / _STEPS), self.bank)
+        leaning = float(np.abs(place.imag - self.offset).max()) / self.rod_length
+        if leaning >= 1.0:
+            raise ModelError(
+                f"{self.name}: its knuckle pin leaves the axis by {leaning:.4g} rod lengths; lengthen the rod"
+            )
+
+    @property
+    def path(self) -> Hashable:
+        """What the piston's path depends on, besides the angle of the crank."""
+        master = self.knuckle.master
+        own = (self.knuckle.radius, self.knuckle.angle, self.bank - master.bank)
+        return (*super().path, *own, master.path)  # type: ignore[misc]
+
+    @property
+    def fires_at(self) -> float:
+        """The true dead centre."""
+        return self.dead_centres[0]
+
+    @cached_property
+    def dead_centres(self) -> tuple[float, float]:
+        """Where the piston stands, by Newton (K13)."""
+
+        def slope(alpha: float) -> tuple[float, float]:
+            _, velocity, acceleration = self._piston(np, alpha)[0]
+            return float(velocity), float(acceleration)
+
+        return _root(slope, 0.0), _root(slope, math.pi)
+
+    @property
+    def stroke(self) -> float:
+        """Distance between the dead centres [m], a little off that of the master."""
+        top, bottom = self.dead_centres
+        return float(self.travel(np, bottom) - self.travel(np, top))
+
+    def travel(self, lib: Any, alpha: Any) -> Any:
+        """Way of the piston towards the crank from alpha = 0 [m]."""
+        return self._piston(lib, 0.0 * alpha)[0][0] - self._piston(lib, alpha)[0][0]
+
+    def velocity(self, lib: Any, alpha: Any) -> Any:
+        """Velocity of the piston away from the crank, by the angle of its crank [m]."""
+        return self._piston(lib, alpha)[0][1]
+
+    def _piston(self, lib: Any, alpha: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any]]:
+        """Piston along its axis with first and second derivative, and the rod's turning (K12)."""
+        place, velocity, acceleration = self.knuckle.motion(lib, alpha, self.bank)
+        length = 0.0 * alpha + self.rod_length
+        sine = (place.imag - self.offset) / length
+        cosine = lib.sqrt((1.0 - sine) * (1.0 + sine))
+        rate = velocity.imag / (length * cosine)
+        swing = (acceleration.imag / length + rate * rate * sine) / cosine
+        return (
+            place.real + length * cosine,
+            velocity.real - length * rate * sine,
+            acceleration.real - length * (swing * sine + rate * rate * cosine),
+        ), (-rate, -swing)
+
+    def motion(self, lib: Any, alpha: Any) -> Motion:
+        """Piston, rod and knuckle pin, less what is counted at the crank pin."""
+        (place, velocity, acceleration), rod = self._piston(lib, alpha)
+        radius = 0.0 * alpha + self.crank_radius
+        pin = radius * (lib.cos(alpha) + 1j * lib.sin(alpha))
+        return Motion(
+            (
+                (self.reciprocating_mass, (place + 1j * self.offset, velocity, acceleration)),
+                (self.rotating_mass, self.knuckle.motion(lib, alpha, self.bank)),
+                (-self.rotating_mass, (pin, 1j * pin, -pin)),
+            ),
+            ((self.rod_inertia_deficit, rod),),
+        )
+
+    def scaled(self, length: float, mass: float) -> Self:
+        """The same mechanism in another size."""
+        return replace(super().scaled(length, mass), knuckle=self.knuckle.scaled(length, mass))
+
+
+def _root(slope: Callable[[float], tuple[float, float]], start: float) -> float:
+    """Where a function given with its derivative is zero, by Newton."""
+    angle = start
+    for _ in range(_ROUNDS):
+        value, derivative = slope(angle)
+        step = value / derivative if derivative else math.inf
+        if not abs(step) < 1.0:
+            break
+        angle -= step
+        if abs(step) <= 1e-14:
+            return angle
+    if abs(slope(angle)[0]) > 1e-12 * abs(slope(angle)[1]):
+        raise ModelError(f"no dead centre is found near {math.degrees(start):g} deg; lengthen the rods")
+    return angle

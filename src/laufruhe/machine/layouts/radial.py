@@ -1,0 +1,175 @@
+"""One row of cylinders around one crank pin: a master rod carries the others on knuckle pins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+from laufruhe import units
+from laufruhe.errors import KeyedError, ModelError
+from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
+from laufruhe.machine.layouts.base import Asked, Key, LayoutKind
+from laufruhe.machine.layouts.build import Mechanism, Throw, build
+from laufruhe.machine.layouts.places import Layout
+from laufruhe.machine.rotor import CRANKSHAFT, Shaft
+from laufruhe.machine.slider_crank import Rod, SliderCrank
+
+
+@dataclass(frozen=True, kw_only=True)
+class MasterRod(Mechanism):
+    """What the cylinders of a radial share, and the articulated rods.
+
+    Attributes
+    ----------
+    master
+        Number of the cylinder on the master rod.
+    master_bank
+        Its bank angle [rad].
+    knuckle_radius
+        [m]; 0 puts all rods on the crank pin.
+    knuckle_angles
+        Of every cylinder's knuckle pin from the master rod [rad], that of the master not used.
+    length
+        Of the articulated rods [m]; without one every piston comes as high as the master's.
+    piston_mass
+        Without any rod's share [kg], where `rod` is given.
+    knuckle_mass
+        At every knuckle pin, beside the rod's share [kg].
+    rod
+        Mass, centre of gravity from the knuckle pin and inertia of an articulated rod.
+    """
+
+    master: int
+    master_bank: float
+    knuckle_radius: float
+    knuckle_angles: tuple[float, ...]
+    length: float | None
+    piston_mass: float
+    knuckle_mass: float
+    rod: Mapping[str, float] | None
+
+    def cylinder(
+        self,
+        number: int,
+        x: float,
+        throw: float,
+        bank: float,
+        firing_angle: float,
+        pin_mass: float = 0.0,
+        shaft: Shaft = CRANKSHAFT,
+    ) -> SliderCrank:
+        """The master's slider-crank, or an articulated one."""
+        if number == self.master:
+            return super().cylinder(number, x, throw, bank, firing_angle, pin_mass, shaft)
+        knuckle = self._knuckle(number)
+        length = self.length or knuckle.length_to(_top(knuckle.master), bank)
+        rod = None if self.rod is None else _rod(length, self.rod)
+        plain = replace(
+            super().cylinder(number, x, throw, bank, firing_angle, shaft=shaft),
+            rod_length=length,
+            reciprocating_mass=self.reciprocating_mass if rod is None else self.piston_mass + rod.reciprocating_mass,
+            rotating_mass=self.knuckle_mass + (0.0 if rod is None else rod.rotating_mass),
+            rod_inertia_deficit=self.rod_inertia_deficit if rod is None else rod.inertia_deficit,
+        )
+        if self.knuckle_radius == 0.0:
+            return plain
+        return ArticulatedCrank(**{own.name: getattr(plain, own.name) for own in fields(plain)}, knuckle=knuckle)
+
+    def _knuckle(self, number: int) -> Knuckle:
+        """Knuckle pin of a cylinder, on a master rod that stands for its geometry alone."""
+        rod = SliderCrank(
+            "master rod", 0.0, self.crank_radius, self.rod_length, 0.0, 0.0, self.master_bank, self.offset
+        )
+        return Knuckle(rod, self.knuckle_radius, self.knuckle_angles[number - 1])
+
+
+def _top(part: SliderCrank) -> complex:
+    """The highest place of a piston pin in the plane of its cylinder [m]."""
+    return complex(math.sqrt((part.rod_length + part.crank_radius) ** 2 - part.offset**2), part.offset)
+
+
+def _rod(length: float, rod: Mapping[str, float]) -> Rod:
+    if not 0.0 <= rod["centre_of_gravity"] <= length:
+        rule = f"does not lie on the rod of {units.shown(length, 'm')}; count it from the knuckle pin"
+        value = units.shown(rod["centre_of_gravity"], "m")
+        raise KeyedError("articulated_rod.centre_of_gravity", rule, value)
+    return Rod(length, **rod)
+
+
+class Radial(LayoutKind):
+    """A master rod and articulated rods on one crank pin, cylinder 1 upright, numbers as the crank turns."""
+
+    name = "radial"
+    keys = (
+        Key("knuckle_radius", "non-negative length", "From the crank pin to the knuckle pins of the master rod."),
+        Key("master_cylinder", "cylinder", "Its rod is the master rod; 1 where left out."),
+        Key("knuckle_angles", "angles", "Of every knuckle pin from the master rod; those of the banks where left out."),
+        Key("articulated_rod_length", "positive length", "Such that all pistons come equally high where left out."),
+        Key("articulated_rod", "rod", "An articulated rod as a rigid body, from its knuckle pin."),
+        Key("knuckle_mass", "mass", "At every knuckle pin, beside the share of articulated_rod.", 0.0),
+    )
+    lists = ("firing_order",)
+    openable = ("firing_order",)
+
+    def place(self, asked: Asked) -> Layout:
+        """Cylinders at equal angles around one throw; phi = 0 is the true dead centre of cylinder 1 (C5)."""
+        count = asked.cylinders
+        banks, none = _banks(count), (0.0,) * count
+        rods = _master_rod(asked)
+        try:
+            late = tuple(rods.cylinder(k + 1, 0.0, 0.0, banks[k], 0.0).fires_at for k in range(count))
+        except KeyedError:
+            raise
+        except ModelError as error:
+            raise KeyedError("articulated_rod_length" if rods.length else "knuckle_radius", str(error)) from None
+        return Layout("radial", none, banks, (0,) * count, none, (0.0,), late=late, throws=(banks[0] + late[0],))
+
+    def parts(
+        self, asked: Asked, layout: Layout, throws: Sequence[float]
+    ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
+        """The master's slider-crank and the articulated ones, every second firing where four strokes take two turns."""
+        turns, count = asked.cycle.turns, asked.cylinders
+        order = [k + 1 for start in range(turns) for k in range(start, count, turns)]
+        return build(asked.cycle, layout, _master_rod(asked), throws, asked.firing_order or order)
+
+
+def _banks(count: int) -> tuple[float, ...]:
+    return tuple(math.tau * k / count for k in range(count))
+
+
+def _master_rod(asked: Asked) -> MasterRod:
+    """What [engine] says of the rods.
+
+    Raises
+    ------
+    KeyedError
+        If it contradicts itself.
+    """
+    own, count = asked.own, asked.cylinders
+    radius, master, given = own["knuckle_radius"], own["master_cylinder"] or 1, own["knuckle_angles"]
+    if radius is None:
+        raise KeyedError("knuckle_radius", "is missing; add it, 0 mm puts all rods on the crank pin")
+    if math.isinf(asked.mechanism.rod_length):
+        raise KeyedError("rod_ratio", "makes a Scotch yoke, which has no master rod; give more", "0")
+    if master > count:
+        raise KeyedError("master_cylinder", f"is none of {count} cylinders; count them from 1", str(master))
+    if asked.rod is not None and own["articulated_rod"] is None:
+        raise KeyedError("articulated_rod", "is missing beside [engine.rod]; add it, or leave both out")
+    banks = _banks(count)
+    if given is not None and len(given) != count - 1:
+        rule = f"has {len(given)} angle(s) for {count - 1} articulated rod(s); give one each, by cylinder"
+        raise KeyedError("knuckle_angles", rule)
+    even = [bank - banks[master - 1] for bank in banks]
+    angles = even if given is None else [*given[: master - 1], 0.0, *given[master - 1 :]]
+    return MasterRod(
+        **{shared.name: getattr(asked.mechanism, shared.name) for shared in fields(asked.mechanism)},
+        master=master,
+        master_bank=banks[master - 1],
+        knuckle_radius=radius,
+        knuckle_angles=tuple(angles),
+        length=own["articulated_rod_length"],
+        piston_mass=asked.piston_mass,
+        knuckle_mass=own["knuckle_mass"],
+        rod=own["articulated_rod"],
+    )
