@@ -83,18 +83,17 @@ def markdown(text: Text) -> list[str]:
 
 
 def _flat(data: xr.Dataset) -> Any:
-    """A row a point: what stands for every mount and decision becomes a column each."""
-    wide = [str(dim) for dim in ("mount", "decision") if dim in data.dims]
-    narrow = data.drop_dims(wide)
+    """A row a point: what stands for every mount, decision, measure ... of a point becomes a column each."""
+    across = {name: values for name, values in data.data_vars.items() if values.dims[:1] == ("point",) != values.dims}
+    narrow = data.drop_dims({str(values.dims[1]) for values in across.values()})
     units = {str(name): values.attrs.get("units", "") for name, values in narrow.variables.items()}
     rows = narrow.to_dataframe().rename(columns={name: _headed(name, unit) for name, unit in units.items()})
-    of_decisions = data["decision_unit"].values.tolist() if "decision_unit" in data.coords else []
-    for name, values in data.data_vars.items():
-        if len(values.dims) == 2 and values.dims[1] in wide:
-            across = data[values.dims[1]].values
-            named = of_decisions if values.dims[1] == "decision" else [values.attrs.get("units", "")] * len(across)
-            for k, (of, unit) in enumerate(zip(across, named, strict=True)):
-                rows[_headed(f"{name}: {of}", unit)] = values.values[:, k]
+    for name, values in across.items():
+        along = values.dims[1]
+        own = [values.attrs.get("units", "")] * data.sizes[along]
+        named = data[f"{along}_unit"].values.tolist() if f"{along}_unit" in data.coords else own
+        for k, (of, unit) in enumerate(zip(data[along].values, named, strict=True)):
+            rows[_headed(f"{name}: {of}", unit)] = values.values[:, k]
     return rows
 
 

@@ -50,19 +50,21 @@ class Outcome:
     units: dict[str, str]
 
 
-def solved(problem: Problem) -> Outcome:
-    """Solve a scene; one without a design is kept as given, and says why."""
+def decided(problem: Problem) -> tuple[Result, str, str]:
+    """A scene as decided, its status and its proof; one without a design as given."""
     try:
         result = solve(problem, many=True)
     except SolverError:
-        return _outcome(state(problem, to_start_from=True), FAILED, "none")
+        return state(problem, to_start_from=True), FAILED, "none"
     if result.objective is None:
-        return _outcome(state(problem, to_start_from=True), str(result.status), "none")
+        return state(problem, to_start_from=True), str(result.status), "none"
     proof = str(result.certificate.kind) if result.certificate else AS_GIVEN if _is_closed(problem) else "none"
-    return _outcome(result, str(result.status), proof)
+    return result, str(result.status), proof
 
 
-def _outcome(shown: Result, status: str, proof: str) -> Outcome:
+def solved(problem: Problem) -> Outcome:
+    """Solve a scene; one without a design is kept as given, and says why."""
+    shown, status, proof = decided(problem)
     nothing = math.nan
     objective, designed = shown.objective, status not in (FAILED, "infeasible")
     before = _over_points(shown.problem, shown.initial)
