@@ -281,7 +281,7 @@ def test_scaling_masses_and_speed_scales_the_optimum() -> None:
     base = replace(four(), points=(replace(four().points[0], gas=None),))
     heavy_parts = tuple(replace(c, reciprocating_mass=2 * c.reciprocating_mass) for c in base.engine.slider_cranks)
     heavy = replace(base, engine=replace(base.engine, slider_cranks=heavy_parts), decisions=tuple(
-        replace(d, upper=2 * d.upper) for d in base.decisions
+        replace(d, set=d.set.scaled(2.0)) for d in base.decisions
     ))  # fmt: skip
     fast = replace(base, points=(replace(base.points[0], speed=2 * base.points[0].speed),))
     one, two, four_times = (solve(p) for p in (base, heavy, fast))
@@ -298,7 +298,7 @@ def test_brute_force_over_size_and_angle() -> None:
     rotors = [shaft_rotor("shaft", -1, 0.1, 0.1, 0.0)]
     machine = engine([0.0, 180.0], rotors, firing_order=[1, 2])
     for low, high in ((0.0, math.tau), (0.2, 1.2)):
-        decision = replace(free_unbalance("shaft", 0.03), angle=(low, high))
+        decision = replace(free_unbalance("shaft", 0.03), set=Sector(0.03, (low, high)))
         p = replace(problem(machine, [], GAS, fidelity=EXACT), decisions=(decision,))
         result = solve(p)
         assert result.objective is not None

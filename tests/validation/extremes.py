@@ -24,6 +24,7 @@ from laufruhe.physics.gas_loads import gas_torque
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 from laufruhe.problem import channels
+from laufruhe.problem.decision import Sector
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.solvers import solve
 from many_digits import acceleration_orders
@@ -295,7 +296,7 @@ def _bounded(big: float, small: float) -> tuple[float, float]:
     machine = replace(tractor.engine([0, 180, 180, 0], rotors), mounts=())
     force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"]))
     problem = tractor.problem(machine, ["plus", "minus"], objective=(force,))
-    free = replace(problem.decisions[0], upper=big), replace(problem.decisions[1], upper=small)
+    free = tuple(replace(d, set=Sector(upper)) for d, upper in zip(problem.decisions, (big, small), strict=True))
     problem = replace(problem, decisions=free)
     found = solve(problem)
     # the second order turns half forwards and half backwards; only `small` of the latter can go

@@ -134,7 +134,7 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> Front:
     SolverError
         If there is no design.
     """
-    if not problem.objective or any(term.measure.is_mass for term in problem.objective):
+    if not problem.load_terms or any(term.measure.is_mass for term in problem.objective):
         raise ModelError("shafts are weighed against a load, and none is minimised; minimise mean mount force")
     optimum = best(problem)
     return Front(
