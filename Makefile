@@ -4,7 +4,7 @@ STUDY ?= problems/tractor-study.toml
 
 VENV := .venv
 BIN := $(VENV)/bin
-LANES := -n auto --dist worksteal
+LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
 .PHONY: help solve study test test-fast bench pictures lint format clean distclean

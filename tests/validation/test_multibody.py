@@ -26,7 +26,7 @@ from laufruhe.physics.shaking_loads import shaking_loads
 from validation import multibody
 from validation.multibody import ConnectingRod, Cylinder, Loads, Machine, Turning
 
-pytestmark = pytest.mark.validation
+pytestmark = [pytest.mark.validation, pytest.mark.slow]
 
 FloatArray = NDArray[np.float64]
 
