@@ -7,19 +7,12 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
-from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
-from laufruhe.cli.screen import DONE, FAILED, exit_statuses, hand_out, progress
-from laufruhe.cli.solve import Answer, Request, checked_tolerance, json_file, show_result, solved, written
-
-if TYPE_CHECKING:
-    from laufruhe.problem.problem import Problem
-    from laufruhe.solvers.result import Result
+from laufruhe.cli.screen import DONE, FAILED, checked_tolerance, exit_statuses, handing_out, progress
 
 app = typer.Typer(
     name="laufruhe",
@@ -62,7 +55,10 @@ def solve(
     tolerance: ToleranceOption = None,
 ) -> None:
     """Decide what the problem leaves open, and prove how good that is."""
-    _run(Request("solve", problem, json, out, not no_plots, tolerance), solved)
+    with exit_statuses(problem):
+        from laufruhe.cli.solve import Request, run, solved
+
+        run(Request("solve", problem, json, out, not no_plots, tolerance), solved)
 
 
 @app.command()
@@ -73,13 +69,10 @@ def evaluate(
 
     Mount forces and orders of the file's own numbers; nothing is decided.
     """
+    with exit_statuses(problem):
+        from laufruhe.cli.solve import Request, run, stated
 
-    def stated(given: Problem, _: Callable[[str], None]) -> Result:
-        from laufruhe.solvers import state
-
-        return state(given)
-
-    _run(Request("evaluate", problem, json, out, not no_plots), stated)
+        run(Request("evaluate", problem, json, out, not no_plots), stated)
 
 
 @app.command()
@@ -89,16 +82,12 @@ def study(problem: StudyArgument, json: StudyJsonOption = None, out: OutOption =
     Finished points are kept; a study that was interrupted goes on where it stopped.
     """
     kept = "interrupted; finished points are kept, the same command goes on"
-    with exit_statuses(problem, kept), ExitStack() as places:
+    with exit_statuses(problem, kept), handing_out(json, problem) as hand_out:
         from laufruhe.cli.study import studied
-        from laufruhe.report import files
 
-        copy = json_file(json, problem, places)
         with progress() as say:
-            text, data = studied(problem, out, jobs, say)
-        if copy is not None:
-            files.write(copy, data)
-        hand_out(text, data, "-" if json == "-" else None)
+            found = studied(problem, out, jobs, say)
+        hand_out(*found)
 
 
 @app.command()
@@ -107,37 +96,28 @@ def check(problem: ProblemArgument, json: JsonOption = None) -> None:
 
     Says what it leaves open; nothing is solved, and no results folder is made.
     """
-    with exit_statuses(problem), ExitStack() as places:
-        from laufruhe.files.reader import load
-        from laufruhe.report import files
-        from laufruhe.report.json_result import as_json
-        from laufruhe.solvers import state
+    with exit_statuses(problem), handing_out(json, problem) as hand_out:
+        from laufruhe.cli.solve import checked
 
-        copy = json_file(json, problem, places)
-        given = load(problem)
-        # a load that no mount carries, or a gas cycle that cannot be met, shows only here
-        stated = state(given, to_start_from=True)
-        if copy is not None:
-            files.write(copy, as_json(stated))
-        hand_out(f"ok: {given.summary}\n", as_json(stated), "-" if json == "-" else None)
+        hand_out(*checked(problem))
 
 
 @app.command()
 def explain(problem: ProblemArgument, json: JsonOption = None, tolerance: FidelityTolerance = 1e-3) -> None:
     """Say what of the physics this scene needs, what it does not, and why."""
-    with exit_statuses(problem):
+    with exit_statuses(problem), handing_out(json, problem) as hand_out:
         from laufruhe.cli.fidelity import explained
 
-        hand_out(*explained(problem, checked_tolerance(tolerance)), json)
+        hand_out(*explained(problem, checked_tolerance(tolerance)))
 
 
 @app.command()
 def trade(problems: Problems, json: JsonOption = None, out: PagesOption = None) -> None:
     """Measure speed against accuracy of every fidelity, on these problems."""
-    with exit_statuses(problems[0]), progress() as say:
+    with exit_statuses(problems[0]), handing_out(json, *problems) as hand_out, progress() as say:
         from laufruhe.cli.fidelity import traded
 
-        hand_out(*traded(problems, out or Path("results") / "trade", say), json)
+        hand_out(*traded(problems, out or Path("results") / "trade", say))
 
 
 def _show_version(wanted: bool) -> None:
@@ -181,13 +161,3 @@ def _leave(status: int) -> NoReturn:
     except OSError:
         status = status or FAILED
     os._exit(status)
-
-
-def _run(request: Request, answer: Answer) -> NoReturn:
-    """Read, answer, write and show; leaves with the exit status of the result."""
-    with exit_statuses(request.problem):
-        with progress() as say:
-            result, folder = written(request, answer, say)
-        show_result(result, request.json == "-", folder)
-        raise typer.Exit(DONE if result.status in ("optimal", "feasible") else FAILED)
-    raise AssertionError("unreachable")

@@ -6,22 +6,24 @@ import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from laufruhe.errors import Complaint, InputError
-from laufruhe.problem.evaluation import objective_value
+from laufruhe.fidelity.automatic import Choice, choose
+from laufruhe.fidelity.mount_needs import needs
+from laufruhe.files.reader import load
+from laufruhe.load_models.batch import prepare
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-
-if TYPE_CHECKING:
-    from laufruhe.fidelity.automatic import Choice
+from laufruhe.report import explain, files
+from laufruhe.report import trade as report
+from laufruhe.studies.trade import seconds, trade
 
 
 def explained(path: Path, tolerance: float) -> tuple[str, str]:
     """Text and JSON of what a scene needs."""
-    from laufruhe.fidelity.automatic import choose
-    from laufruhe.fidelity.mount_needs import needs
-    from laufruhe.report import explain
-
     problem = _with_objective(path)
     if problem.load_terms:
         choice, times = choose(problem, tolerance), _load_times
@@ -33,12 +35,6 @@ def explained(path: Path, tolerance: float) -> tuple[str, str]:
 
 def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
     """Milliseconds of another design, as chosen and exact over the whole cycle."""
-    import numpy as np
-
-    from laufruhe.load_models.batch import prepare
-    from laufruhe.physics.fidelity import Fidelity
-    from laufruhe.studies.trade import seconds
-
     whole = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
     times = []
     for fidelity, prune in ((choice.fidelity, True), (whole, False)):
@@ -50,9 +46,6 @@ def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
 
 def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
     """Milliseconds of what is asked of mounts, with the loads that it needs and with all."""
-    from laufruhe.problem.evaluation import evaluate
-    from laufruhe.studies.trade import seconds
-
     needed = problem if choice.numbers[0] else replace(problem, points=())
     times = [1e3 * seconds(lambda p=p: objective_value(p, evaluate(p))) for p in (needed, problem)]  # type: ignore[misc]
     return times[0], times[1]
@@ -62,9 +55,6 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     """Pages and pictures of every problem, an index of them all; returns the index and JSON."""
     from laufruhe.plots.style import save
     from laufruhe.plots.trade import figure, has_picture
-    from laufruhe.report import files
-    from laufruhe.report import trade as report
-    from laufruhe.studies.trade import trade
 
     problems = [_with_objective(path) for path in paths]
     found, data = [], []
@@ -87,8 +77,6 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
 
 
 def _with_objective(path: Path) -> Problem:
-    from laufruhe.files.reader import load
-
     problem = load(path)
     if not problem.objective:
         rule, remedy = "is missing: accuracy is that of an objective", "add [objective] or mounts"

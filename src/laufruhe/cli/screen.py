@@ -2,28 +2,55 @@
 
 from __future__ import annotations
 
+import math
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import typer
 
-from laufruhe.errors import InputError, ModelError, SolverError
+from laufruhe.errors import Complaint, InputError, ModelError, SolverError
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
-def hand_out(text: str, data: str, json: str | None) -> None:
-    """Text on the screen, data where they were asked for."""
-    typer.echo(text, nl=False, err=json == "-")
-    if json == "-":
-        typer.echo(data, nl=False)
-    elif json is not None:
-        from laufruhe.report import files
+@contextmanager
+def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[str, str], None]]:
+    """Text on the screen, data where they were asked for; whether that can be written is found out on entry."""
+    from laufruhe.report import files
 
-        with files.staged_file(Path(json), "--json") as place:
-            files.write(place, data)
+    with ExitStack() as places:
+        place = json_file(json, problems, places)
+
+        def hand_out(text: str, data: str) -> None:
+            typer.echo(text, nl=False, err=json == "-")
+            if json == "-":
+                typer.echo(data, nl=False)
+            elif place is not None:
+                files.write(place, data)
+
+        yield hand_out
+
+
+def json_file(json: str | None, problems: Iterable[Path], places: ExitStack) -> Path | None:
+    """Where a copy of the data goes, if one is wanted as a file."""
+    from laufruhe.report import files
+
+    if json is None or json == "-":
+        return None
+    path = Path(json)
+    if path.resolve() in [problem.resolve() for problem in problems]:
+        raise InputError("laufruhe", (Complaint("--json", str(path), "is the problem file", "name another file"),))
+    return places.enter_context(files.staged_file(path, "--json"))
+
+
+def checked_tolerance(tolerance: float) -> float:
+    """Refuse a tolerance that is no number above zero."""
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        complaint = Complaint("--tolerance", f"{tolerance:g}", "must be a number above zero", "try 1e-3")
+        raise InputError("laufruhe", (complaint,))
+    return tolerance
 
 
 def complain(lines: str) -> None:
