@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, Role
 from laufruhe.machine.firing import even_patterns
-from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.crank_stars import Array, Stars, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -109,7 +108,7 @@ def _is_amplitude(term: Term) -> bool:
     q = term.measure
     if q.channel not in (channels.SHAKING_FORCE, channels.ROCKING_COUPLE):
         return False
-    return q.norm is NORMS["rms"] or (q.orders is not None and len(q.orders) == 1)
+    return q.norm.is_euclidean or (q.orders is not None and len(q.orders) == 1)
 
 
 def _one_throw(engine: Engine) -> Engine | None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.numerics.batch_norms import CACHE_BYTES, BatchNorm
+from laufruhe.numerics.norms import Grid
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -99,10 +100,11 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
 
 def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:
     rows = np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
-    weights = norm.grid.weights
-    if prune:
-        rows, weights = _merged(rows, weights)
-    return BatchNorm(norm.norm, np.ascontiguousarray(rows), weights)
+    grid = norm.grid
+    if prune and norm.norm.of_row_lengths:
+        rows, weights = _merged(rows, grid.weights)
+        grid = Grid(weights, len(weights))
+    return BatchNorm(norm.norm, np.ascontiguousarray(rows), grid)
 
 
 def _merged(rows: Array, weights: Array) -> tuple[Array, Array]:

@@ -202,9 +202,7 @@ class EngineFamily:
         driven = np.any(stacked != 0.0, axis=(0, 1))
         if not driven.any():
             driven[:1] = True
-        return BatchNorm(
-            quantity.norm, np.ascontiguousarray(stacked[:, :, driven].transpose(2, 0, 1)), rows[0].grid.weights
-        )
+        return BatchNorm(quantity.norm, np.ascontiguousarray(stacked[:, :, driven].transpose(2, 0, 1)), rows[0].grid)
 
 
 def _alike(engine: Engine) -> SliderCrank:

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.norms import Norm
+from laufruhe.numerics.norms import Grid, Norm
 
 Array = NDArray[np.float64]
 
@@ -35,13 +35,13 @@ class BatchNorm:
         How row lengths are put together.
     rows
         R, shape (components, features, k).
-    weights
-        Shape (k,).
+    grid
+        Where the rows stand.
     """
 
     norm: Norm
     rows: Array
-    weights: Array
+    grid: Grid
 
     def values(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
         """The norm of every design.
@@ -60,6 +60,8 @@ class BatchNorm:
         -------
         Shape (designs,).
         """
+        if not self.norm.of_row_lengths:
+            return np.array([self.value(design) for design in features])
         components, _, k = self.rows.shape
         block = max(cache_bytes // (8 * (components + 1) * max(k, 1)), _LEAST_BLOCK)
         out = np.empty(len(features))
@@ -81,6 +83,8 @@ class BatchNorm:
 
     def value(self, features: Array) -> float:
         """The norm of one design, features of shape (n,), in as few calls as there can be."""
+        if not self.norm.of_row_lengths:
+            return self.norm.value(self.grid, np.einsum("cfk,f->kc", self.rows, features))
         return float(self._together(self._lengths(np.dot(features, self._matrix))))
 
     @cached_property
@@ -106,7 +110,7 @@ class BatchNorm:
 
     def _together(self, lengths: Array) -> Array:
         """One number for each design."""
-        return self.norm.of_lengths(lengths, self.weights)
+        return self.norm.of_lengths(lengths, self.grid.weights)
 
     @property
     def operations(self) -> int:

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import total_stiffness
@@ -292,13 +291,14 @@ class BoxModel:
         whole = sum(self.problem.points[k].weight for k in counted)
         share = np.array([point.weight for point in self.problem.points]) / whole
         weights = share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen)
-        if quantity.norm is NORMS["rms"]:
+        norm = quantity.norm
+        if norm.is_euclidean:
             return root_under(answer, weights)
         found = [self._sampled(quantity, answer, lines, p, len(chosen)) for p in counted if np.any(lines.points == p)]
-        if not found:
+        if not found or not norm.of_row_lengths:
             nothing = np.zeros(len(at.centres))
             return Under(nothing, np.zeros_like(at.centres), nothing)
-        if quantity.norm is NORMS["maximum"]:
+        if not norm.sums_lengths:
             best = np.argmax([each.value for each in found], axis=0)
             pick = np.arange(len(best))
             value, slopes, rest = (np.array([getattr(e, part) for e in found]) for part in ("value", "slopes", "rest"))
@@ -327,7 +327,7 @@ class BoxModel:
         rows = np.einsum("tk,bkr->btr", turns, value).real.reshape(len(value), samples, mounts, 3)
         size = np.linalg.norm(rows, axis=-1)
         along = rows / np.where(size > 0.0, size, 1.0)[..., None]
-        if quantity.norm is NORMS["mean"]:
+        if quantity.norm.sums_lengths:
             share = 1.0 / (samples * mounts)
             duals = np.einsum("tk,btr->bkr", turns, along.reshape(len(value), samples, -1))
             slope = share * np.einsum("bkr,bknr->bn", duals, slopes).real

@@ -133,13 +133,14 @@ def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
         terms.append(z)
         constant += weight * float(np.vdot(z, norm.constant))
         gradient += weight * np.einsum("kd,kdn->n", z, norm.slope)
-    for (maximum, norm), z in zip(problem.limits, multipliers.limits, strict=True):
+    held = [norm.norm.balanced(norm.grid, z) for (_, norm), z in zip(problem.limits, multipliers.limits, strict=True)]
+    for (maximum, norm), z in zip(problem.limits, held, strict=True):
         price = norm.dual_norm(z)
         constant += float(np.vdot(z, norm.constant)) - price * maximum
         gradient += np.einsum("kd,kdn->n", z, norm.slope)
     least = constant + sum(domain.least(gradient) for domain in problem.domains)
     # every term is a norm, so nothing lies under zero
-    return Bound(max(least, 0.0), gradient, Multipliers(tuple(terms), multipliers.limits))
+    return Bound(max(least, 0.0), gradient, Multipliers(tuple(terms), tuple(held)))
 
 
 def best_bound(fine: AffineProblem, coarse: AffineProblem, x: Array, found: Multipliers) -> Bound:

@@ -154,21 +154,21 @@ def _of_quantity(problem: Problem, quantity: Measure, softest: Softest, model: A
     # no direction counts less than the least weight
     least = min(quantity.direction_weights or (1.0,))
     whole = sum(point.weight for point, _ in chosen)
-    squares: list[list[float]] = []
-    roots: list[list[float]] = []
+    squares: list[dict[float, float]] = []
+    roots: list[dict[float, float]] = []
     for point, (bare, slopes) in chosen:
         base = common_base([bare.base, *(slope.base for slope in slopes)])
         coefficients = [s.rebased(base).coefficients for s in (bare, *slopes)]
-        squares.append([0.0])
-        roots.append([0.0])
+        squares.append({})
+        roots.append({})
         for k in np.flatnonzero(quantity.counted([k * float(base) for k in range(max(len(c) for c in coefficients))])):
             loads = np.array([softest.load @ c[k] if k < len(c) else np.zeros(6) for c in coefficients])
             half = 0.5 if k else 1.0
             metric = softest.metric(quantity.norm, loads)
-            omega = k * float(base) * point.speed
-            least_square = least_transmitted(loads, omega, metric, softest.floors, model.domains)
-            squares[-1].append(half * least_square / len(softest.squares))
-            roots[-1].append(half * math.sqrt(least_square) / len(softest.squares))
+            order = k * float(base)
+            least_square = least_transmitted(loads, order * point.speed, metric, softest.floors, model.domains)
+            squares[-1][order] = half * least_square / len(softest.squares)
+            roots[-1][order] = half * math.sqrt(least_square) / len(softest.squares)
     shares = np.array([point.weight / whole for point, _ in chosen])
     return least * quantity.norm.least_of_orders(squares, roots, shares)
 

@@ -83,7 +83,7 @@ class ConicProgram:
         slope = (norm.slope * (self._problem.units / unit)).reshape(k * d, -1)
         rows = cp.reshape(slope @ self._y, (k, d), order="C") + constant
         cones = norm.norm.cones(norm.grid)
-        value, cone = held_norm(cones, rows)
+        value, cone = held_norm(cones, rows, norm.grid.steps)
         return _Cone(constant, value, cone, unit, (k, d), cones.factors)
 
     def _number(self, value: Array) -> Any:
@@ -141,9 +141,13 @@ class ConicProgram:
         return ConicSolution(x, Multipliers(terms, limits), seconds, iterations)
 
 
-def held_norm(cones: Cones, rows: Any) -> tuple[Any, Any]:
-    """A norm of rows (k, d) as a linear expression, and the cones that hold it (P1)."""
+def held_norm(cones: Cones, rows: Any, steps: int) -> tuple[Any, Any]:
+    """A norm of rows (k, d), signals of `steps` rows, as a linear expression, and the cones that hold it (P1)."""
     heads = cp.Variable(len(cones.value))
+    if cones.centred:
+        k, d = rows.shape
+        centres = cp.Variable((k // steps, d))
+        rows = rows - np.kron(np.eye(k // steps), np.ones((steps, 1))) @ centres
     if cones.whole:
         return heads[0], cp.SOC(heads[0], cp.vec(cp.multiply(cones.factors[:, None], rows), order="C"))
     tops = heads if len(cones.value) == len(cones.head) else heads[cones.head]

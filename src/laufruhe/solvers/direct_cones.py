@@ -72,6 +72,15 @@ class _Block:
         """Columns of the heads."""
         return slice(self.first, self.first + len(self.cones.value))
 
+    @property
+    def centres(self) -> NDArray[np.int64]:
+        """Column of the free vector that each number of the rows is counted from, shape (k, d); none, (0, 0)."""
+        if not self.cones.centred:
+            return np.zeros((0, 0), dtype=int)
+        k, d = self.norm.constant.shape
+        signal = np.arange(k) // self.norm.grid.steps
+        return np.asarray(self.heads.stop + signal[:, None] * d + np.arange(d))
+
 
 class _Rows:
     """A x + s = b, s in a product of cones: blocks of rows as they are added."""
@@ -116,7 +125,7 @@ def solve_direct(problem: AffineProblem) -> ConicSolution:
         *((norm, reach(problem, [norm])) for _, norm in problem.limits),
     ]:
         blocks.append(_Block(norm, norm.norm.cones(norm.grid), size, columns))
-        columns = blocks[-1].heads.stop
+        columns = int(blocks[-1].centres.max(initial=blocks[-1].heads.stop - 1)) + 1
     rows = _Rows(columns)
     for domain in problem.domains:
         _add_domain(rows, domain, float(problem.units[domain.start]))
@@ -201,10 +210,11 @@ def _add_norm(rows: _Rows, block: _Block, problem: AffineProblem) -> int:
     right[under] = constant
     places = np.broadcast_to(under[:, :, None], slope.shape)
     across = np.broadcast_to(np.arange(problem.size), slope.shape)
+    centres = block.centres.ravel()
     rows.add(
-        np.concatenate([heads, places.ravel()]),
-        np.concatenate([block.first + cones.head, across.ravel()]),
-        np.concatenate([np.full(len(heads), -1.0), -slope.ravel()]),
+        np.concatenate([heads, places.ravel(), under.ravel()[: len(centres)]]),
+        np.concatenate([block.first + cones.head, across.ravel(), centres]),
+        np.concatenate([np.full(len(heads), -1.0), -slope.ravel(), np.ones(len(centres))]),
         right,
     )
     rows.cones += [clarabel.SecondOrderConeT(width)] * len(heads)

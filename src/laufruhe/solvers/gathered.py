@@ -18,7 +18,9 @@ class Gathered:
     slopes
         Of each constraint's side over the limit that it comes from.
     heads
-        Variables at least zero, each with where it stands at a given point (E22).
+        Further variables, each with where it stands at a given point (E22).
+    floors
+        Their least values.
     """
 
     expressions: list[Any] = field(default_factory=list)
@@ -27,6 +29,7 @@ class Gathered:
     names: list[str] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
     heads: list[tuple[Any, Any]] = field(default_factory=list)
+    floors: list[float] = field(default_factory=list)
 
     def add(self, expression: Any, lower: float, upper: float, name: str, slope: float = 0.0) -> None:
         """One constraint, or a column of them."""
@@ -52,8 +55,16 @@ class Named:
 
     def head(self, value: Any) -> Any:
         """A variable for a largest value (E22)."""
-        found = self.symbol.sym(f"head{len(self.into.heads)}")
+        return self._added(value, 0.0)
+
+    def free(self, value: Any) -> Any:
+        """A row of variables without bounds."""
+        return self._added(value.T, -math.inf).T
+
+    def _added(self, value: Any, floor: float) -> Any:
+        found = self.symbol.sym(f"head{len(self.into.heads)}", value.numel())
         self.into.heads.append((found, value))
+        self.into.floors += [floor] * value.numel()
         return found
 
     def hold(self, expression: Any) -> None:

@@ -146,7 +146,7 @@ class _Rows:
         flat = norm.constant.reshape(-1) / unit + moves @ self._steps
         if self._size:
             flat = flat + (norm.slope * (self._scales / unit)).reshape(k * d, -1) @ self._y
-        return held_norm(norm.norm.cones(norm.grid), cp.reshape(flat, (k, d), order="C"))
+        return held_norm(norm.norm.cones(norm.grid), cp.reshape(flat, (k, d), order="C"), norm.grid.steps)
 
 
 def _stars(steps: Any, space: StarSpace) -> list[Any]:

@@ -154,9 +154,9 @@ class SmoothProgram:
             low += self.moves.lower.tolist()
             high += self.moves.upper.tolist()
         modes = 42 * self._modal
-        free = np.full(modes + len(self._held.heads), np.inf)
+        free = np.full(modes + len(self._held.floors), np.inf)
         below = -free
-        below[modes:] = 0.0
+        below[modes:] = self._held.floors
         return np.concatenate([low, below]), np.concatenate([high, free])
 
     def _scales(self, lower: Array, upper: Array) -> Array:

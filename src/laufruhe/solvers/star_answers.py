@@ -11,7 +11,6 @@ import numpy as np
 from laufruhe.errors import SolverError
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Method
 from laufruhe.problem.problem import Phasing, Problem
@@ -116,7 +115,7 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     for family in families:
         space = replace(family.space, mirror=simple, reflect=simple)
         model = StarModel(phasing, space, family.geometry, family.fixed)
-        exact = all(term.measure.norm is NORMS["rms"] for term in problem.objective) and not problem.limits
+        exact = all(term.measure.norm.is_euclidean for term in problem.objective) and not problem.limits
         samples = model.samples if exact else PROGRAM_SAMPLES
         owners, shafts = owners_of(model), phasing.shafts
         program = solve_program(

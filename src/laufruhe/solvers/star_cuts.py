@@ -341,7 +341,8 @@ def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
     parts = []
     for (weight, norm), given in zip(fine.terms, multipliers.terms, strict=True):
         parts.append((weight * norm.norm.dual_feasible(norm.grid, given), norm))
-    for (maximum, norm), z in zip(fine.limits, multipliers.limits, strict=True):
+    for (maximum, norm), given in zip(fine.limits, multipliers.limits, strict=True):
+        z = norm.norm.balanced(norm.grid, given)
         constant -= norm.norm.dual_norm(norm.grid, z) * maximum
         parts.append((z, norm))
     for z, norm in parts:

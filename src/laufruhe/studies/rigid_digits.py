@@ -79,7 +79,7 @@ def rigid_part(problem: Problem) -> RigidPart:
 
 
 def _is_covered(quantity: Measure, engine: Engine) -> bool:
-    if not quantity.is_load or quantity.orders is not None:
+    if not quantity.is_load or not quantity.norm.of_row_lengths or quantity.orders is not None:
         return False
     return quantity.channel is not channels.MOUNT_TRAVEL and (
         quantity.channel is not channels.MOUNT_FORCE or engine.block is None
@@ -192,9 +192,9 @@ def _measure(quantity: Measure, problem: Problem, wrenches: Sequence[list[Vector
 
     weights = [float(share) for share in quantity.shares(problem.points)]
     squares = [_squares(quantity, problem.engine, wrench) for wrench in wrenches]
-    if quantity.norm is NORMS["maximum"]:
+    if not (quantity.norm.sums_lengths or quantity.norm.is_euclidean):
         return mpmath.sqrt(max(max(s) for s, weight in zip(squares, weights, strict=True) if weight > 0.0))
-    is_mean = quantity.norm is NORMS["mean"]
+    is_mean = quantity.norm.sums_lengths
     means = [mpmath.fsum(map(mpmath.sqrt, s) if is_mean else s) / len(s) for s in squares]
     total = mpmath.fsum(mpmath.mpf(w) * mean for w, mean in zip(weights, means, strict=True)) / mpmath.fsum(weights)
     return total if is_mean else mpmath.sqrt(total)

@@ -13,6 +13,7 @@ from laufruhe.numerics.norms.norm import (
     Cones,
     Grid,
     Norm,
+    OrderBounds,
     SmoothProgram,
     curvature,
     fine_lengths,
@@ -96,11 +97,9 @@ class Maximum(Norm):
                 errors.append(float((size.max(axis=(0, 1)) - size.max(axis=0).min(axis=0)).max(initial=0.0)))
         return max(errors) + max(bends)
 
-    def least_of_orders(
-        self, squares: Sequence[Sequence[float]], roots: Sequence[Sequence[float]], shares: Array
-    ) -> float:
+    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
         """No less than the root mean square at any operating point."""
-        return math.sqrt(max((sum(each) for each in squares), default=0.0))
+        return math.sqrt(max((sum(each.values()) for each in squares), default=0.0))
 
 
 def _amplitudes(signal: Spectrum) -> float:

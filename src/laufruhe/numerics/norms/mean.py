@@ -13,6 +13,7 @@ from laufruhe.numerics.norms.norm import (
     Cones,
     Grid,
     Norm,
+    OrderBounds,
     SmoothProgram,
     curvature,
     fine_lengths,
@@ -100,11 +101,9 @@ class Mean(Norm):
             total += share * (float(np.abs(shifted - shifted.mean()).max()) + bend)
         return float(total)
 
-    def least_of_orders(
-        self, squares: Sequence[Sequence[float]], roots: Sequence[Sequence[float]], shares: Array
-    ) -> float:
+    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
         """At every operating point no less than its strongest order."""
-        return float(sum(share * max(each) for share, each in zip(shares, roots, strict=True)))
+        return float(sum(share * max(each.values(), default=0.0) for share, each in zip(shares, roots, strict=True)))
 
 
 def between(z: Array, steps: int, times: int) -> Array:

@@ -10,9 +10,9 @@ asks which norm it has before it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,10 @@ Array = NDArray[np.float64]
 
 # squares of numbers between these neither overflow nor lose digits
 _LEAST, _MOST = 1e-140, 1e150
+
+
+OrderBounds: TypeAlias = Sequence[Mapping[float, float]]
+"""At every operating point a number of each order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +60,15 @@ class Cones:
         What each row is multiplied by inside its cone, shape (k,).
     whole
         Whether one cone holds all rows; else each row has its own.
+    centred
+        Whether the rows of every signal are counted from a vector that is free.
     """
 
     value: Array
     head: NDArray[np.intp]
     factors: Array
     whole: bool = False
+    centred: bool = False
 
 
 class SmoothProgram(Protocol):
@@ -69,6 +76,9 @@ class SmoothProgram(Protocol):
 
     def head(self, value: Any) -> Any:
         """A variable that is at least zero; `value` is where it stands at a given point."""
+
+    def free(self, value: Any) -> Any:
+        """A row of variables without bounds."""
 
     def hold(self, expression: Any) -> None:
         """Every entry at most zero."""
@@ -89,6 +99,8 @@ class Norm(ABC):
         Whether nothing but the sum of weighted squares of all rows matters (S12).
     sums_lengths
         Whether the norm is linear in the lengths of the rows.
+    of_row_lengths
+        Whether nothing but the lengths of the rows matters, wherever they stand.
     """
 
     name: ClassVar[str]
@@ -96,6 +108,7 @@ class Norm(ABC):
     averages: ClassVar[bool] = False
     is_euclidean: ClassVar[bool] = False
     sums_lengths: ClassVar[bool] = False
+    of_row_lengths: ClassVar[bool] = True
 
     def __repr__(self) -> str:
         return f"<{self.name}>"
@@ -120,6 +133,10 @@ class Norm(ABC):
         excess = self.dual_norm(grid, z)
         return z if excess <= 1.0 else z / excess
 
+    def balanced(self, grid: Grid, z: Array) -> Array:
+        """The nearest dual rows whose dual norm is finite (P3)."""
+        return z
+
     @abstractmethod
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
         """Dual rows along the rows of a design where that is at least as good as a solver's Z (P6)."""
@@ -128,9 +145,9 @@ class Norm(ABC):
     def spread(self, z: Array, steps: int, times: int) -> Array:
         """Dual rows at `steps` angles of each signal on a grid `times` as fine (P6)."""
 
-    @abstractmethod
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
         """Of many designs from the lengths of their rows, shape (..., k) to (...); the lengths are used up."""
+        raise TypeError(f"{self.name} is not known from lengths alone")
 
     @abstractmethod
     def cones(self, grid: Grid) -> Cones:
@@ -158,8 +175,7 @@ class Norm(ABC):
         """How far the norm at `steps` samples a cycle can be off at the most (F7, F8)."""
 
     @abstractmethod
-    def least_of_orders(self, squares: Sequence[Sequence[float]], roots: Sequence[Sequence[float]], shares: Array
-                        ) -> float:  # fmt: skip
+    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
         """A value that the norm is not under, from bounds of every order at every operating point (E34).
 
         Parameters

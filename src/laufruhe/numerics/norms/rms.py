@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.norms.mean import between
-from laufruhe.numerics.norms.norm import Array, Cones, Grid, Norm, SmoothProgram, lengths, mean_square
+from laufruhe.numerics.norms.norm import Array, Cones, Grid, Norm, OrderBounds, SmoothProgram, lengths, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 
 
@@ -83,8 +83,6 @@ class RootMeanSquare(Norm):
         squares = [float(np.square(lengths(s.sample(steps))).mean()) for s in signals]
         return abs(math.sqrt(float(shares @ np.array(squares))) - self.above(signals, shares))
 
-    def least_of_orders(
-        self, squares: Sequence[Sequence[float]], roots: Sequence[Sequence[float]], shares: Array
-    ) -> float:
+    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
         """The squares of all orders and operating points add up."""
-        return math.sqrt(sum(share * sum(each) for share, each in zip(shares, squares, strict=True)))
+        return math.sqrt(sum(share * sum(each.values()) for share, each in zip(shares, squares, strict=True)))
