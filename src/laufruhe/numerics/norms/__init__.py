@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from laufruhe.numerics.norms.maximum import Maximum
 from laufruhe.numerics.norms.mean import Mean
 from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, softened_lengths
+from laufruhe.numerics.norms.peak_to_peak import PeakToPeak
 from laufruhe.numerics.norms.rms import RootMeanSquare
 
 __all__ = ["MEAN", "NORMS", "RMS", "Cones", "Grid", "Norm", "SmoothProgram", "lengths", "softened_lengths"]
 
-NORMS: Mapping[str, Norm] = {norm.name: norm for norm in (Mean(), Maximum(), RootMeanSquare())}
+NORMS: Mapping[str, Norm] = {norm.name: norm for norm in (Mean(), Maximum(), RootMeanSquare(), PeakToPeak())}
 MEAN, RMS = NORMS["mean"], NORMS["rms"]
