@@ -22,6 +22,8 @@ from laufruhe.problem.problem import Problem
 ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256, 384)
 SAMPLES = tuple(48 * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 20, 24, 30, 40, 60, 80, 120))
 GAS_SAMPLES = (720, 1440, 2880, REFERENCE_SAMPLES)
+GAS_ORDERS = 12
+"""Of a rung whose gas is cut."""
 PHYSICS_SHARE, GAS_SHARE, PART_SHARE = 0.5, 0.25, 0.1
 """Shares of the tolerance that all physics, the steps of the gas, and one whole part may use."""
 TIME_ORDERS, TIME_SAMPLES = 12, 360
@@ -100,7 +102,7 @@ class _Gas(_WholePart):
     key, kind = "gas", bool
     told: ClassVar = {"description": "false leaves the working gas out."}
     what, rung = "gas", "exact without gas, 720 steps"
-    less: ClassVar = {"gas": False}
+    less: ClassVar = {"gas": False, "gas_orders": None}
     whole: ClassVar = {"gas": True, "gas_samples": REFERENCE_SAMPLES}
 
     def is_there(self, problem: Problem) -> bool:
@@ -156,6 +158,20 @@ class _Orders(Knob):
 
     def away(self, problem: Problem) -> Rungs:
         return [("orders above 2", replace(problem.fidelity, orders=2))]
+
+
+class _GasOrders(Knob):
+    """A choice by hand: it spares no step of the cycle that fewer orders of everything have not spared already."""
+
+    key, kind = "gas_orders", int
+    told: ClassVar = {"description": "Last order kept of the gas alone.", "ge": 1}
+
+    def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
+        return None if GAS.is_there(problem) else ("is a choice of gas", "leave it out, or add [gas]")
+
+    def rungs(self, scale: Scale) -> Rungs:
+        cut = Fidelity(samples=720, gas_orders=GAS_ORDERS)
+        return [(f"exact, gas to order {GAS_ORDERS}, 720 steps", cut)] if GAS.is_there(scale.problem) else []
 
 
 class _CrankInertia(Knob):
@@ -295,7 +311,8 @@ class _Samples(Knob):
 
 GAS = _Gas()
 KNOBS: tuple[Knob, ...] = (
-    _Kinematics(), _Rod(), GAS, _GasSamples(), _Orders(), _CrankInertia(), _Mounts(), _Modes(), _Samples(),
+    _Kinematics(), _Rod(), GAS, _GasSamples(), _GasOrders(), _Orders(), _CrankInertia(), _Mounts(), _Modes(),
+    _Samples(),
 )  # fmt: skip
 
 

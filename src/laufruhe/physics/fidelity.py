@@ -44,6 +44,8 @@ class Fidelity:
         "rigid", or "mass-only": two masses without the inertia that they get wrong.
     gas
         Whether the working gas loads the engine.
+    gas_orders
+        Last order of crank speed kept of the gas alone; those of `orders` when None.
     gas_samples
         Steps over the cycle at which gas torque is taken; those of `samples` when None.
     crank_inertia
@@ -70,6 +72,7 @@ class Fidelity:
     orders: int | None = None
     rod: RodModel = "rigid"
     gas: bool = True
+    gas_orders: int | None = None
     gas_samples: int | None = None
     crank_inertia: float = math.inf
     mounts: MountModel = "frequency"
@@ -79,6 +82,8 @@ class Fidelity:
     def __post_init__(self) -> None:
         if self.orders is not None and self.orders < 1:
             raise ChoiceError("orders", self.orders, "must be at least 1", "leave it out to keep all")
+        if self.gas_orders is not None and not (self.gas and self.gas_orders >= 1):
+            raise ChoiceError("gas_orders", self.gas_orders, "goes with gas, and must be at least 1", "leave it out")
         if not self.crank_inertia > 0.0:
             raise ChoiceError("crank_inertia", self.crank_inertia, "must be positive", "give kg m2")
         if self.is_uneven and self.kinematics != "exact":
@@ -106,6 +111,10 @@ class Fidelity:
         """The working gas that loads the engine."""
         return point.gas if self.gas else None
 
+    def kept_of_gas(self, torque: Spectrum) -> Spectrum:
+        """Torque of the gas without the orders that are not kept of it."""
+        return torque if self.gas_orders is None else torque.kept(self.gas_orders)
+
     def kept(self, loads: Spectrum, least: float = 1.0) -> Spectrum:
         """Loads without the orders that are not kept; those up to `least` are."""
         return loads if self.orders is None else loads.kept(max(self.orders, least))
@@ -123,6 +132,7 @@ class Fidelity:
             (self.orders is not None, f"orders to {self.orders}"),
             (self.rod == "mass-only", "rod of two masses"),
             (not self.gas, "no gas"),
+            (self.gas_orders is not None, f"gas to order {self.gas_orders}"),
             (self.is_uneven, f"uneven crank speed ({self.crank_inertia:g} kg m2)"),
             (self.mounts == "rigid", "mounts that do not give way"),
             (self.mounts == "time", "mounts in the time domain"),

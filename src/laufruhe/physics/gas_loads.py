@@ -38,7 +38,7 @@ def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: F
 
     A cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
     """
-    return spectrum_of(gas_torque(gas, part, cycle, fidelity.gas_steps), cycle.base_order)
+    return fidelity.kept_of_gas(spectrum_of(gas_torque(gas, part, cycle, fidelity.gas_steps), cycle.base_order))
 
 
 def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:

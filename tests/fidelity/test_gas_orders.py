@@ -1,0 +1,116 @@
+"""Gas kept to an order of its own: inertia stays, and what is left out is bounded."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cli import scenes
+from fidelity.scenes import finer, random_elastic_problem, random_problem
+from laufruhe.errors import InputError, ModelError, UncarriedLoadError
+from laufruhe.fidelity.automatic import ladder
+from laufruhe.fidelity.error_bounds import error_bound, reference
+from laufruhe.files.reader import load
+from laufruhe.load_models.uneven_gas import GasMoments
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Problem
+from problem_files import written
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+EVERY = 10_000
+
+
+def _scene(make, seed: int) -> Problem:
+    """Rigid or elastic, even or uneven throws, rows and vees, two- and four-stroke, always with gas."""
+    return make(random.Random(40_000 + seed), gas=True)
+
+
+@pytest.mark.parametrize("make", [random_problem, random_elastic_problem])
+@pytest.mark.parametrize("seed", range(30))
+def test_estimate_is_not_below_the_error(make, seed: int) -> None:
+    rng, problem = random.Random(seed), _scene(make, seed)
+    fidelity = Fidelity(samples=rng.choice([96, 360, 720]), gas_orders=rng.choice([1, 2, 4, 8, 12, 24]))
+    own = replace(problem, fidelity=replace(fidelity, orders=rng.choice([None, None, 16]), gas_samples=1440))
+    try:
+        found, best = evaluate(own), reference(own)
+    except UncarriedLoadError:
+        return
+    value, truth = objective_value(own, found), objective_value(problem, evaluate(finer(problem, 7001)))
+    assert abs(value - truth) <= error_bound(own, found, best) * max(value, 1e-300)
+
+
+@pytest.mark.parametrize("make", [random_problem, random_elastic_problem])
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("crank_inertia", [math.inf, 50.0])
+def test_many_orders_are_every_order(make, seed: int, crank_inertia: float) -> None:
+    whole = replace(_scene(make, seed), fidelity=Fidelity(samples=360, crank_inertia=crank_inertia))
+    cut = replace(whole, fidelity=replace(whole.fidelity, gas_orders=EVERY))
+    assert objective_value(cut, evaluate(cut)) == objective_value(whole, evaluate(whole))
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("last", [1, 3, 12])
+def test_gas_alone_is_cut(seed: int, last: int) -> None:
+    problem = _scene(random_problem, seed)
+    for point in problem.points:
+        cut, none, whole = (
+            shaking_loads(problem.engine, point, fidelity).rebased(problem.engine.cycle.base_order)
+            for fidelity in (Fidelity(gas_orders=last), Fidelity(gas=False), Fidelity())
+        )
+        length, scale = len(whole.coefficients), np.abs(whole.coefficients).max()
+        first, second = (np.pad(s.coefficients, ((0, length - len(s.coefficients)), (0, 0))) for s in (cut, none))
+        above = whole.orders > last
+        np.testing.assert_allclose(first[above], second[above], rtol=0.0, atol=1e-13 * scale)
+        np.testing.assert_allclose(first[~above], whole.coefficients[~above], rtol=0.0, atol=1e-13 * scale)
+
+
+def test_uneven_throws_feel_the_orders_that_are_kept() -> None:
+    problem = load(PROBLEMS / "inline-five-uneven-gas.toml").at(Fidelity(samples=720, gas_orders=3))
+    stars = [part.throw - part.bank for part in problem.engine.slider_cranks]
+    few = GasMoments(problem, 0.0).at(problem.points[0], stars)
+    every = dict(GasMoments(problem.at(Fidelity(samples=720)), 0.0).at(problem.points[0], stars))
+    assert max(order for order, _ in few) == 3.0 < max(every)
+    assert all(np.allclose(np.array(moment), np.array(every[order])) for order, moment in few)
+
+
+def test_stars_keep_the_choice() -> None:
+    """A star of an open crank is evaluated with it, within the bound."""
+    problem = load(PROBLEMS / "inline-five-uneven-gas.toml").at(Fidelity(samples=720, gas_orders=4))
+    assert problem.phasing is not None
+    throws = tuple(math.tau * k / 5.0 for k in (0, 3, 2, 1, 4))
+    star = problem.phasing.realise(Candidate(throws, (1, 2, 4, 5, 3)))
+    assert star.fidelity.gas_orders == 4
+    found, best = evaluate(star), reference(star)
+    value, truth = objective_value(star, found), objective_value(star, best)
+    assert 0.0 < abs(value - truth) <= error_bound(star, found, best) * value
+
+
+def test_from_a_file(tmp_path: Path) -> None:
+    text = (PROBLEMS / "tractor-four-lanchester.toml").read_text(encoding="utf-8") + "\n[fidelity]\ngas_orders = 12\n"
+    problem = load(written(tmp_path, text))
+    assert problem.fidelity == Fidelity(gas_orders=12)
+    assert "gas to order 12" in problem.fidelity.summary
+    with pytest.raises(InputError, match=r"fidelity\.gas_orders.*goes with gas"):
+        load(written(tmp_path, text + "gas = false\n"))
+    with pytest.raises(InputError, match=r"fidelity\.gas_orders"):
+        load(written(tmp_path, text.replace("gas_orders = 12", "gas_orders = 0")))
+    with pytest.raises(InputError, match=r"fidelity\.gas_orders.*auto decides"):
+        load(written(tmp_path, text + 'kinematics = "auto"\n'))
+    with pytest.raises(InputError, match=r"fidelity\.gas_orders.*add \[gas\]"):
+        load(written(tmp_path, scenes.SHAKING_ONLY + "\n[fidelity]\ngas_orders = 3\n"))
+    with pytest.raises(ModelError, match="gas orders"):
+        Fidelity(gas_orders=0)
+
+
+def test_a_trade_tries_it_where_there_is_gas() -> None:
+    rungs = dict(ladder(_scene(random_problem, 3)))
+    assert rungs["exact, gas to order 12, 720 steps"].fidelity.gas_orders == 12
+    assert not any("gas to order" in name for name, _ in ladder(random_problem(random.Random(1), gas=False)))
