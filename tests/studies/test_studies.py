@@ -25,12 +25,12 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.files.study_parts import CaseTable
 from laufruhe.problem.measure import Limit
-from laufruhe.report.tractor_study import FIGURES, figure_files
 from laufruhe.solvers import solve
 from laufruhe.studies import Point, Scenes, kinds, run, work
 from laufruhe.studies.kept import NAME, KeptPoints
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
+from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.outcome import solved
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
@@ -341,9 +341,12 @@ def test_every_figure_and_statement_is_on_the_page(tmp_path: Path, monkeypatch: 
     answer = CliRunner().invoke(app, ["study", str(PROBLEMS / "tractor-study.toml")])
     assert answer.exit_code == 0, answer.output
     folder = tmp_path / "results" / "tractor-study"
-    assert {path.name for path in folder.iterdir()} == {"report.md", *figure_files()}
+    parts = load_study(PROBLEMS / "tractor-study.toml").study.parts
+    assert {path.name for path in folder.iterdir()} == {"report.md", *(f"{p.name}.{e}" for p in parts for e in p.ends)}
     page = (folder / "report.md").read_text(encoding="utf-8")
-    for name, figure in FIGURES.items():
-        assert f"({name}.png)" in page
-        assert figure.paper in page
-    assert "statements of the study are confirmed" in page
+    for part in parts:
+        assert isinstance(part, Replication)
+        assert f"({part.name}.png)" in page
+        assert part.says in page
+        assert all(statement.text in page for statement in part.statements)
+    assert "42 of 48 statements are confirmed." in page

@@ -40,7 +40,23 @@ def case(name: str, problem: str, more: str = "") -> str:
 
 VEE = PROBLEMS / "vee-six-60.toml"
 FOUR = PROBLEMS / "tractor-four-lanchester.toml"
-FIGURES = study().replace("[study]", '[study]\nfigures = "tractor"').replace('name = "p"', 'name = "fig-10"')
+REPLICA = """
+title = "t"
+[study]
+common = { numbers = { m = 2 } }
+[[study.parts]]
+name = "p"
+kind = "replication"
+title = "t"
+problems = { one = { like = "tractor-single.toml", engine = { reciprocating_mass = "{m} kg" } } }
+quantities = { mean = "mean mount force" }
+cases = [{ name = "given", problem = "one" }]
+[[study.parts.statements]]
+text = "s"
+value = "mean['given']"
+is = 1
+within = "5 %"
+""".replace("tractor-single.toml", str(PROBLEMS / "tractor-single.toml"))
 LONGER = case("T", str(FOUR), 'set = { "engine.stroke" = "100 mm" }')
 BAD = [
     (study("counterweight fracton"), "did you mean 'counterweight fraction'?"),
@@ -63,7 +79,23 @@ BAD = [
     (study(sweep=swept(SPEED, 'values = ["6 m/s", "8 m/s"]\npoints = 3')), "are given beside from"),
     (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "log"')), "has no logarithm"),
     (study(sweep=swept(FRACTION, "from = 0\nto = inf\npoints = 3")), "is not finite"),
-    (FIGURES, "is a figure of the study itself"),
+    (REPLICA.replace("value = \"mean", "value = \"maen"), "study.parts[1]"),
+    (REPLICA.replace("value = \"mean", "value = \"maen"), "'maen' is no name here; did you mean 'mean'?"),
+    (REPLICA.replace("mean['given']", "mean['givn']"), "'givn' is no case here; did you mean 'given'?"),
+    (REPLICA.replace("mean['given']", "mean.values"), "'mean.values' is not allowed here"),
+    (REPLICA.replace("mean['given']", "__import__('os')"), "'__import__' is no function here"),
+    (REPLICA.replace("mean['given']", "(lambda: 1)()"), "is no function"),
+    (REPLICA.replace("mean['given']", "1 +"), "is no expression; write for example"),
+    (REPLICA.replace("mean mount force", "mean mount farce"), "did you mean 'mean mount force'?"),
+    (REPLICA.replace("{m} kg", "{mm} kg"), "'mm' is no name here; did you mean 'm'?"),
+    (REPLICA.replace("{m} kg", "{m kg"), "cannot be read"),
+    (REPLICA.replace("{m} kg", "{m} mm"), "'mm' is not a unit of a mass"),
+    (REPLICA.replace("within", "witin"), "did you mean 'within'?"),
+    (REPLICA.replace('within = "5 %"', ""), "needs is and within together; give both"),
+    (REPLICA.replace("is = 1", 'holds = "value > 1"\nis = 1'), "judged by is and within, or by holds"),
+    (REPLICA.replace('problem = "one"', 'problem = "one", computation = "gas"'), "'gas' is no computation"),
+    (REPLICA.replace('problem = "one"', 'problem = "two"'), "does not exist"),
+    (REPLICA.replace('problem = "one"', 'problem = "one", sweep = { m = { from = 1 } }'), "is no grid; give values"),
     (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "cubic"')), "use one of: linear, log"),
     (study(sweep=2 * swept(FRACTION, "values = [0, 1]")), "is swept twice"),
     (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{FRACTION}" = 0.5 }}', "is swept, and set by"),

@@ -12,7 +12,7 @@ from laufruhe.numerics.cores import processors
 from laufruhe.report import files
 from laufruhe.studies import run
 from laufruhe.studies.kept import NAME
-from laufruhe.studies.reader import StudyFile, load_study
+from laufruhe.studies.reader import load_study
 
 SAID_EVERY = 0.2
 
@@ -24,8 +24,6 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
         raise InputError("laufruhe", (complaint,))
     started = time.perf_counter()
     study = load_study(path)
-    if study.study.figures is not None:
-        _check_names(study, path)
     folder = out if out is not None else Path("results") / path.stem
     kept = folder / NAME
     datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or processors())
@@ -39,16 +37,6 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())
     text = f"{spent}done in {time.perf_counter() - started:.1f} s: {folder / files.REPORT}\n"
     return text, as_json(study, datasets, seconds)
-
-
-def _check_names(study: StudyFile, path: Path) -> None:
-    """A part may not be named as a figure of the tractor study: their files would be one."""
-    from laufruhe.report.tractor_study import FIGURES
-
-    for k, part in enumerate(study.study.parts):
-        if part.name in FIGURES:
-            where, rule = f"study.parts[{k + 1}].name", "is a figure of the study itself"
-            raise InputError(str(path), (Complaint(where, part.name, rule, "name it otherwise"),))
 
 
 class _Teller:

@@ -42,6 +42,12 @@ def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
     return whole
 
 
+def joined(tables: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Tables with others upon them: a table within is joined in turn, anything else is replaced."""
+    within = {key: joined(tables[key], own[key]) for key in own if isinstance(own[key], dict) and key in tables}
+    return {**tables, **own, **within}
+
+
 def _keys(tables: dict[str, Any], where: str) -> list[Any]:
     """The keys and places that a path goes through."""
     here: Any = tables

@@ -21,7 +21,14 @@ from laufruhe.plots.style import heading, page, save
 from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
-_MORE = {"indigo": "#332288", "olive": "#999933", "leaf": "#00664b", "rust": "#a63c00"}
+_MORE = {
+    "indigo": "#332288",
+    "olive": "#999933",
+    "leaf": "#00664b",
+    "rust": "#a63c00",
+    "mint": "#d9ecd9",
+    "white": "#ffffff",
+}
 
 
 def draw(picture: Picture) -> Figure:
@@ -69,7 +76,10 @@ def _mark(axes: Axes, mark: Mark) -> None:
             drawn.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.0})
     elif isinstance(mark, Bars):
         draws = axes.bar if mark.upright else axes.barh
-        bars = draws(mark.places, mark.values, mark.width, color=hue(mark.colour), linewidth=0)
+        fill: dict[str, Any] = (
+            {"facecolor": "none", "edgecolor": hue(mark.colour)} if mark.hollow else {"color": hue(mark.colour)}
+        )
+        bars = draws(mark.places, mark.values, mark.width, linewidth=1.3 if mark.hollow else 0.0, **fill)
         if mark.numbers:
             axes.bar_label(bars, list(mark.numbers), size=7.5)
     elif isinstance(mark, Area):

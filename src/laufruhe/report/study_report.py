@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
-from laufruhe.report.tractor_study import figure_files, write_figures
 from laufruhe.studies.part import Part
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import StudyFile
+from laufruhe.studies.replication.judging import counted
 from laufruhe.studies.text import Rows, Text
 
 if TYPE_CHECKING:
@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 
 def file_names(study: StudyFile) -> list[str]:
     """Everything that `write_study` makes."""
-    own = figure_files() if study.study.figures else []
-    parts = [f"{part.name}.{end}" for part in study.study.parts for end in ("nc", "csv", "png")]
-    return [files.REPORT, *own, *parts]
+    return [files.REPORT, *(f"{part.name}.{end}" for part in study.study.parts for end in part.ends)]
 
 
 def write_study(
@@ -48,8 +46,8 @@ def write_study(
     lines += [f"Made by `{command}`.", ""]
     if study.assumptions:
         lines += ["Assumptions:", "", *(f"- {text}" for text in study.assumptions), ""]
-    if study.study.figures:
-        lines += write_figures(folder, say)
+    found = counted(datasets.values())
+    lines += [found, ""] if found else []
     for part in study.study.parts:
         say(f"writing {part.name}")
         lines += _part(part, datasets[part.name], folder, draw)
@@ -65,11 +63,13 @@ def _part(part: Part, data: xr.Dataset, folder: Path, draw: Callable[[Picture, P
     # a name with a space cannot be marked as a coordinate there
     spaced = {str(coord): str(coord).replace(" ", "_") for coord in data.coords if " " in str(coord)}
     data.rename(spaced).to_netcdf(folder / f"{name}.nc")
-    _flat(data).to_csv(folder / f"{name}.csv")
-    draw(part.picture(data), folder / f"{name}.png")
+    if "csv" in part.ends:
+        _flat(data).to_csv(folder / f"{name}.csv")
+    if "png" in part.ends:
+        draw(part.picture(data), folder / f"{name}.png")
     words = data.attrs["kind"].capitalize() + "." + (f" Source: {source}" if source else "")
     told = [line for text in part.table(data) for line in (*markdown(text), "")]
-    return [f"## {title}", "", words, "", *told, f"![{title}]({name}.png)", ""]
+    return [f"## {title}", "", words, "", *told, *([f"![{title}]({name}.png)", ""] if "png" in part.ends else [])]
 
 
 def markdown(text: Text) -> list[str]:

@@ -57,6 +57,11 @@ class Part(Table):
         """What is drawn of the dataset."""
         raise NotImplementedError
 
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Kinds of files that are written."""
+        return ("nc", "csv", "png")
+
     def about(self, **more: Any) -> dict[str, Any]:
         """Attributes of the dataset that every part has, and more."""
         return {"title": self.title, "kind": self.settings()["kind"], "source": self.source, **more}

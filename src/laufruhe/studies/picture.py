@@ -59,6 +59,7 @@ class Bars:
     label: str = ""
     numbers: Sequence[str] = ()
     upright: bool = True
+    hollow: bool = False
 
 
 @dataclass(frozen=True)

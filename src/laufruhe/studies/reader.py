@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias, Union
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, Union
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from laufruhe.errors import Complaint, InputError
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
 from laufruhe.files.reader import tables_of
+from laufruhe.files.study_paths import joined
 from laufruhe.files.study_sweeps import axis_of
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.part import Part
@@ -25,10 +26,18 @@ else:
 class StudyTable(Table):
     """What a study consists of."""
 
-    figures: Literal["tractor"] | None = Field(
-        default=None, description="Every figure of Hasselgruber's study, beside what it says."
+    common: dict[str, Any] = Field(
+        default_factory=dict, description="Keys that every part has; it may give its own, and tables are joined."
     )
-    parts: list[AnyPart] = Field(default_factory=list)
+    parts: list[AnyPart] = Field(min_length=1)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _common(cls, given: Any) -> Any:
+        parts = given.get("parts") if isinstance(given, dict) else None
+        if not isinstance(parts, list) or not isinstance(given.get("common"), dict):
+            return given
+        return {**given, "parts": [joined(given["common"], part) if isinstance(part, dict) else part for part in parts]}
 
 
 class StudyFile(Table):
@@ -55,8 +64,6 @@ def load_study(path: Path) -> StudyFile:
         file = StudyFile.model_validate(tables)
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, StudyFile)) from None
-    if not file.study.parts and file.study.figures is None:
-        raise _refused(path, "study.parts", "", "is missing", 'add [[study.parts]], or figures = "tractor"')
     names = [part.name for part in file.study.parts]
     for k, part in enumerate(file.study.parts):
         where = f"study.parts[{k + 1}]"

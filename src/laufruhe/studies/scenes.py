@@ -37,12 +37,15 @@ class Point:
         In place of the scene's own objective.
     shafts
         Balancer shafts kept; all when None.
+    base
+        Tables to start from, in place of those of the case's problem file.
     """
 
     case: CaseTable
     changes: Mapping[str, Any] = field(default_factory=dict)
     metric: str | None = None
     shafts: tuple[str, ...] | None = None
+    base: Mapping[str, Any] | None = None
 
     def __str__(self) -> str:
         return ", ".join([self.case.name, *(f"{path} = {value}" for path, value in self.changes.items())])
@@ -70,9 +73,7 @@ class Scenes:
             If the problem file has no such table or quantity.
         """
         path, case = self.folder / point.case.problem, point.case
-        if path not in self._files:
-            self._files[path] = tables_of(path)
-        tables = dict(self._files[path])
+        tables = dict(self.file(case.problem) if point.base is None else point.base)
         for name in case.without:
             if name not in tables:
                 rule = "is left out by the study and is not there"
@@ -86,6 +87,13 @@ class Scenes:
         if point.metric is not None:
             tables["objective"] = {"minimise": point.metric}
         return tables
+
+    def file(self, name: str) -> dict[str, Any]:
+        """Tables of a problem file; not to be changed."""
+        path = self.folder / name
+        if path not in self._files:
+            self._files[path] = tables_of(path)
+        return self._files[path]
 
     def refused(self, case: CaseTable, where: str, rule: str, remedy: str) -> InputError:
         """One line about the scene of a case."""

@@ -1,0 +1,209 @@
+"""A source replicated: its cases computed, its statements judged, its figures drawn, all told by the study file."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from laufruhe.errors import Complaint, InputError, ModelError
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import nearest
+from laufruhe.files.study_paths import joined
+from laufruhe.solvers import Status, solve
+from laufruhe.studies.part import Part, Record
+from laufruhe.studies.picture import Picture
+from laufruhe.studies.replication.computations import COMPUTATIONS
+from laufruhe.studies.replication.drawing import drawn
+from laufruhe.studies.replication.expressions import ExpressionError, check, expressions_in, filled, grid, numbers_of
+from laufruhe.studies.replication.judging import judged, rows
+from laufruhe.studies.replication.models import PictureTable, ReplicaCase, StatementTable
+from laufruhe.studies.replication.quantities import AskedTable, asked, check_asked
+from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.text import Text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class Replication(Part):
+    """Part of a paper or textbook: what it says beside what is computed here."""
+
+    kind: Literal["replication"]
+    says: str = Field(default="", description="What the source says, in a sentence.")
+    cases: list[ReplicaCase] = Field(default_factory=list)  # type: ignore[assignment]
+    numbers: dict[str, Any] = Field(default_factory=dict, description="By name: numbers, lists, expressions, grids.")
+    problems: dict[str, dict[str, Any]] = Field(
+        default_factory=dict, description="Tables of problem files, numbers in braces; `like` names one to start from."
+    )
+    quantities: dict[str, str | AskedTable] = Field(default_factory=dict, description="Asked of every case.")
+    define: dict[str, str] = Field(default_factory=dict, description="Expressions that several others use.")
+    statements: list[StatementTable] = Field(default_factory=list)
+    picture_: PictureTable | None = Field(default=None, alias="picture")
+
+    @model_validator(mode="after")
+    def _means_something(self) -> Replication:
+        """Names, quantities and computations are looked up before anything is computed."""
+        try:
+            self._check()
+        except ModelError as error:
+            raise f.refusal(str(error)) from None
+        return self
+
+    def _check(self) -> None:
+        known = {*self.numbers, *self.quantities, "value"}
+        for case in self.cases:
+            if case.computation and case.computation not in COMPUTATIONS:
+                raise ModelError(
+                    f"'{case.computation}' is no computation; {nearest(case.computation, [*COMPUTATIONS])}"
+                )
+            known |= {*COMPUTATIONS[case.computation].gives} if case.computation else set()
+        for what in self.quantities.values():
+            check_asked(what)
+        cases = [case.name for case in self.cases]
+        for name, text in self.define.items():
+            check(text, known, cases)
+            known.add(name)
+        for one in self.statements:
+            for text in (one.value, one.holds or "0", *expressions_in(one.why)):
+                check(text, known, cases)
+
+    def settings(self) -> dict[str, Any]:
+        """What is asked of every case; numbers and problems stand in the scenes."""
+        told = [(case.computation, case.numbers) for case in self.cases if case.computation]
+        return {"kind": self.kind, "quantities": {k: str(what) for k, what in self.quantities.items()}, "told": told}
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Every quantity has dimensions of its own, so no table of one row a point holds them."""
+        return ("nc", "png") if self.picture_ else ("nc",)
+
+    def points(self, scenes: Scenes) -> list[Point]:
+        """Every case at every combination of its swept numbers."""
+        return [point for case in self.cases for point in self._points(case, scenes)]
+
+    def _points(self, case: ReplicaCase, scenes: Scenes) -> Iterator[Point]:
+        grids = {
+            name: grid(name, table.model_dump(by_alias=True)).values.tolist() for name, table in case.sweep.items()
+        }
+        for values in itertools.product(*grids.values()):
+            swept = dict(zip(grids, values, strict=True))
+            try:
+                names = numbers_of({**self.numbers, **case.numbers, **swept}, {})
+                tables = filled(self._tables(case.problem, scenes), names)
+                told = {name: names[name] for name in case.numbers} if case.computation else swept
+                changed = case.model_copy(update={"set": filled(case.set, names), "numbers": told})
+            except ExpressionError as error:
+                raise self._refused(case.name, *str(error).split("; ", 1)) from None
+            yield Point(changed, base=tables)
+
+    def _tables(self, name: str, scenes: Scenes) -> dict[str, Any]:
+        """Tables of a problem under `problems`, upon those of what it is like; else of a file."""
+        if name not in self.problems:
+            return scenes.file(name)
+        own = {key: value for key, value in self.problems[name].items() if key != "like"}
+        like = self.problems[name].get("like")
+        return own if like is None else joined(self._tables(like, scenes), own)
+
+    def answer(self, point: Point, scenes: Scenes) -> Record:
+        """Every quantity of one scene, at its optimum where something is open."""
+        problem, case = scenes.problem(point), _case(point)
+        with scenes.blamed(point):
+            if case.computation:
+                found = COMPUTATIONS[case.computation].run(problem, case.numbers)
+                return {name: values.as_dict() for name, values in found.items()}
+            result = solve(problem, many=True)
+            if result.status in (Status.INFEASIBLE, Status.FAILED):
+                raise ModelError(f"no design meets all limits of '{case.name}'; loosen one")
+            return {name: asked(result, what).as_dict() for name, what in self.quantities.items()}
+
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+        """Quantities along the points, and every statement judged."""
+        import xarray as xr
+
+        swept = list(dict.fromkeys(name for case in self.cases for name in case.sweep))
+        data = xr.Dataset(
+            coords={
+                "case": ("point", [point.case.name for point in points]),
+                **{name: ("point", [_case(point).numbers.get(name, np.nan) for point in points]) for name in swept},
+            },
+            attrs=self.about(
+                says=self.says, part=self.model_dump_json(by_alias=True, exclude_defaults=True, exclude={"problems"})
+            ),
+        )
+        for name in dict.fromkeys(name for record in records for name in record):
+            data = data.merge(_along_points([record.get(name) for record in records], name))
+        names = self.names(data)
+        try:
+            return data.assign_coords(judged(self.statements, names))
+        except ExpressionError as error:
+            raise self._refused("statements", *str(error).split("; ", 1)) from None
+
+    def names(self, data: xr.Dataset) -> dict[str, Any]:
+        """What expressions know: functions, numbers, what every case gave, and what is defined of them."""
+        quantities = {str(name): _by_case(data, str(name)) for name in data.data_vars if "point" in data[name].dims}
+        return numbers_of(self.define, {**numbers_of(self.numbers, {}), **quantities})
+
+    @staticmethod
+    def table(data: xr.Dataset) -> list[Text]:
+        """What is said, and every statement beside ours."""
+        said = [f"The source: {data.attrs['says']}"] if data.attrs["says"] else []
+        return [*said, *rows(data)]
+
+    @staticmethod
+    def picture(data: xr.Dataset) -> Picture:
+        """What the file describes; the statements alone where it describes nothing."""
+        part = Replication.model_validate_json(data.attrs["part"])
+        assert part.picture_ is not None
+        return drawn(part.picture_, part.names(data), data)
+
+    def _refused(self, where: str, rule: str, remedy: str = "correct it") -> InputError:
+        return InputError(f"part '{self.name}'", (Complaint(where, "", rule, remedy),))
+
+
+def _case(point: Point) -> ReplicaCase:
+    assert isinstance(point.case, ReplicaCase)
+    return point.case
+
+
+class _Cases(dict[str, Any]):
+    """What each case gave, by its name."""
+
+    def __missing__(self, name: str) -> Any:
+        raise ExpressionError(f"'{name}' is no case; {nearest(str(name), list(self))}")
+
+
+def _by_case(data: xr.Dataset, name: str) -> _Cases:
+    """A quantity of every case, along what it swept and the quantity's own dimensions."""
+    import xarray as xr
+
+    found = _Cases()
+    swept = [str(c) for c, labels in data.coords.items() if labels.dims == ("point",) and c != "case"]
+    for case in dict.fromkeys(data["case"].values.tolist()):
+        here = data.isel(point=np.flatnonzero(data["case"].values == case))
+        coords = {c: np.array(list(dict.fromkeys(here[c].values.tolist()))) for c in swept if here[c].notnull().all()}
+        own = {str(dim): here[dim].values for dim in here[name].dims[1:]}
+        shape = [len(labels) for labels in (*coords.values(), *own.values())]
+        values = xr.DataArray(here[name].values.reshape(shape), coords={**coords, **own}, dims=[*coords, *own])
+        for dim in own if here[name].attrs.get("padded") else ():
+            values = values.dropna(dim, how="all")
+        found[str(case)] = values if values.dims else values.item()
+    return found
+
+
+def _along_points(found: Sequence[Mapping[str, Any] | None], name: str) -> xr.DataArray:
+    """One quantity of all points; those that lack labels others have are padded with no number."""
+    import xarray as xr
+
+    given = [one["coords"] for one in found if one is not None]
+    coords = {dim: list(dict.fromkeys(label for one in given for label in one[dim])) for dim in given[0]}
+    whole = np.full((len(found), *(len(labels) for labels in coords.values())), np.nan)
+    for k, one in enumerate(found):
+        if one is not None:
+            places = [[coords[dim].index(label) for label in labels] for dim, labels in one["coords"].items()]
+            whole[np.ix_([k], *places)] = np.array(one["values"], dtype=float)
+    padded = int(any(len(one[dim]) < len(labels) for one in given for dim, labels in coords.items()))
+    return xr.DataArray(whole, coords, ("point", *coords), name, {"padded": padded})

@@ -1,0 +1,102 @@
+"""The picture that a replication describes, its expressions evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from laufruhe.studies.picture import Area, Axis, Bars, Line, Mark, Panel, Picture, Words, credit
+from laufruhe.studies.replication.expressions import filled, value_of
+from laufruhe.studies.replication.functions import join
+from laufruhe.studies.replication.models import AxisTable, BarsTable, CurveTable, PanelTable, PictureTable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+GROUP, ABOVE, LEAST_INSIDE, LEAST_SHOWN = 0.84, 0.012, 0.055, 1e-6
+DIGITS = 3
+
+Names = Mapping[str, Any]
+
+
+def drawn(table: PictureTable, names: Names, data: xr.Dataset) -> Picture:
+    """A picture of what the names are worth."""
+    return Picture(
+        table.title or data.attrs["title"],
+        filled(table.words, names),
+        [_panel(panel, names) for panel in table.panels],
+        credit(data),
+        size=(table.size[0], table.size[1]),
+        columns=table.columns,
+        gap=table.gap,
+        room=table.room,
+    )
+
+
+def _panel(panel: PanelTable, names: Names) -> Panel:
+    marks: list[Mark] = []
+    for area in panel.areas:
+        x, (low, high) = ([value_of(end, names) for end in ends] for ends in (area.x, area.y))
+        marks.append(Area(x, [low, low], [high, high], area.colour, filled(area.label, names)))
+    for curve in panel.curves:
+        marks += _curves(curve, names)
+    if panel.bars:
+        marks += _bars(panel.bars, names)
+    for words in panel.words:
+        across, up = (float(value_of(at, names)) for at in (words.x, words.y))
+        marks.append(Words(across, up, filled(words.text, names), 8.0, words.colour, words.across, words.along))
+    return Panel(marks, _axis(panel.x, names), _axis(panel.y, names), filled(panel.title, names))
+
+
+def _axis(axis: AxisTable, names: Names) -> Axis:
+    labels = filled(axis.names, names)
+    ticks = [(float(k), str(text)) for k, text in enumerate(labels)] if labels else None
+    if axis.ticks is not None:
+        ticks = [(float(at), f"{at:g}") for at in axis.ticks]
+    ends = None if axis.ends is None else tuple(float(value_of(end, names)) for end in axis.ends)
+    return Axis(axis.label, ends, ticks, tuple(axis.log), grid=labels is None)  # type: ignore[arg-type]
+
+
+def _each(given: Mapping[str, Sequence[Any]], names: Names) -> Iterator[dict[str, Any]]:
+    """Names with each of the values given for one of them."""
+    for name, values in given.items():
+        yield from ({**names, name: value} for value in values)
+    if not given:
+        yield dict(names)
+
+
+def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
+    for k, own in enumerate(_each(curve.each, names)):
+        colour = curve.colours[k % len(curve.colours)]
+        y = value_of(curve.y, own)
+        dims: tuple[str, ...] = getattr(y, "dims", ())
+        x = value_of(curve.x, {**own, **{dim: y[dim] for dim in dims}}) if curve.x is not None else y[dims[0]]
+        xs, ys = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (x, y))
+        xs, ys = np.broadcast_arrays(xs, ys)
+        yield Line(xs, ys, colour, filled(curve.label, own), curve.width, curve.dash, curve.marker)
+        if curve.end:
+            yield Words(float(xs[-1]), float(ys[-1]), f" {filled(curve.end, own)}", 8.0, colour)
+
+
+def _bars(bars: BarsTable, names: Names) -> Iterator[Mark]:
+    """Filled bars, the outlines around them, and the numbers of both."""
+    series = list(_each(bars.each, names))
+    fills = [join(value_of(bars.filled, own)) for own in series]
+    outlines = [join(value_of(bars.outline, own)) for own in series] if bars.outline else fills
+    top, width = max(max(values) for values in outlines), GROUP / len(series)
+    for k, (own, low, high) in enumerate(zip(series, fills, outlines, strict=True)):
+        places = np.arange(len(low)) + (k - 0.5 * (len(series) - 1)) * width
+        label = filled(bars.labels[k] if bars.labels else bars.label, own)
+        yield Bars(places, low, 0.9 * width, bars.colours[k], label)
+        if bars.outline:
+            yield Bars(places, high, 0.9 * width, bars.colours[k], hollow=True)
+        for x, inner, outer in zip(places, low, high, strict=True):
+            yield Words(x, outer + ABOVE * top, _number(outer, top), 6.5, "faint", "center", "bottom")
+            if bars.outline and inner > LEAST_INSIDE * top:
+                yield Words(x, inner - ABOVE * top, _number(inner, top), 6.5, "white", "center", "top")
+
+
+def _number(value: float, top: float) -> str:
+    return f"{value:#.{DIGITS}g}".rstrip(".") if value > LEAST_SHOWN * top else "0"

@@ -1,0 +1,199 @@
+"""A small language over the numbers and results of a replication: arithmetic, comparisons, a few named functions.
+
+Values are numbers, texts, lists and labelled arrays; `mean["with shaft"]` is what a case gave. Nothing but
+what stands in `FUNCTIONS` can be called, and no attribute can be reached.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable, Collection, Mapping
+from string import Formatter
+from typing import Any, cast
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.files.complaints import nearest
+from laufruhe.studies.replication.functions import CONSTANTS, FUNCTIONS
+
+MOST_LETTERS = 2000
+_BINARY: Mapping[type, Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Mod: operator.mod, ast.Pow: lambda a, b: (float(a) if isinstance(a, int) else a) ** b,
+}  # fmt: skip
+_COMPARED: Mapping[type, Callable[[Any, Any], Any]] = {
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq,
+}  # fmt: skip
+_UNARY: Mapping[type, Callable[[Any], Any]] = {ast.USub: operator.neg, ast.Not: operator.not_}
+
+
+class ExpressionError(ModelError):
+    """An expression that means nothing here; says which, why, and what would."""
+
+
+def check(text: str, names: Collection[str], cases: Collection[str]) -> None:
+    """Whether an expression could have a value, before any name has one.
+
+    Raises
+    ------
+    ExpressionError
+        If it cannot be read, or uses names, functions or cases that are not there.
+    """
+    nodes = [node for node in ast.walk(_parsed(text)) if isinstance(node, ast.expr)]
+    calls = [node for node in nodes if isinstance(node, ast.Call)]
+    unknown = {ast.unparse(node.args[1]) for node in calls if ast.unparse(node.func) == "root" and len(node.args) == 4}
+    called = {id(node.func) for node in calls}
+    known = {*names, *CONSTANTS, *unknown}
+    for node in nodes:
+        _check_node(node)
+        if isinstance(node, ast.Name) and id(node) not in called:
+            _check_among(node.id, known, "name")
+        elif isinstance(node, ast.Subscript) and isinstance(case := getattr(node.slice, "value", None), str):
+            _check_among(case, cases, "case")
+
+
+def _check_node(node: ast.expr) -> None:
+    if type(node) not in _NODES:
+        raise ExpressionError(f"'{ast.unparse(node)}' is not allowed here; use numbers, names and functions alone")
+    if isinstance(node, ast.Call):
+        _check_among(ast.unparse(node.func), FUNCTIONS, "function")
+
+
+def _check_among(name: str, known: Collection[str], what: str) -> None:
+    if name not in known:
+        raise ExpressionError(f"'{name}' is no {what} here; {nearest(name, list(known))}")
+
+
+def expressions_in(text: str) -> list[str]:
+    """What stands in the braces of a text."""
+    try:
+        return [field for _, field, _, _ in Formatter().parse(text) if field]
+    except ValueError as error:
+        raise ExpressionError(f"'{text}' cannot be read ({error}); check its braces") from None
+
+
+def value_of(text: Any, names: Mapping[str, Any]) -> Any:
+    """What an expression is worth; what is no text is worth itself.
+
+    Raises
+    ------
+    ExpressionError
+        If it cannot be read, or names what is not there.
+    """
+    if not isinstance(text, str):
+        return text
+    try:
+        return _value(_parsed(text), names)
+    except ExpressionError:
+        raise
+    except (TypeError, ValueError, KeyError, IndexError, ZeroDivisionError, OverflowError, AttributeError) as error:
+        raise ExpressionError(f"'{text}' has no value ({str(error).splitlines()[0]}); correct it") from None
+
+
+def filled(text: Any, names: Mapping[str, Any]) -> Any:
+    """Text with its `{expressions}` replaced, lists and tables inside and out; one that is all of it keeps its type."""
+    if isinstance(text, dict):
+        return {key: filled(value, names) for key, value in text.items()}
+    if isinstance(text, list):
+        return [filled(value, names) for value in text]
+    if not isinstance(text, str) or "{" not in text:
+        return text
+    try:
+        parts = [(plain, field, spec) for plain, field, spec, _ in Formatter().parse(text)]
+    except ValueError as error:
+        raise ExpressionError(f"'{text}' cannot be read ({error}); check its braces") from None
+    if len(parts) == 1 and not parts[0][0] and not parts[0][2]:
+        return value_of(parts[0][1], names)
+    return "".join(plain + ("" if field is None else _shown(field, spec or "", names)) for plain, field, spec in parts)
+
+
+def _shown(field: str, spec: str, names: Mapping[str, Any]) -> str:
+    value = value_of(field, names)
+    return format(float(value) if spec else value, spec) if not isinstance(value, str) else value
+
+
+def _parsed(text: str) -> ast.expr:
+    if len(text) > MOST_LETTERS:
+        raise ExpressionError(f"an expression of {len(text)} letters is too long; split it under define")
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ExpressionError(
+            f"'{text}' is no expression; write for example 100 * (mean['b'] / mean['a'] - 1)"
+        ) from None
+
+
+def _value(node: ast.expr, names: Mapping[str, Any]) -> Any:
+    _check_node(node)
+    return _NODES[type(node)](node, names)
+
+
+def _name(node: ast.Name, names: Mapping[str, Any]) -> Any:
+    _check_among(node.id, {*names, *CONSTANTS}, "name")
+    return names[node.id] if node.id in names else CONSTANTS[node.id]
+
+
+def _call(node: ast.Call, names: Mapping[str, Any]) -> Any:
+    name = ast.unparse(node.func)
+    called = FUNCTIONS[name]
+    given = {str(word.arg): _value(word.value, names) for word in node.keywords}
+    if name == "root":
+        # its first argument is no value yet: it has one at every place that is tried
+        return called(lambda x: _value(node.args[0], {**names, node.args[1].id: x}), *(  # type: ignore[attr-defined]
+            _value(one, names) for one in node.args[2:]))  # fmt: skip
+    return called(*(_value(one, names) for one in node.args), **given)
+
+
+def _compared(node: ast.Compare, names: Mapping[str, Any]) -> Any:
+    values = [_value(one, names) for one in (node.left, *node.comparators)]
+    kinds = [type(one) for one in node.ops]
+    found = [_COMPARED[kind](a, b) for kind, a, b in zip(kinds, values, values[1:], strict=False)]
+    return found[0] if len(found) == 1 else all(map(bool, found))
+
+
+def _joined(node: ast.BoolOp, names: Mapping[str, Any]) -> bool:
+    values = (bool(_value(one, names)) for one in node.values)
+    return all(values) if isinstance(node.op, ast.And) else any(values)
+
+
+def _constant(node: ast.Constant, _: Mapping[str, Any]) -> Any:
+    if not isinstance(node.value, int | float | str):
+        raise ExpressionError(f"'{node.value!r}' is neither number nor text; write one")
+    return node.value
+
+
+_NODES: Mapping[type, Callable[[Any, Mapping[str, Any]], Any]] = {
+    ast.Constant: _constant,
+    ast.Name: _name,
+    ast.Call: _call,
+    ast.Compare: _compared,
+    ast.BoolOp: _joined,
+    ast.List: lambda node, names: [_value(one, names) for one in node.elts],
+    ast.Subscript: lambda node, names: _value(node.value, names)[_value(node.slice, names)],
+    ast.UnaryOp: lambda node, names: _UNARY[type(node.op)](_value(node.operand, names)),
+    ast.BinOp: lambda node, names: _BINARY[type(node.op)](_value(node.left, names), _value(node.right, names)),
+}
+
+
+def numbers_of(given: Mapping[str, Any], names: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers by name, each an expression over those before it; a table is a grid along a dimension of its name.
+
+    Raises
+    ------
+    ExpressionError
+        As `value_of` does.
+    """
+    found = dict(names)
+    for name, text in given.items():
+        found[name] = grid(name, text) if isinstance(text, dict) else value_of(text, found)
+    return found
+
+
+def grid(name: str, given: Mapping[str, Any]) -> Any:
+    """Values listed, or so many from one end to the other, labelled by themselves."""
+    import xarray as xr
+
+    values = given.get("values") or np.linspace(given["from"], given["to"], cast(int, given["points"]))
+    return xr.DataArray(values, dims=name, coords={name: values})

@@ -1,0 +1,108 @@
+"""Functions of replication files, by name: of arrays, and a few of engines."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine.layouts import stations
+from laufruhe.physics.elastic_mounts import single_transmissibility
+from laufruhe.physics.modes import GRAVITY, sag_for_critical_speed, sag_frequency
+from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+STEPS = 60
+
+
+def _reduced(how: str) -> Callable[..., Any]:
+    def reduce(values: Any, *dims: str) -> Any:
+        if not hasattr(values, "dims"):
+            return getattr(np, how)(np.asarray(values, dtype=float)).item()
+        found = getattr(values, how)(list(dims) or None)
+        return found if found.dims else found.item()
+
+    return reduce
+
+
+def at(values: xr.DataArray, **places: Any) -> Any:
+    """What stands at a coordinate, the nearest to a number; at several for a list."""
+    for dim, place in places.items():
+        exact = isinstance(place, str | list)
+        values = values.sel({dim: place}) if exact else values.sel({dim: float(place)}, method="nearest")
+    return values if values.dims else values.item()
+
+
+def _arg(how: str) -> Callable[..., Any]:
+    def found(values: Any, dim: str | None = None) -> Any:
+        answer = getattr(values, f"idx{how}")(dim or values.dims[0])
+        return answer if answer.dims else answer.item()
+
+    return found
+
+
+def root(function: Callable[[Any], Any], low: float, high: float) -> Any:
+    """Where a function that is positive at the lower end and falls crosses zero, by bisection; of arrays, each."""
+    width: Any = high - low
+    for _ in range(STEPS):
+        width = 0.5 * width
+        low = low + width * (function(low + width) > 0.0)
+    return low + 0.5 * width
+
+
+def orders(values: xr.DataArray) -> Any:
+    """Amplitude of every order of crank speed of a signal over the crank angle [deg]."""
+    import xarray as xr
+
+    angle = values["angle"].values
+    found = np.abs(np.fft.rfft(values.values, axis=values.dims.index("angle"))) * 2.0 / len(angle)
+    turns = (angle[1] - angle[0]) * len(angle) / 360.0
+    at_orders = {"order": np.arange(found.shape[values.dims.index("angle")]) / turns}
+    dims = ["order" if dim == "angle" else dim for dim in values.dims]
+    return xr.DataArray(found, dims=dims, coords={**at_orders, **{d: values[d] for d in dims if d in values.coords}})
+
+
+def couple_star(throws: Sequence[float], order: float = 1.0) -> complex:
+    """Sum of x_k e^{i h theta_k} of throws [deg], x in cylinder spacings about the middle."""
+    turns = [cmath.exp(1j * order * math.radians(throw)) for throw in throws]
+    return sum((x * turn for x, turn in zip(stations(len(throws), 1.0), turns, strict=True)), 0j)
+
+
+def join(*parts: Any) -> NDArray[np.float64]:
+    """Numbers one after the other."""
+    return np.concatenate([np.ravel(np.asarray(part, dtype=float)) for part in parts])
+
+
+def transmissibility(ratio: Any, loss_factor: Any) -> Any:
+    """Foundation over exciting force of one mass on one spring (E11), of labelled arrays too."""
+    import xarray as xr
+
+    # without damping there is no end to it at the critical speed
+    with np.errstate(divide="ignore"):
+        return xr.apply_ufunc(single_transmissibility, ratio, loss_factor)
+
+
+def _lengths(values: xr.DataArray, dim: str = "direction") -> Any:
+    return (values**2).sum(dim) ** 0.5
+
+
+FUNCTIONS: Mapping[str, Any] = {
+    **{name: _reduced(name) for name in ("min", "max", "mean", "sum", "all", "any")},
+    **{name: getattr(np, name) for name in ("sqrt", "log", "exp", "sin", "cos", "minimum", "maximum", "round", "diff")},
+    "abs": abs, "len": len, "at": at, "argmin": _arg("min"), "argmax": _arg("max"), "root": root, "orders": orders,
+    "length": _lengths, "join": join, "rising": lambda values: bool(np.all(np.diff(np.asarray(values)) > 0.0)),
+    "list": lambda values: [value.item() for value in np.asarray(values)],
+    "degrees": lambda z: math.degrees(cmath.phase(z)), "conjugate": lambda z: z.conjugate(),
+    "couple_star": couple_star, "transmissibility": transmissibility,
+    "sag_for_critical_speed": sag_for_critical_speed, "sag_frequency": sag_frequency,
+}  # fmt: skip
+"""Every function that an expression may call."""
+CONSTANTS: Mapping[str, float] = {
+    "pi": math.pi, "tau": math.tau, "g": GRAVITY, "negligible": NEGLIGIBLE, "noticeable": NOTICEABLE,
+}  # fmt: skip

@@ -1,0 +1,153 @@
+"""The keys of a replication: its cases, what the source states, and what is drawn (docs/studies.md)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import Field, model_validator
+
+from laufruhe.files import fields as f
+from laufruhe.files.fields import Table
+from laufruhe.files.study_parts import CaseTable
+from laufruhe.studies.picture import SERIES
+
+Expression: TypeAlias = int | float | str
+Each: TypeAlias = Annotated[
+    dict[str, list[int | float | str]], Field(alias="for", description="Drawn once for every value of one name.")
+]
+
+
+class GridTable(Table):
+    """Numbers listed, or so many between two ends."""
+
+    values: list[int | float] | None = None
+    first: int | float | None = Field(default=None, alias="from")
+    last: int | float | None = Field(default=None, alias="to")
+    points: Annotated[int, Field(ge=2, le=100_000)] | None = None
+
+    @model_validator(mode="after")
+    def _is_one(self) -> GridTable:
+        spaced = None not in (self.first, self.last, self.points)
+        if spaced == bool(self.values):
+            raise f.refusal("is no grid; give values, or from, to and points")
+        return self
+
+
+class ReplicaCase(CaseTable):
+    """One scene, or a computation by its name."""
+
+    problem: str = Field(default="", description="A name under problems, or a problem file.")
+    numbers: dict[str, Any] = Field(default_factory=dict, description="In place of those of the study.")
+    sweep: dict[str, GridTable] = Field(default_factory=dict, description="Numbers that take several values.")
+    computation: str = Field(default="", description="In place of a problem: what no problem file can say.")
+
+
+class AssumptionTable(Table):
+    """On what a statement holds that does not hold as it is printed."""
+
+    what: str
+    holds: str
+
+
+class StatementTable(Table):
+    """What the source says, and how the same is found here."""
+
+    text: Annotated[str, Field(min_length=1)]
+    where: str = Field(default="", description="Figure, page or equation.")
+    printed: str | None = Field(default=None, description="As the source has it; left out where ours goes beyond it.")
+    value: str
+    unit: str = ""
+    expected: Expression | None = Field(default=None, alias="is", description="Printed number in that unit.")
+    within: int | float | str | None = Field(default=None, description='Allowed: a number in that unit, or "15 %".')
+    holds: str | None = Field(default=None, description="Condition, with the name value, in place of is and within.")
+    assuming: AssumptionTable | None = None
+    why: str = ""
+
+    @model_validator(mode="after")
+    def _is_judged(self) -> StatementTable:
+        if (self.holds is None) == (self.expected is None):
+            raise f.refusal("is judged by is and within, or by holds; give one of the two")
+        if (self.expected is None) != (self.within is None):
+            raise f.refusal("needs is and within together; give both")
+        return self
+
+
+class AxisTable(Table):
+    """One axis of a panel."""
+
+    label: str = ""
+    ends: list[Expression] | None = Field(default=None, min_length=2, max_length=2)
+    names: list[str] | str | None = Field(default=None, description="Of the places 0, 1, 2 ..., in place of numbers.")
+    ticks: list[int | float] | None = None
+    log: list[float] = Field(default_factory=list, description="First figures of the ticks of a logarithmic axis.")
+
+
+class CurveTable(Table):
+    """A line, or dots where it has a marker and no width."""
+
+    y: Expression
+    x: Expression | None = Field(
+        default=None, description="The dimension of y where left out; a name means its places."
+    )
+    each: Each = Field(default_factory=dict, alias="for")
+    label: str = ""
+    end: str = Field(default="", description="Words at the last point.")
+    colours: list[str] = Field(default=[str(name) for name in SERIES])
+    width: float = 2.0
+    dash: list[float] = Field(default_factory=list)
+    marker: str = ""
+
+
+class BarsTable(Table):
+    """Groups of bars, one of each group for every value."""
+
+    filled: str
+    outline: str | None = None
+    each: Each = Field(default_factory=dict, alias="for")
+    label: str = ""
+    labels: list[str] = Field(default_factory=list)
+    colours: list[str] = Field(default=["grey", "sky", "orange", "blue", "vermilion", "green"])
+
+
+class WordsTable(Table):
+    """Words at a place."""
+
+    x: Expression
+    y: Expression
+    text: str
+    colour: str = "faint"
+    across: Literal["left", "center", "right"] = "left"
+    along: Literal["bottom", "center", "top"] = "center"
+
+
+class AreaTable(Table):
+    """What lies between two values of y from one x to another."""
+
+    x: list[Expression] = Field(min_length=2, max_length=2)
+    y: list[Expression] = Field(min_length=2, max_length=2)
+    colour: str = "pale"
+    label: str = ""
+
+
+class PanelTable(Table):
+    """What shares two axes."""
+
+    title: str = ""
+    x: AxisTable = AxisTable()
+    y: AxisTable = AxisTable()
+    areas: list[AreaTable] = Field(default_factory=list)
+    curves: list[CurveTable] = Field(default_factory=list)
+    bars: BarsTable | None = None
+    words: list[WordsTable] = Field(default_factory=list)
+
+
+class PictureTable(Table):
+    """The picture of a part; its title is that of the part where left out."""
+
+    title: str | None = None
+    words: str = ""
+    size: list[float] = Field(default=[7.2, 4.0], min_length=2, max_length=2, description="Of a panel [inch].")
+    columns: Annotated[int, Field(ge=1)] = 1
+    gap: float = 0.7
+    room: float = 0.0
+    panels: list[PanelTable] = Field(min_length=1)

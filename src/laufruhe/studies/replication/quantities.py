@@ -1,0 +1,139 @@
+"""What may be asked of a case: any measure of a problem file, and what else stands in `RESULTS`, by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from laufruhe.errors import ModelError
+from laufruhe.files.asked import Scene
+from laufruhe.files.complaints import nearest
+from laufruhe.files.file_models import QuantityTable
+from laufruhe.numerics.spectrum import order_amplitude
+from laufruhe.physics.metrics import cycle_measures, turning_parts
+from laufruhe.physics.modes import MOTIONS
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import mount_samples
+from laufruhe.problem.measure import MEASURES
+from laufruhe.solvers.result import Result
+
+ORDERS = (1.0, 2.0, 4.0, 6.0)
+FORCE, COUPLE = slice(0, 3), slice(4, 6)
+DECISION = "decision "
+
+
+class AskedTable(QuantityTable):
+    """A quantity of every case, narrowed."""
+
+    quantity: str
+    of: list[str] | None = Field(default=None, description="Counterweights or balancers whose mass counts.")
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """Numbers along named dimensions, as JSON holds them: nested lists, and the labels of each dimension in turn."""
+
+    values: Any
+    coords: Mapping[str, list[Any]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For the file of finished points."""
+        return {"values": self.values, "coords": dict(self.coords)}
+
+
+def check_asked(what: str | AskedTable) -> None:
+    """Whether there is such a quantity.
+
+    Raises
+    ------
+    ModelError
+        With the nearest one.
+    """
+    name = what if isinstance(what, str) else what.quantity
+    known = [*RESULTS, *MEASURES]
+    if name not in known and not name.startswith(DECISION):
+        raise ModelError(f"'{name}' is no quantity; {nearest(name, known)}")
+
+
+def asked(result: Result, what: str | AskedTable) -> Labelled:
+    """A quantity of the design that a case ends at [SI].
+
+    Raises
+    ------
+    ModelError
+        If this engine has none of it.
+    """
+    table = AskedTable(quantity=what) if isinstance(what, str) else what
+    name = table.quantity
+    if name in RESULTS:
+        return RESULTS[name](result, table)
+    if name.startswith(DECISION):
+        values = {decision.name: decision.value for decision in result.decisions}
+        return Labelled(values.get(name.removeprefix(DECISION), math.nan), {})
+    scene = Scene(result.final.engine, result.problem.points)
+    found = list(result.final.values(scene.measure(name, table, "quantities.quantity")))
+    return Labelled(found, {"number": list(range(1, len(found) + 1))}) if len(found) > 1 else Labelled(found[0], {})
+
+
+def _signal(result: Result, _: AskedTable) -> Labelled:
+    """Mount forces over the cycle."""
+    values = mount_samples(result.final, 0)[:, :, 1:]
+    turns = result.final.engine.cycle.turns
+    angle = (360.0 * turns * np.arange(len(values)) / len(values)).tolist()
+    names = result.final.mount_names
+    return Labelled(values.tolist(), {"angle": angle, "mount": names, "direction": ["lateral", "vertical"]})
+
+
+def _by_mount(measure: str, result: Result, _: AskedTable) -> Labelled:
+    forces = mount_samples(result.final, 0)
+    values = [getattr(cycle_measures(forces[:, m]), measure) for m in range(forces.shape[1])]
+    return Labelled(values, {"mount": result.final.mount_names})
+
+
+def _by_order(part: slice, result: Result, table: AskedTable) -> Labelled:
+    """Largest of a free load over a turn, order by order."""
+    orders = table.orders or ORDERS
+    wrench = result.final.loads[0].wrench
+    return Labelled([float(order_amplitude(wrench.at(order)[part])) for order in orders], {"order": list(orders)})
+
+
+def _turning(part: slice, result: Result, table: AskedTable) -> Labelled:
+    """What of a free load turns with the crank and against it."""
+    orders = table.orders or ORDERS
+    values = [list(turning_parts(*result.final.loads[0].wrench.at(order)[part][-2:])) for order in orders]
+    return Labelled(values, {"order": list(orders), "turns": ["with the crank", "against the crank"]})
+
+
+def _bound(result: Result, _: AskedTable) -> Labelled:
+    return Labelled(result.certificate.lower_bound if result.certificate else math.nan, {})
+
+
+def _intervals(result: Result, _: AskedTable) -> Labelled:
+    values = [math.degrees(angle) for angle in result.final.engine.firing_intervals]
+    return Labelled(values, {"firing": list(range(1, len(values) + 1))})
+
+
+def _energy(result: Result, _: AskedTable) -> Labelled:
+    energy = mounting_in(result.final.engine).modes.energy
+    return Labelled(energy.tolist(), {"motion": list(MOTIONS), "mode": list(range(1, 7))})
+
+
+RESULTS: Mapping[str, Callable[[Result, AskedTable], Labelled]] = {
+    "mount forces": _signal,
+    "mean force by mount": partial(_by_mount, "mean"),
+    "maximum force by mount": partial(_by_mount, "max"),
+    "free force": partial(_by_order, FORCE),
+    "free couple": partial(_by_order, COUPLE),
+    "turning force": partial(_turning, FORCE),
+    "turning couple": partial(_turning, COUPLE),
+    "firing intervals": _intervals,
+    "energy shares": _energy,
+    "lower bound": _bound,
+}
+"""Quantities beside the measures."""
