@@ -28,7 +28,7 @@ from laufruhe.load_models.batch import Designs, prepare, random_decisions  # noq
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
 from laufruhe.machine.layouts import Mechanism, boxer, build, inline  # noqa: E402
 from laufruhe.numerics.batch_norms import BatchNorm  # noqa: E402
-from laufruhe.numerics.norms import NORMS  # noqa: E402
+from laufruhe.numerics.norms import NORMS, Grid  # noqa: E402
 from laufruhe.physics.fidelity import Fidelity  # noqa: E402
 from laufruhe.physics.shaking_loads import forget  # noqa: E402
 from laufruhe.problem import channels  # noqa: E402
@@ -133,7 +133,7 @@ def _other_rotors(problem: Problem, engine: Engine) -> Callable[[], object]:
 def _one_row(designs: Designs) -> Designs:
     """The same calls with nothing to do."""
     terms = tuple(
-        (weight, BatchNorm(norm.norm, np.ascontiguousarray(norm.rows[:, :, :1]), norm.weights[:1]))
+        (weight, BatchNorm(norm.norm, np.ascontiguousarray(norm.rows[:, :, :1]), Grid(norm.grid.weights[:1], 1)))
         for weight, norm in designs.terms
     )
     return replace(designs, terms=terms)

@@ -111,7 +111,7 @@ def many_speeds(problem: Problem) -> list[str]:
 
 def joint(problem: Problem) -> list[str]:
     """Balance and mounts together: this project and SLSQP with finite differences, from the same 32 starts."""
-    problem = replace(problem, mount_design=replace(problem.mount_design, starts=STARTS))
+    problem = replace(problem, search=replace(problem.search, starts=STARTS))
     started = time.perf_counter()
     result = solve_joint(problem)
     ours = time.perf_counter() - started
@@ -155,10 +155,10 @@ class _LateError(Exception):
 
 def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tuple[float, float, bool]:
     """Objective, seconds, and whether all limits are kept, from one start."""
-    design = problem.mount_design
-    low = np.array([d.lower for d in design.decisions] + [-d.upper for d in problem.decisions for _ in range(2)])
-    high = np.array([d.upper for d in design.decisions] + [d.upper for d in problem.decisions for _ in range(2)])
-    count, began = len(design.decisions), time.perf_counter()
+    places, rotors = problem.mount_decisions, problem.unbalances
+    low = np.array([d.lower for d in places] + [-d.upper for d in rotors for _ in range(2)])
+    high = np.array([d.upper for d in places] + [d.upper for d in rotors for _ in range(2)])
+    count, began = len(places), time.perf_counter()
     known: dict[bytes, tuple[float, np.ndarray]] = {}
     point = np.clip((np.concatenate([mounts, columns]) - low) / (high - low), 0.0, 1.0)
 
@@ -166,10 +166,10 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
         """Objective, and the room under every limit."""
         x = low + y * (high - low)
         unbalances = [complex(a, b) for a, b in x[count:].reshape(-1, 2)]
-        at = evaluate(problem, problem.design(unbalances, x[:count].tolist()), SAMPLES)
-        rooms = [-at.standing(limit).excess for limit in design.limits]
-        rooms += [1.0 - at.value(limit.measure) / limit.maximum for limit in problem.limits]
-        rooms += [1.0 - abs(u) / d.upper for d, u in zip(problem.decisions, unbalances, strict=True)]
+        at = evaluate(problem, problem.design([*unbalances, *x[:count].tolist()]), SAMPLES)
+        rooms = [-at.standing(limit).excess for limit in problem.mount_limits]
+        rooms += [1.0 - at.value(limit.measure) / limit.maximum for limit in problem.load_limits]
+        rooms += [1.0 - abs(u) / d.upper for d, u in zip(rotors, unbalances, strict=True)]
         return objective_value(problem, at), np.array(rooms)
 
     def seen(y: np.ndarray) -> tuple[float, np.ndarray]:
