@@ -30,26 +30,20 @@ MOST_ORDERS = 3
 
 @dataclass(frozen=True, eq=False)
 class MountingFacts:
-    """Modes of one design and what its scene does to them.
+    """Modes of one design and what its scene does to them [SI].
 
     Attributes
     ----------
-    modes
-        Natural modes.
     excited
-        Indices of those that any operating point drives (E12).
+        Indices of the modes that any operating point drives (E12).
     orders
         Orders that make most of the load, the strongest first.
-    sag
-        Of the centre of gravity under its own weight [m].
-    mount_sag
-        At every mount, downwards [m].
+    sag, mount_sag
+        Of the centre of gravity under its own weight, and at every mount, downwards [m].
     torque_travel
         Largest displacement of any mount under the mean torque [m].
-    torque_roll_axis
-        Unit vector (E8).
-    torque_roll_coupling
-        Zero where turning about that axis is a mode (E8).
+    torque_roll_axis, torque_roll_coupling
+        Unit vector, and what is zero where turning about it is a mode (E8).
     """
 
     modes: Modes

@@ -6,7 +6,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from laufruhe.errors import Complaint, InputError
@@ -39,20 +39,18 @@ def staged(folder: Path, option: str, names: Collection[str] = RESULT_FILES) -> 
     InputError
         If nothing can be written to `folder`.
     """
-    made: list[Path] = []
-    try:
-        _make(folder, made)
-        _check_free(folder, names)
-        stage = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
-    except OSError as error:
-        _remove_empty(made)
-        raise _refused(option, folder, error) from None
-    try:
+    missing = [path for path in (folder, *folder.parents) if not path.exists() and not path.is_symlink()]
+    with ExitStack() as undone:
+        # deepest first; what holds files by then stays
+        undone.callback(_remove_empty, missing)
+        try:
+            stage = _stage(folder, names)
+        except OSError as error:
+            why = f"cannot be written ({error.strerror or error})"
+            raise InputError("laufruhe", (Complaint(option, str(folder), why, "name another place"),)) from None
+        undone.callback(shutil.rmtree, stage, ignore_errors=True)
         yield stage
         _move(stage, folder, names)
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
-        _remove_empty(made)
 
 
 @contextmanager
@@ -83,22 +81,15 @@ def write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
-def _make(folder: Path, made: list[Path]) -> None:
-    missing = []
-    while not folder.exists() and not folder.is_symlink():
-        missing.append(folder)
-        folder = folder.parent
-    for path in reversed(missing):
-        path.mkdir()
-        made.append(path)
-    if not folder.is_dir():
-        raise NotADirectoryError(f"'{folder}' is not a folder")
-
-
-def _check_free(folder: Path, names: Collection[str]) -> None:
-    for name in names:
-        if (folder / name).is_dir():
-            raise IsADirectoryError(f"'{name}' is a folder there")
+def _stage(folder: Path, names: Collection[str]) -> Path:
+    above = next(path for path in (folder, *folder.parents) if path.exists() or path.is_symlink())
+    if not above.is_dir():
+        raise NotADirectoryError(f"'{above}' is not a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    taken = [name for name in names if (folder / name).is_dir()]
+    if taken:
+        raise IsADirectoryError(f"'{taken[0]}' is a folder there")
+    return Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
 
 
 def _move(stage: Path, folder: Path, names: Collection[str]) -> None:
@@ -110,11 +101,6 @@ def _move(stage: Path, folder: Path, names: Collection[str]) -> None:
 
 
 def _remove_empty(folders: list[Path]) -> None:
-    for folder in reversed(folders):
+    for folder in folders:
         with suppress(OSError):
             folder.rmdir()
-
-
-def _refused(option: str, folder: Path, error: OSError) -> InputError:
-    why = error.strerror or str(error)
-    return InputError("laufruhe", (Complaint(option, str(folder), f"cannot be written ({why})", "name another place"),))
