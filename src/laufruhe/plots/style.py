@@ -100,19 +100,21 @@ def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], so
     figure.text(left, 0.14 / high, fitted(source, wide, 7), size=7, va="bottom", color=FAINT)
 
 
+def headed(drawn: Page, result: Result, title: str, lines: str, legend: Sequence[Artist], note: str = "") -> Figure:
+    """The page of a result, finished; the note says what it leaves out."""
+    problem = result.problem
+    described = f"Engine: {problem.source}. " if problem.source else ""
+    source = f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
+    heading(drawn.figure, title, lines, legend, source)
+    return drawn.figure
+
+
 def _legend_columns(labels: Sequence[str], inches: float) -> int:
     """Entries side by side: all of them, or half where the figure is too narrow for one row."""
     letters = sum(len(label) for label in labels)
     handles_and_gaps = 4.0 * len(labels)
     fits = 9.0 / 72.0 * (0.53 * letters + handles_and_gaps) <= inches - 0.6
     return len(labels) if fits else -(-len(labels) // 2)
-
-
-def source_line(result: Result, note: str = "") -> str:
-    """Where the data come from, after what the picture leaves out."""
-    problem = result.problem
-    described = f"Engine: {problem.source}. " if problem.source else ""
-    return f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
 
 
 def fitted(text: str, inches: float, points: float) -> str:

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import ElasticMounting
@@ -17,12 +16,10 @@ from laufruhe.physics.modes import (
     torque_roll_coupling,
     weight_wrench,
 )
-from laufruhe.present.measures import has_mounts
+from laufruhe.present.measures import Array, has_mounts
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 MAIN_SHARE = 0.1
 MOST_ORDERS = 3

@@ -7,12 +7,11 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.wrench import WRENCH
-from laufruhe.present.measures import PRESENT, is_met, limits_of, mount_orders, shaking_orders
+from laufruhe.present.measures import PRESENT, Array, is_met, limits_of, mount_orders, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.prove.certificate import Proof
@@ -150,7 +149,7 @@ def _all_points(result: Result, mounts: list[list[Record]]) -> list[Record]:
     ]
 
 
-def _over_points(entries: Any, share: NDArray[np.float64]) -> dict[str, float]:
+def _over_points(entries: Any, share: Array) -> dict[str, float]:
     return {
         "mean": float(share @ [entry["mean"] for entry in entries]),
         "max": max(entry["max"] for entry in entries),

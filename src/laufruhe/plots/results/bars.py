@@ -6,15 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
-from laufruhe.plots.style import FAINT, Series, fitted, heading, page, series_of, source_line, thin
-from laufruhe.present.measures import hardest_point, has_mounts
+from laufruhe.plots.style import FAINT, Series, fitted, headed, page, series_of, thin
+from laufruhe.present.measures import Array, hardest_point, has_mounts
 from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 MOST_POINTS = 4
 WIDTH = 0.36
@@ -42,8 +39,7 @@ def figure(result: Result) -> Figure:
         Patch(facecolor=one.colour, edgecolor=one.colour, label=f"{one.name}: mean"),
         Patch(facecolor="none", edgecolor=one.colour, linewidth=1.4, label="maximum"),
     )]  # fmt: skip
-    heading(drawn.figure, "Mean and maximum mount forces", lines, legend, source_line(result))
-    return drawn.figure
+    return headed(drawn, result, "Mean and maximum mount forces", lines, legend)
 
 
 def _measures(design: Evaluation, k: int) -> Array:

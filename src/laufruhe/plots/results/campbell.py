@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, fastest, limits_on, mark_points, order_entries
-from laufruhe.plots.style import AFTER, FAINT, INK, entry, entry_of_dots, heading, page, source_line
+from laufruhe.plots.style import AFTER, FAINT, INK, entry, entry_of_dots, headed, page
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import number
@@ -47,8 +47,7 @@ def figure(result: Result) -> Figure:
     which = "of the design as decided" if changed(result) else "as given"
     lines = f"Natural frequencies {which}, and the orders that load it most."
     legend = [*order_entries(facts, AFTER), critical, *legend]
-    heading(drawn.figure, "Critical speeds", lines, legend, source_line(result))
-    return drawn.figure
+    return headed(drawn, result, "Critical speeds", lines, legend)
 
 
 def _modes(axes: Axes, facts: MountingFacts, reach: float) -> None:

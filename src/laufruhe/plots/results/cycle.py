@@ -11,14 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
-from numpy.typing import NDArray
 
 from laufruhe.machine import Engine
-from laufruhe.plots.style import FAINT, INK, Series, entry, fitted, heading, page, series_of, source_line
-from laufruhe.present.measures import hardest_point
+from laufruhe.plots.style import FAINT, INK, Series, entry, fitted, headed, page, series_of
+from laufruhe.present.measures import Array, hardest_point
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6
 # width of one panel and of several side by side, height, gaps [inch]
@@ -83,9 +80,9 @@ def figure(result: Result) -> Figure:
     lines = f"{what}{at}; above, the cylinders that fire."
     firing = entry("a cylinder fires", color=FAINT, linewidth=0.8, linestyle=STYLES[2])
     legend = [*(one.entry() for one in series), firing]
-    source = source_line(result, _left_out(result, shown, mounts))
-    heading(drawn.figure, "Forces and moments over one working cycle", lines, legend, source)
-    return drawn.figure
+    return headed(
+        drawn, result, "Forces and moments over one working cycle", lines, legend, _left_out(result, shown, mounts)
+    )
 
 
 def _points(result: Result) -> list[int]:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from laufruhe.plots.style import AFTER, BEFORE, heading, page, source_line
+from laufruhe.plots.style import AFTER, BEFORE, headed, page
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.solvers.ranking import PhasingResult, RankedOrder
 from laufruhe.solvers.result import Result
@@ -36,8 +36,7 @@ def figure(result: Result) -> Figure:
     uneven = any(max(o.intervals) - min(o.intervals) > 1e-6 for _, o in shown)
     intervals = " [deg]." if uneven else f", {cycle / count:g} deg for all."
     lines = f"Cylinder that fires, and the crank angle to the next firing{intervals}"
-    heading(drawn.figure, "Firing orders", lines, legend[: 1 + any(k for k, _ in shown)], source_line(result))
-    return drawn.figure
+    return headed(drawn, result, "Firing orders", lines, legend[: 1 + any(k for k, _ in shown)])
 
 
 def _shown(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.plots.style import INK, entry, heading, page, series_of, source_line
+from laufruhe.plots.style import INK, entry, headed, page, series_of
 from laufruhe.present.mounting import MountingFacts, facts_of, is_elastic
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
@@ -23,8 +23,7 @@ def figure(result: Result) -> Figure:
         _shares(axes, facts_of(one.design))
         axes.set_title(one.name, loc="left", size=10, pad=8, parse_math=False)
     lines = "Percent of kinetic energy; a mode of its own has 100 in one row. Bold: excited."
-    heading(drawn.figure, "Natural modes", lines, [entry("", linestyle="none")], source_line(result))
-    return drawn.figure
+    return headed(drawn, result, "Natural modes", lines, [entry("", linestyle="none")])
 
 
 def _shares(axes: Axes, facts: MountingFacts) -> None:

@@ -10,7 +10,6 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from laufruhe.machine import Mount
 from laufruhe.plots.style import (
@@ -20,19 +19,16 @@ from laufruhe.plots.style import (
     Series,
     entry_of_dots,
     fitted,
-    heading,
+    headed,
     page,
     point_name,
     series_of,
-    source_line,
     thin,
 )  # fmt: skip
-from laufruhe.present.measures import hardest_point, has_mounts
+from laufruhe.present.measures import Array, hardest_point, has_mounts
 from laufruhe.present.numbers import trimmed
 from laufruhe.problem.evaluation import mount_samples
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 MOST_PANELS = 12
 PANEL = 2.9
@@ -56,9 +52,7 @@ def figure(result: Result) -> Figure:
         _frame(axes, mount, result.final.engine.mounts[m], lateral, vertical)
     _label(drawn, columns)
     lines = f"Force on each mount at {point_name(result, k)}, seen from the front."
-    source = source_line(result, _left_out(paths))
-    heading(drawn.figure, "Mount forces over one working cycle", lines, _legend(series), source)
-    return drawn.figure
+    return headed(drawn, result, "Mount forces over one working cycle", lines, _legend(series), _left_out(paths))
 
 
 def _reach(paths: list[Array], count: int) -> tuple[float, float]:

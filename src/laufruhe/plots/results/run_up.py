@@ -10,7 +10,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.run_up import RunUp, run_through
 from laufruhe.physics.speed_map import split_loads
 from laufruhe.plots.speed_axis import RPM, driven, main_order
-from laufruhe.plots.style import INK, entry, heading, page, series_of, source_line
+from laufruhe.plots.style import INK, entry, headed, page, series_of
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import figure as words
 from laufruhe.problem.channels import mounting_in
@@ -46,8 +46,7 @@ def figure(result: Result) -> Figure:
     drawn.panels[1].set_xlabel("crank speed [rpm]")
     legend += [entry(name, color=INK, linestyle=style) for style, name in _RUNS]
     lines = f"On any mount, in {SECONDS:g} s at constant acceleration; loads of {point.name}."
-    heading(drawn.figure, "Through resonance", lines, legend, source_line(result))
-    return drawn.figure
+    return headed(drawn, result, "Through resonance", lines, legend)
 
 
 def _last(result: Result) -> float:

@@ -9,15 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import order_amplitude
-from laufruhe.plots.style import FAINT, heading, page, point_name, series_of, source_line
-from laufruhe.present.measures import hardest_point, main_load, mount_orders, padded
+from laufruhe.plots.style import FAINT, headed, page, point_name, series_of
+from laufruhe.present.measures import Array, hardest_point, main_load, mount_orders, padded
 from laufruhe.problem.loads import PointLoads
 from laufruhe.solvers.result import Result
 
-Array = NDArray[np.float64]
 Panel = tuple[str, Callable[[PointLoads], Array]]
 
 SHARE = 0.005
@@ -49,8 +47,7 @@ def figure(result: Result) -> Figure:
     what = "Amplitude of the force on a mount" if with_mounts else "Amplitude of the load on the block"
     lines = f"{what} at {point_name(result, k)}; order 0 is the steady part."
     legend = [Patch(facecolor=one.colour, label=one.name) for one in series]
-    heading(drawn.figure, title, lines, legend, source_line(result))
-    return drawn.figure
+    return headed(drawn, result, title, lines, legend)
 
 
 def _mount_panels(result: Result) -> list[Panel]:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from laufruhe.plots.style import AFTER, BEFORE, FAINT, INK, entry, heading, page, source_line
+from laufruhe.plots.style import AFTER, BEFORE, FAINT, INK, entry, headed, page
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import number
 from laufruhe.solvers.ranking import RankedStar
@@ -36,8 +36,7 @@ def figure(result: Result) -> Figure:
         along.set_title(_balance(star), loc="left", size=8, color=FAINT, parse_math=False)
     legend = [entry("best star", color=AFTER, marker="o"), entry("next in the ranking", color=BEFORE, marker="o")]
     lines = "From the front, turning clockwise; and from the left: full pins point to you, crossed ones away."
-    heading(drawn.figure, "Crank stars", lines, legend[: min(len(stars), 2)], source_line(result))
-    return drawn.figure
+    return headed(drawn, result, "Crank stars", lines, legend[: min(len(stars), 2)])
 
 
 def _title(result: Result, star: RankedStar, k: int) -> str:

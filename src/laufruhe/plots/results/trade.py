@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from laufruhe.plots.style import AFTER, BEFORE, FAINT, entry, heading, page, source_line
+from laufruhe.plots.style import AFTER, BEFORE, FAINT, entry, headed, page
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
@@ -47,5 +47,4 @@ def figure(result: Result) -> Figure:
     )  # fmt: skip
     legend = [entry("best local optimum found", color=AFTER, marker="o"), entry("proven: no design below", **_BOUND)]
     lines = "What slightly uneven crank angles buy; each point is a design, evaluated by the exact model."
-    heading(drawn.figure, "Balance against even firing", lines, legend, source_line(result))
-    return drawn.figure
+    return headed(drawn, result, "Balance against even firing", lines, legend)

@@ -9,22 +9,19 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.physics.speed_map import speed_map, split_loads
 from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, fastest, limits_on, mark_points, order_entries
-from laufruhe.plots.style import FAINT, INK, entry, heading, page, series_of, source_line
-from laufruhe.present.measures import hardest_point
+from laufruhe.plots.style import FAINT, INK, entry, headed, page, series_of
+from laufruhe.present.measures import Array, hardest_point
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 SPEEDS = 400
 applies = is_elastic
@@ -51,8 +48,7 @@ def figure(result: Result) -> Figure:
     axes.minorticks_off()
     axes.set(xlim=(0.0, top * RPM), ylim=(1e-2, 1.6 * highest), xlabel="crank speed [rpm]", ylabel="transmissibility")
     lines = f"Force on the mounts over that on mounts that give no way; loads of {point.name}."
-    heading(drawn.figure, "Transmissibility over speed", lines, legend, source_line(result))
-    return drawn.figure
+    return headed(drawn, result, "Transmissibility over speed", lines, legend)
 
 
 def _curves(

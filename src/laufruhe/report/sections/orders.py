@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from laufruhe.present.measures import hardest_point, has_mounts, load_designs, mount_orders, padded, shaking_orders
+from laufruhe.present.measures import (
+    Array,
+    hardest_point,
+    has_mounts,
+    load_designs,
+    mount_orders,
+    padded,
+    shaking_orders,
+)
 from laufruhe.present.numbers import aligned
 from laufruhe.problem.loads import PointLoads
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 SHOWN = 8
 SHARE = 0.005
