@@ -1,0 +1,324 @@
+"""Measures of a design over crank speed, its limits beside them, and the amplitude of every order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from laufruhe.errors import InputError
+from laufruhe.files import fields as f
+from laufruhe.files.asked import Scene
+from laufruhe.files.complaints import Refused, measured, nearest
+from laufruhe.files.file_models import QuantityName, QuantityTable
+from laufruhe.files.study_parts import CaseTable
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.spectrum import order_amplitude
+from laufruhe.physics.elastic_mounts import ResonanceError
+from laufruhe.problem.channels import ON_BLOCK, LoadChannel, mounting_in
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Measure, selected
+from laufruhe.problem.problem import Problem
+from laufruhe.studies import picture as p
+from laufruhe.studies.outcome import AS_GIVEN, decided
+from laufruhe.studies.part import Part, Record, variable
+from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.text import NOTHING, Rows, Text, number
+from laufruhe.units import readable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+DesignName = Literal["as given", "as decided"]
+RPM, PER_RAD = readable("rad/s")
+MOST_SPEEDS, MOST_ORDERS, PRESENT = 20_000, 8, 0.01
+
+
+class SpeedsTable(f.Table):
+    """Crank speeds: so many, or in steps, from the lower to the higher."""
+
+    first: f.Speed = Field(alias="from")
+    last: f.Speed = Field(alias="to")
+    points: Annotated[int, Field(ge=2, le=MOST_SPEEDS)] | None = None
+    step: f.Speed | None = None
+
+    @model_validator(mode="after")
+    def _is_a_range(self) -> SpeedsTable:
+        if self.first >= self.last:
+            raise f.refusal("go nowhere; write the lower speed first")
+        if (self.points is None) == (self.step is None):
+            raise f.refusal("have no steps, or are told them twice; give points or step, one of them")
+        if self.step is not None and not 1.0 <= (self.last - self.first) / self.step < MOST_SPEEDS:
+            raise f.refusal("have a step that does not fit between their ends; give another")
+        return self
+
+    def with_point(self, point: OperatingPoint) -> Array:
+        """Ascending [rad/s], that of an operating point between them too."""
+        count = self.points or int((self.last - self.first) / (self.step or 1.0) + 1e-9) + 1
+        steps = self.first + (self.step or (self.last - self.first) / (count - 1)) * np.arange(count)
+        steps = steps[~np.isclose(steps, point.speed, rtol=1e-9)]
+        return np.sort([*steps, *([point.speed] if self.first <= point.speed <= self.last else [])])
+
+
+class MeasureTable(QuantityTable):
+    """One line of the map."""
+
+    quantity: QuantityName
+    limit: str | None = Field(default=None, description="Drawn beside those of the problem.")
+
+
+class SpeedMap(Part):
+    """Measures over crank speed, of designs as given and as decided at the file's own operating points."""
+
+    kind: Literal["speed map"]
+    speeds: SpeedsTable
+    measures: list[MeasureTable] = Field(
+        default_factory=list, description="In place of all that the problem minimises or limits and speed changes."
+    )
+    operating_point: str | None = Field(default=None, description="Whose load is kept; the first where left out.")
+    designs: list[DesignName] = Field(default=["as given", "as decided"], min_length=1)
+    by_order: bool = Field(default=False, description="Also the amplitude of every order of the first measure.")
+
+    def points(self, scenes: Scenes) -> list[Point]:
+        """A case each: what is decided does not hang on the speeds."""
+        for case in self.cases:
+            problem = scenes.problem(Point(case))
+            self._load(problem, case, scenes)
+            measures = list(self._measures(problem, case, scenes))
+            if not measures:
+                rule = "asks for nothing that speed changes"
+                raise scenes.refused(case, "objective", rule, "name measures in the part")
+            if self.by_order and not measures[0].is_load:
+                rule = f"has no orders of its first measure, {measures[0].name}"
+                raise scenes.refused(case, "objective", rule, "name a force, couple, moment or travel first")
+            with scenes.blamed(Point(case)):
+                evaluate(problem)
+        return [Point(case) for case in self.cases]
+
+    def _load(self, problem: Problem, case: CaseTable, scenes: Scenes) -> OperatingPoint:
+        names, wanted = [point.name for point in problem.points], self.operating_point
+        if wanted is not None and wanted not in names:
+            raise scenes.refused(case, "operating_points", f"has no '{wanted}'", nearest(wanted, names))
+        return problem.points[0 if wanted is None else names.index(wanted)]
+
+    def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[Measure, float]:
+        """What is mapped, at whatever speed, and the part's own limits."""
+        scene, asked = Scene(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
+        try:
+            if self.measures:
+                asked = {}
+            for k, table in enumerate(self.measures, 1):
+                measure = scene.measure(table.quantity, table, f"measures[{k}].quantity")
+                where = f"measures[{k}].limit"
+                asked[measure] = math.inf if table.limit is None else measured(table.limit, measure.unit, where)
+        except Refused as refused:
+            raise InputError(str(scenes.folder / case.problem), (refused.complaint,)) from None
+        return {replace(m, points=None): limit for m, limit in asked.items() if set(ON_BLOCK) <= set(m.channel.keys)}
+
+    def answer(self, point: Point, scenes: Scenes) -> Record:
+        """Values, limits and orders of every design at every speed."""
+        problem = scenes.problem(point)
+        load, asked = self._load(problem, point.case, scenes), self._measures(problem, point.case, scenes)
+        measures = list(asked)
+        speeds = self.speeds.with_point(load)
+        with scenes.blamed(point):
+            designs = {
+                name: {**_mapped(problem, load, speeds, engine, measures, self.by_order), "proof": proof}
+                for name, engine, proof in self._engines(problem)
+            }
+        return {
+            "speeds": speeds.tolist(),
+            "measures": [[measure.name, measure.unit] for measure in measures],
+            "limits": [_limits(problem, measure, load, speeds, own) for measure, own in asked.items()],
+            "designs": designs,
+        }
+
+    def _engines(self, problem: Problem) -> Iterator[tuple[DesignName, Engine, str]]:
+        is_open = bool(problem.decisions or problem.phasing)
+        if "as given" in self.designs or not is_open:
+            yield "as given", problem.engine, AS_GIVEN
+        if "as decided" in self.designs and is_open:
+            result, status, proof = decided(problem)
+            yield "as decided", result.final.engine, proof if status in ("optimal", "feasible") else status
+
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+        """A point for every case, design and speed, in that order; NaN on a resonance that nothing damps."""
+        import xarray as xr
+
+        units = {name: unit for record in records for name, unit in record["measures"]}
+        each = [
+            _one(point.case.name, design, own, record)
+            for point, record in zip(points, records, strict=True)
+            for design, own in record["designs"].items()
+        ]
+        found = xr.concat(each, "point", join="outer").reindex(measure=list(units))
+        found = found.drop_dims([name for name in ("order", "mode") if not found.sizes[name]])
+        words = {"value": "of every measure, in measure_unit", "limit": "that it is to keep under, in measure_unit"}
+        for name, text in words.items():
+            found[name].attrs["long_name"] = text
+        if "amplitude" in found:
+            own = {"long_name": "largest amplitude of every order of crank speed", "of": next(iter(units))}
+            found["amplitude"].attrs.update(own | {"units": next(iter(units.values()))})
+        if "frequency" in found:
+            found["frequency"].attrs.update(units="Hz", long_name="natural frequencies on the mounts")
+        return found.assign_coords(measure_unit=("measure", list(units.values()))).assign_attrs(self.about())
+
+    @staticmethod
+    def table(data: xr.Dataset) -> list[Text]:
+        """Every line of the map: where it is largest, and where over its limit."""
+        data = _readable(data)
+        head = ["case", "design", "measure", "least", "largest", f"at [{RPM}]", "limit", f"over it, from to [{RPM}]"]
+        rows = []
+        for case, design, one in _designs(data):
+            for name, unit in zip(data["measure"].values, data["measure_unit"].values, strict=True):
+                values, limits = (one[what].sel(measure=name).values for what in ("value", "limit"))
+                if np.isnan(values).all():
+                    continue
+                speeds, most, known = one["speed"].values, int(np.nanargmax(values)), limits[np.isfinite(limits)]
+                over = speeds[values > limits * (1.0 + 1e-6)]
+                edges = f"{over.min():.4g} to {over.max():.4g}" if len(over) else "nowhere"
+                cells = [case, design, f"{name} [{unit}]" if unit else str(name), number(np.nanmin(values))]
+                cells += [number(values[most]), f"{speeds[most]:.4g}"]
+                rows.append([*cells, *((number(known[0]), edges) if len(known) else (NOTHING, NOTHING)),
+                             str(one["proof"].values[0])])  # fmt: skip
+        return [Rows([*head, "proof"], rows)]
+
+    @staticmethod
+    def picture(data: xr.Dataset) -> p.Picture:
+        """A panel a measure, designs as given dashed; then a panel a design of its orders."""
+        data = _readable(data)
+        designs = list(_designs(data))
+        panels = [_panel(data, designs, k) for k in range(data.sizes["measure"])]
+        panels += [_orders(*one) for one in designs] if "amplitude" in data else []
+        words = "Each design at every speed, its load kept."
+        words += " Strokes on the axis: an order meets a mode." if "amplitude" in data and "frequency" in data else ""
+        legend = [replace(m, x=(), y=()) for m in panels[0].marks if isinstance(m, p.Line) and m.label]
+        legend += [p.Line(dash=p.DASHES[1], width=1.2, label="limit")] if data["limit"].notnull().any() else []
+        size = (p.WIDE, p.HIGH if len(panels) == 1 else 2.2)
+        return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, gap=0.8, legend=legend)
+
+
+def _mapped(
+    problem: Problem, load: OperatingPoint, speeds: Array, engine: Engine, measures: Sequence[Measure], by_order: bool
+) -> Record:
+    """Values (measures, speeds) of one design, amplitudes (orders, speeds), and natural frequencies [Hz]."""
+    values = np.full((len(measures), len(speeds)), math.nan)
+    sizes: dict[float, Array] = {}
+    channel = measures[0].channel
+    for k, speed in enumerate(speeds):
+        try:
+            found = evaluate(replace(problem, points=(replace(load, speed=float(speed)),)), engine)
+        except ResonanceError:
+            continue
+        values[:, k] = [found.value(measure) for measure in measures]
+        if by_order and isinstance(channel, LoadChannel):
+            signal = selected(measures[0], channel.signal(found.loads[0]), found.mount_names)
+            amplitudes = order_amplitude(signal.coefficients).max(axis=1)
+            for order, size in zip(signal.orders, amplitudes, strict=True):
+                sizes.setdefault(float(order), np.zeros(len(speeds)))[k] = size
+    largest = sorted((order for order in sizes if order), key=lambda order: -sizes[order].max())[:MOST_ORDERS]
+    shown = sorted(order for order in largest if sizes[order].max() > PRESENT * sizes[largest[0]].max())
+    modes = mounting_in(engine).modes.frequencies.tolist() if engine.block is not None else []
+    return {"values": values.tolist(), "orders": shown, "sizes": [sizes[h].tolist() for h in shown], "modes": modes}
+
+
+def _limits(problem: Problem, measure: Measure, load: OperatingPoint, speeds: Array, own: float) -> list[float]:
+    """The lowest limit on a measure at every speed; one of single operating points at theirs alone."""
+    found = np.full(len(speeds), own)
+    for limit in problem.limits:
+        if replace(limit.measure, points=None) == measure and limit.measure.counts_point(load):
+            there = (speeds == load.speed) | (limit.measure.points is None)
+            found[there] = np.minimum(found[there], limit.maximum)
+    return [float(value) if math.isfinite(value) else math.nan for value in found]
+
+
+def _one(case: str, design: str, own: Mapping[str, Any], record: Mapping[str, Any]) -> xr.Dataset:
+    """One design of one case at every speed."""
+    import xarray as xr
+
+    speeds = [float(f"{PER_RAD * speed:.12g}") for speed in record["speeds"]]
+    count, names = len(speeds), [name for name, _ in record["measures"]]
+    return xr.Dataset(
+        {
+            "value": (("point", "measure"), np.transpose(own["values"])),
+            "limit": (("point", "measure"), np.transpose(record["limits"])),
+            "amplitude": (("point", "order"), np.reshape(own["sizes"], (-1, count)).T),
+            "frequency": (("point", "mode"), np.tile(own["modes"], (count, 1))),
+        },
+        {
+            **{name: ("point", [value] * count) for name, value in
+               {"case": case, "design": design, "proof": own["proof"]}.items()},
+            "speed": variable("point", speeds, "crank speed", RPM),
+            "measure": names,
+            "order": own["orders"],
+            "mode": np.arange(1, len(own["modes"]) + 1),
+        },
+    )  # fmt: skip
+
+
+def _readable(data: xr.Dataset) -> xr.Dataset:
+    """The dataset in the units that a reader expects."""
+    units, factors = zip(*(readable(str(unit)) for unit in data["measure_unit"].values), strict=True)
+    found = data.assign(value=data["value"] * np.array(factors), limit=data["limit"] * np.array(factors))
+    if "amplitude" in data:
+        found["amplitude"] = (data["amplitude"] * factors[0]).assign_attrs(data["amplitude"].attrs)
+    return found.assign_coords(measure_unit=("measure", list(units)))
+
+
+def _designs(data: xr.Dataset) -> Iterator[tuple[str, str, xr.Dataset]]:
+    """The points of every case and design."""
+    keys = list(zip(data["case"].values.tolist(), data["design"].values.tolist(), strict=True))
+    for case, design in dict.fromkeys(keys):
+        yield case, design, data.isel(point=np.flatnonzero([key == (case, design) for key in keys]))
+
+
+def _panel(data: xr.Dataset, designs: Sequence[tuple[str, str, xr.Dataset]], k: int) -> p.Panel:
+    """One measure over speed, and its limits."""
+    cases = list(dict.fromkeys(case for case, *_ in designs))
+    lines: list[p.Mark] = []
+    borders: list[p.Mark] = []
+    for case, design, one in designs:
+        speeds, values, limits = one["speed"].values, one["value"].values[:, k], one["limit"].values[:, k]
+        given = design == AS_GIVEN
+        single: p.Colour = "before" if given else "after"
+        colour = single if len(cases) == 1 else p.colour(cases.index(case), len(cases))
+        label = design if len(cases) == 1 else f"{case}, {design}"
+        lines.append(p.Line(speeds, values, colour, label, dash=p.DASHES[0] if given else ()))
+        there = np.isfinite(limits)
+        # one of a single operating point is a stroke
+        look: dict[str, Any] = {"width": 1.2} if there.sum() > 1 else {"width": 0.0, "marker": "_", "size": 14.0}
+        borders.append(p.Line(speeds[there], limits[there], dash=p.DASHES[1], behind=True, **look))
+    name, unit = str(data["measure"].values[k]), str(data["measure_unit"].values[k])
+    top = max(float(data[what].isel(measure=k).max()) for what in ("value", "limit") if data[what].notnull().any())
+    label, ends = f"{name} [{unit}]" if unit else name, (0.0, 1.08 * top or 1.0)
+    # beside a panel of its own there is room for the name
+    alone = data.sizes["measure"] == 1 and "amplitude" not in data
+    axis, title = (p.Axis(label, ends), "") if alone else (p.Axis(ends=ends), label)
+    return p.Panel([*lines, *borders], _speed_axis(data), axis, title)
+
+
+def _speed_axis(data: xr.Dataset) -> p.Axis:
+    return p.Axis(f"crank speed [{RPM}]", (float(data["speed"].min()), float(data["speed"].max())))
+
+
+def _orders(case: str, design: str, one: xr.Dataset) -> p.Panel:
+    """Amplitude of every order, named at its peak; on the axis the speeds at which it meets a mode."""
+    speeds, top = one["speed"].values, float(one["amplitude"].max()) or 1.0
+    marks: list[p.Mark] = []
+    for k, order in enumerate(one["order"].values):
+        values, colour = one["amplitude"].values[:, k], p.colour(k, one.sizes["order"])
+        peak = int(np.argmax(np.nan_to_num(values)))
+        side = "right" if speeds[peak] > speeds.mean() else "left"
+        marks.append(p.Line(speeds, values, colour))
+        marks.append(p.Words(speeds[peak], values[peak] + 0.05 * top, f"order {order:g}", colour=colour, across=side))
+        met = 2.0 * math.pi * PER_RAD * one["frequency"].values[0] / order if "frequency" in one else np.zeros(0)
+        met = met[(met > speeds.min()) & (met < speeds.max())]
+        marks.append(p.Line(met, np.zeros(len(met)), colour, width=0.0, marker="|", size=10.0))
+    title = f"{case}, {design}: orders of {one['amplitude'].attrs['of']} [{one['measure_unit'].values[0]}]"
+    return p.Panel(marks, _speed_axis(one), p.Axis(ends=(0.0, 1.15 * top)), title)
