@@ -226,10 +226,12 @@ def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ..
 
 
 def mass_rows(measure: Measure, rotors: Sequence[Rotor]) -> Rows:
-    """Rows U / radius of the counted rotors, shape (rotors, 2) [kg]."""
+    """Rows U / radius of the counted rotors, shape (rotors, 2) [kg]; of none one row of nothing."""
     counted = counted_rotors(measure, rotors)
-    vectors = np.array([[r.unbalance.real, r.unbalance.imag] for r in counted]).reshape(-1, 2)
-    radii = np.array([radius_of(r) for r in counted]).reshape(-1, 1)
+    if not counted:
+        return Rows(MEAN, np.zeros((1, 2)), Grid(np.ones(1), 1))
+    vectors = np.array([[r.unbalance.real, r.unbalance.imag] for r in counted])
+    radii = np.array([[radius_of(r)] for r in counted])
     return Rows(MEAN, vectors / radii, Grid(np.ones(len(counted)), 1))
 
 

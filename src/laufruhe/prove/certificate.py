@@ -164,7 +164,10 @@ def best_bound(fine: AffineProblem, coarse: AffineProblem, x: Array, found: Mult
 
 def _spread(fine: AffineNorm, samples: int, z: Array) -> Array:
     """Dual rows at `samples` angles on a finer grid; masses have no angles and stay."""
-    times = len(fine.grid.weights) // len(z) if len(z) else 1
+    times, rest = divmod(len(fine.grid.weights), max(len(z), 1))
+    if rest:
+        # rows of another basis say nothing here
+        return np.zeros_like(fine.constant)
     return z if times <= 1 else fine.norm.spread(z, samples, times)
 
 

@@ -33,6 +33,7 @@ class Gathered:
 
     def add(self, expression: Any, lower: float, upper: float, name: str, slope: float = 0.0) -> None:
         """One constraint, or a column of them."""
+        expression = ca.MX(expression)
         count = expression.numel()
         self.expressions.append(expression.reshape((count, 1)))
         self.lower += [lower] * count

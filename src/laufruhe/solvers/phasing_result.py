@@ -10,7 +10,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import FLOOR, Reach, certified
 from laufruhe.solvers.conclusion import no_star, state, with_star
-from laufruhe.solvers.ranking import PhasingResult, RankedStar, ranked_orders, ranked_star
+from laufruhe.solvers.ranking import PhasingResult, RankedOrder, RankedStar, ranked_orders, ranked_star
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.star_answers import Answer, Decided
 from laufruhe.solvers.star_cuts import owners_of, solve_design
@@ -20,9 +20,11 @@ from laufruhe.solvers.unbalances import solve_unbalances
 
 def final_result(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     """The best design solved once more as a problem of its own, with what was proven of all designs."""
-    best = answer.designs[0]
-    shafts = names_of(phasing, _needed(problem, phasing, best))
-    orders, _ = ranked_orders(phasing, best.family.layout, best.family.throws(best.steps), best.steps)
+    designs = [design for design in answer.designs if _orders(phasing, design)]
+    if not designs:
+        return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
+    best = designs[0]
+    shafts, orders = names_of(phasing, _needed(problem, phasing, best)), _orders(phasing, best)
     left_out = tuple(name for names in phasing.shafts.optional for name in names if name not in shafts)
     candidate = replace(best.family.candidate(phasing, best.steps, left_out), firing_order=orders[0].order)
     result = solve_fixed(replace(phasing.realise(candidate), tolerance=problem.tolerance, phasing=None))
@@ -33,7 +35,7 @@ def final_result(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
     )  # fmt: skip
     details = PhasingResult(
-        tuple(_entry(phasing, d, None if k else shafts) for k, d in enumerate(answer.designs)),
+        tuple(_entry(phasing, d, None if k else shafts) for k, d in enumerate(designs)),
         best.family.layout.throw_positions,
         best.family.layout.banks,
         sum_of_designs(phasing),
@@ -41,6 +43,10 @@ def final_result(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         answer.method,
     )
     return with_star(problem, phasing, result, candidate, certificate, details)
+
+
+def _orders(phasing: Phasing, design: Decided) -> tuple[RankedOrder, ...]:
+    return ranked_orders(phasing, design.family.layout, design.family.throws(design.steps), design.steps)[0]
 
 
 def solve_fixed(problem: Problem) -> Result:
