@@ -14,14 +14,14 @@ DESIGNS, FEATURES, ROWS = 70, 5, 40
 def _batch(norm: Norm, components: int) -> tuple[BatchNorm, np.ndarray]:
     rng = np.random.default_rng(components)
     rows = rng.normal(size=(components, FEATURES, ROWS))
-    return BatchNorm(norm, rows, rng.uniform(0.1, 1.0, ROWS)), rng.normal(size=(DESIGNS, FEATURES))
+    return BatchNorm(norm, rows, Grid(rng.uniform(0.1, 1.0, ROWS), ROWS)), rng.normal(size=(DESIGNS, FEATURES))
 
 
 @pytest.mark.parametrize("norm", NORMS.values())
 @pytest.mark.parametrize("components", [1, 2, 3])
 def test_norm_of_each_design(norm: Norm, components: int) -> None:
     batch, features = _batch(norm, components)
-    wanted = [norm.value(Grid(batch.weights, 1), np.einsum("cfk,f->kc", batch.rows, design)) for design in features]
+    wanted = [norm.value(batch.grid, np.einsum("cfk,f->kc", batch.rows, design)) for design in features]
     np.testing.assert_allclose(batch.values(features), wanted, rtol=1e-13)
     np.testing.assert_allclose([batch.value(design) for design in features], wanted, rtol=1e-13)
 
@@ -38,5 +38,5 @@ def test_blocks_and_threads_change_no_digit_that_counts(components: int) -> None
 def test_turning_every_row_changes_nothing(components: int) -> None:
     batch, features = _batch(NORMS["maximum"], components)
     turn, _ = np.linalg.qr(np.random.default_rng(9).normal(size=(components, components)))
-    turned = BatchNorm(batch.norm, np.einsum("cd,dfk->cfk", turn, batch.rows), batch.weights)
+    turned = BatchNorm(batch.norm, np.einsum("cd,dfk->cfk", turn, batch.rows), batch.grid)
     np.testing.assert_allclose(turned.values(features), batch.values(features), rtol=1e-13)

@@ -18,45 +18,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Designs:
-    """A problem prepared for many designs.
-
-    Attributes
-    ----------
-    problem
-        Whose decisions vary.
-    model
-        Loads without the decisions and of each alone, at the problem's fidelity.
-    terms
-        (weight, norm) pairs; features are 1 and the decision vector.
-    """
+    """A problem prepared for many designs; the features of its norms are 1 and the decision vector."""
 
     problem: Problem
     model: AffineModel
     terms: tuple[tuple[float, BatchNorm], ...]
 
     def objective(self, values: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
-        """Objective of every design.
-
-        Parameters
-        ----------
-        values
-            Decisions u, complex, shape (designs, decisions) (C4).
-        threads, cache_bytes
-            See `BatchNorm.values`.
-
-        Returns
-        -------
-        Shape (designs,) [SI].
-        """
-        features = np.empty((len(values), 1 + self.columns))
-        features[:, 0] = 1.0
-        for k, domain in enumerate(self.model.domains):
-            u = np.asarray(values[:, k])
-            if domain.width == 1:
-                features[:, 1 + domain.start] = (u * domain.set.directions[0].conjugate()).real
-            else:
-                features[:, 1 + domain.start], features[:, 2 + domain.start] = u.real, u.imag
-        return self.of_columns(features, threads, cache_bytes)
+        """Objective of every design from its decisions u, complex, shape (designs, decisions) (C4)."""
+        columns = [
+            (values[:, k] * direction.conjugate()).real
+            for k, domain in enumerate(self.model.domains)
+            for direction in domain.set.directions
+        ]
+        return self.of_columns(np.stack([np.ones(len(values)), *columns], axis=1), threads, cache_bytes)
 
     def of_columns(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
         """Objective of 1 and the decision vector side by side, shape (designs, 1 + columns)."""
@@ -83,18 +58,10 @@ class Designs:
 def prepare(problem: Problem, prune: bool = True) -> Designs:
     """Everything that does not depend on the decisions, once.
 
-    Parameters
-    ----------
-    prune
-        Whether parts of the cycle that repeat and directions that nothing drives are
-        left out; they change nothing but the time.
+    What `prune` leaves out, what repeats within the cycle and what nothing drives, changes nothing but the time.
     """
-    model = AffineModel(problem)
-    if prune:
-        affine = model.at(model.full_samples)
-    else:
-        whole = AffineModel(problem, whole_cycle=True)
-        affine = whole.at(problem.fidelity.samples)
+    model = AffineModel(problem, whole_cycle=not prune)
+    affine = model.at(model.full_samples if prune else problem.fidelity.samples)
     return Designs(problem, model, tuple((weight, _batched(norm, prune)) for weight, norm in affine.terms))
 
 

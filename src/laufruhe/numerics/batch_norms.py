@@ -27,38 +27,16 @@ _PARTS_OF_COMPLEX = 2
 
 @dataclass(frozen=True, eq=False)
 class BatchNorm:
-    """N(f . R) of many f.
-
-    Attributes
-    ----------
-    norm
-        How row lengths are put together.
-    rows
-        R, shape (components, features, k).
-    grid
-        Where the rows stand.
-    """
+    """N(f . R) of many f, with R of shape (components, features, k)."""
 
     norm: Norm
     rows: Array
     grid: Grid
 
     def values(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
-        """The norm of every design.
+        """The norm of every design, from features of shape (designs, features).
 
-        Parameters
-        ----------
-        features
-            Shape (designs, features).
-        threads
-            Blocks worked on at the same time.
-        cache_bytes
-            Memory of one block of rows; all threads together use `threads` times that
-            and a little more.
-
-        Returns
-        -------
-        Shape (designs,).
+        One block of rows takes `cache_bytes`; `threads` are worked on at the same time.
         """
         if not self.norm.of_row_lengths:
             return np.array([self.value(design) for design in features])
@@ -72,7 +50,8 @@ class BatchNorm:
             for start in own:
                 part = features[start : start + block]
                 found = np.matmul(part, self._matrix, out=product[: len(part)])
-                out[start : start + block] = self._together(self._lengths(found, lengths[: len(part)]))
+                size = self._lengths(found, lengths[: len(part)])
+                out[start : start + block] = self.norm.of_lengths(size, self.grid.weights)
 
         if threads <= 1 or len(starts) <= 1:
             work(starts)
@@ -85,7 +64,7 @@ class BatchNorm:
         """The norm of one design, features of shape (n,), in as few calls as there can be."""
         if not self.norm.of_row_lengths:
             return self.norm.value(self.grid, np.einsum("cfk,f->kc", self.rows, features))
-        return float(self._together(self._lengths(np.dot(features, self._matrix))))
+        return float(self.norm.of_lengths(self._lengths(np.dot(features, self._matrix)), self.grid.weights))
 
     @cached_property
     def _matrix(self) -> Array:
@@ -107,10 +86,6 @@ class BatchNorm:
         for j in range(2, components):
             np.add(total, product[..., j * k : (j + 1) * k], out=total)
         return np.sqrt(total, out=total)
-
-    def _together(self, lengths: Array) -> Array:
-        """One number for each design."""
-        return self.norm.of_lengths(lengths, self.grid.weights)
 
     @property
     def operations(self) -> int:

@@ -31,11 +31,6 @@ def as_order(order: float) -> Fraction:
     return Fraction(order).limit_denominator(MAX_ORDER_DENOMINATOR)
 
 
-def same_order(orders: NDArray[np.float64], order: float) -> NDArray[np.bool_]:
-    """Which of these are one and the same order: they are told apart to a thousandth."""
-    return np.asarray(np.round(orders * MAX_ORDER_DENOMINATOR) == np.round(order * MAX_ORDER_DENOMINATOR))
-
-
 @dataclass(frozen=True, eq=False)
 class Spectrum:
     """f(phi) = Re sum_j c_j e^{i j b phi}, b the lowest order (C8).

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.machine import OperatingPoint, Rotor
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
-from laufruhe.numerics.spectrum import Spectrum, same_order
+from laufruhe.numerics.spectrum import Spectrum, orders_equal
 from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel, MountChannel
 
 Array = NDArray[np.float64]
@@ -111,10 +111,9 @@ class Measure:
 
     def counted(self, orders: Sequence[float] | Array) -> NDArray[np.bool_]:
         """Which orders of crank speed count, shape of `orders`."""
-        found = np.asarray(orders, dtype=float)
         if self.orders is None:
-            return np.ones(found.shape, dtype=bool)
-        return np.asarray(np.any([same_order(found, order) for order in self.orders], axis=0)).reshape(found.shape)
+            return np.ones(np.shape(orders), dtype=bool)
+        return orders_equal(orders, self.orders)
 
     def places(self, mount_names: Sequence[str]) -> list[int]:
         """Of the mounts that count."""

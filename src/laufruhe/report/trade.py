@@ -9,8 +9,7 @@ from dataclasses import asdict
 from laufruhe.present.numbers import DASH
 from laufruhe.report.grid import escaped, piped
 from laufruhe.report.strict_json import strict
-from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade
-from laufruhe.studies.trade_optima import is_local
+from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade, is_local
 
 ALIKE = 1.3
 TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, SolverError
 from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, error_bound, reference
 from laufruhe.fidelity.knobs import TIME_ORDERS, TIME_SAMPLES
@@ -20,16 +20,22 @@ from laufruhe.machine import Engine
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
+from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.problem import Problem
+from laufruhe.solvers import solve
+from laufruhe.solvers.conic import ConicProgram
+from laufruhe.solvers.result import Status
 from laufruhe.studies.rigid_digits import RigidPart, rigid_part
-from laufruhe.studies.trade_optima import is_open, optimum
 
 Array = NDArray[np.float64]
 
 REFERENCE_STEPS = 1440
 """Steps over the period at which the optimum beside which a regret is counted is solved."""
+REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"
+STARS_ON_OPEN_MOUNTS = 2
+"""Each of them takes a joint solve, at every fidelity."""
 _LEAST_TIME, _MOST_REPEATS = 0.02, 50
 
 
@@ -39,23 +45,16 @@ class Row:
 
     Attributes
     ----------
-    name
-        As a table shows it.
-    error
-        Of the objective of the design as given, relative to the reference.
-    estimate
-        That the error is said not to exceed, relative to the reference too.
-    evaluation, gradient, solve
+    error, estimate
+        Of the objective of the design as given, and what it is said not to exceed; relative to the reference.
+    evaluation, gradient, solve, fresh
         Seconds; another design with the scene prepared (from nothing where that cannot
-        be prepared), its gradient with it, and an optimum from nothing. NaN where
-        nothing is open, or this fidelity cannot decide it.
-    fresh
-        Seconds of an evaluation from nothing.
+        be prepared), its gradient with it, an optimum, and an evaluation from nothing. NaN
+        where nothing is open, or this fidelity cannot decide it.
     memory
-        Largest memory of an evaluation from nothing [byte].
+        Largest of an evaluation from nothing [byte].
     regret
-        Reference objective of this fidelity's optimum over the reference optimum, less
-        one; NaN as above.
+        Reference objective of this fidelity's optimum over the reference optimum, less one; NaN as above.
     """
 
     name: str
@@ -75,12 +74,9 @@ class TimeDomain:
 
     Attributes
     ----------
-    point
-        Operating point.
-    integration
-        Largest difference from the same equations in the frequency domain.
-    loss
-        Largest difference from hysteretic loss, which has no law in time (E26).
+    integration, loss
+        Largest difference from the same equations in the frequency domain, and from
+        hysteretic loss, which has no law in time (E26).
     """
 
     point: str
@@ -94,17 +90,15 @@ class Trade:
 
     Attributes
     ----------
-    value
-        Reference objective of the design as given [SI].
-    optimum
-        Reference objective of the reference optimum [SI]; NaN where nothing is open.
+    value, optimum
+        Reference objective of the design as given, and of the reference optimum [SI]; NaN where nothing is open.
     rigid_part
         Disagreement of the rigid reference with 50 digits.
     flywheel
         Crank inertia at which the constant speed was priced [kg m2], and the relative
         change of the objective that the uneven speed makes; None where no load is asked.
     time_domain
-        Elastic mounts in time beside the frequency domain; None where mounts are rigid.
+        None where mounts are rigid.
     """
 
     problem: Problem
@@ -132,30 +126,61 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     if is_open(problem):
         say("solving the reference")
         engine = optimum(problem.at(Fidelity(samples=REFERENCE_STEPS)), REFERENCE_STEPS)
-        least = math.nan if engine is None else _reference_value(problem, engine)
+        least = math.nan if engine is None else objective_value(problem, reference(problem, engine))
     rows = []
     for name, own in ladder(problem):
         say(name)
         rows.append(_row(name, own, best, truth, least))
     say("uneven crank speed")
-    return Trade(
-        problem, tuple(rows), truth, least, rigid_part(problem),
-        _price_of_constant_speed(problem) if problem.load_terms else None, _price_of_time(problem),
-    )  # fmt: skip
+    flywheel = _price_of_constant_speed(problem) if problem.load_terms else None
+    return Trade(problem, tuple(rows), truth, least, rigid_part(problem), flywheel, _price_of_time(problem))
+
+
+def is_open(problem: Problem) -> bool:
+    """Whether a problem leaves anything to be decided."""
+    return bool(problem.decisions or problem.phasing)
+
+
+def is_local(problem: Problem) -> bool:
+    """Whether its optimum is one of many: mounts decided for loads, searched from the design as given alone."""
+    return bool(problem.mount_decisions and problem.load_terms)
+
+
+def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
+    """The best engine at a fidelity; None where it decides nothing, or finds no design within the limits (F14).
+
+    Unbalances alone are decided at `samples` steps over the period of the loads, without
+    refinement. Open stars and mounts are solved as `solve` does, of the latter one start, of
+    both together the stars that rank first.
+    """
+    try:
+        if problem.phasing is None and not problem.mount_decisions:
+            model = AffineModel(problem)
+            x = ConicProgram(model.at(samples or model.full_samples)).solve().x
+            return None if x is None else problem.design([domain.complex_value(x) for domain in model.domains])
+        one = replace(problem, search=replace(problem.search, starts=1))
+        if one.phasing is not None and one.mount_decisions:
+            one = replace(one, phasing=replace(one.phasing, best=STARS_ON_OPEN_MOUNTS))
+        result = solve(one)
+    except (SolverError, ModelError):
+        # cheap physics may leave nothing that solves: it is no choice for deciding then
+        return None
+    return result.final.engine if result.status in (Status.OPTIMAL, Status.FEASIBLE) else None
 
 
 def _row(name: str, own: Problem, best: Evaluation, truth: float, least: float) -> Row:
     evaluation = evaluate(own)
     value = objective_value(own, evaluation)
     prepared, gradient = _prepared_times(own)
-    solve, regret = math.nan, math.nan
+    solve_time, regret = math.nan, math.nan
     if is_open(own) and own.fidelity.mounts != "time":
         started = time.perf_counter()
         engine = optimum(own)
         if engine is not None:
-            solve = time.perf_counter() - started
+            solve_time = time.perf_counter() - started
             whole = replace(own, points=tuple(loads.point for loads in best.loads))
-            regret = _reference_value(whole, engine) / least - 1.0 if least > 0.0 else math.nan
+            found = objective_value(whole, reference(whole, engine))
+            regret = found / least - 1.0 if least > 0.0 else math.nan
     fresh = seconds(lambda: _from_nothing(own))
     return Row(
         name=name,
@@ -164,7 +189,7 @@ def _row(name: str, own: Problem, best: Evaluation, truth: float, least: float) 
         estimate=error_bound(own, evaluation, best) * value / truth if truth > 0.0 else 0.0,
         evaluation=fresh if math.isnan(prepared) else prepared,
         gradient=gradient,
-        solve=solve,
+        solve=solve_time,
         fresh=fresh,
         memory=_memory(lambda: _from_nothing(own)),
         regret=regret,
@@ -198,20 +223,19 @@ def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -
     return value, gradient
 
 
-def _reference_value(problem: Problem, engine: Engine) -> float:
-    return objective_value(problem, reference(problem, engine))
-
-
 def _price_of_time(problem: Problem) -> TimeDomain | None:
     """Elastic mounts by integration beside the frequency domain, at the first operating point."""
     if problem.engine.block is None:
         return None
     point, mounting = problem.points[0], mounting_in(problem.engine)
     wrench = shaking_loads(problem.engine, point, Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS))
-    found = TimeMounting(mounting, TIME_SAMPLES).forces(wrench, point.speed).sample(TIME_SAMPLES)
-    same, own = (
-        spectrum.sample(TIME_SAMPLES)
-        for spectrum in (viscous_forces(mounting, wrench, point.speed), mounting.forces(wrench, point.speed))
+    found, same, own = (
+        forces.sample(TIME_SAMPLES)
+        for forces in (
+            TimeMounting(mounting, TIME_SAMPLES).forces(wrench, point.speed),
+            viscous_forces(mounting, wrench, point.speed),
+            mounting.forces(wrench, point.speed),
+        )
     )
     peak = float(np.abs(same).max())
     return TimeDomain(point.name, *(float(np.abs(found - other).max()) / peak for other in (same, own)))
@@ -219,9 +243,8 @@ def _price_of_time(problem: Problem) -> TimeDomain | None:
 
 def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
     """A flywheel that leaves the speed some 2 % uneven, and what that changes of the objective."""
-    from laufruhe.physics.uneven_speed import crank_motion
-
-    inertia = 30.0 * max(_reciprocating_inertia(problem), 1e-12)
+    reciprocating = sum(p.reciprocating_mass * p.crank_radius**2 for p in problem.engine.slider_cranks)
+    inertia = 30.0 * max(reciprocating, 1e-12)
     for _ in range(12):
         uneven = Fidelity(samples=360, crank_inertia=inertia)
         try:
@@ -232,13 +255,10 @@ def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
         if most < 1e-9 or 0.019 < most < 0.021:
             break
         inertia *= most / 0.02
-    even = objective_value(problem, evaluate(replace(problem, fidelity=Fidelity(samples=360))))
-    changed = objective_value(problem, evaluate(replace(problem, fidelity=uneven)))
+    even, changed = (
+        objective_value(problem, evaluate(replace(problem, fidelity=f))) for f in (Fidelity(samples=360), uneven)
+    )
     return inertia, (changed - even) / even if even > 0.0 else 0.0
-
-
-def _reciprocating_inertia(problem: Problem) -> float:
-    return sum(p.reciprocating_mass * p.crank_radius**2 for p in problem.engine.slider_cranks)
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -259,6 +279,3 @@ def _memory(work: Callable[[], object]) -> int:
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-
-
-REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"
