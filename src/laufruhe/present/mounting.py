@@ -9,13 +9,7 @@ import numpy as np
 
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import ElasticMounting
-from laufruhe.physics.modes import (
-    Modes,
-    static_motion,
-    torque_roll_axis,
-    torque_roll_coupling,
-    weight_wrench,
-)
+from laufruhe.physics.modes import Modes, static_motion, torque_roll_axis, torque_roll_coupling, weight_wrench
 from laufruhe.present.measures import Array, has_mounts
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation

@@ -31,12 +31,13 @@ INDEX = (
 
 def as_page(found: Trade, picture: str | None, command: str) -> str:
     """Table, picture if there is one, and the choice for one problem."""
-    problem = found.problem
+    problem, part = found.problem, found.rigid_part
     optimum = "" if math.isnan(found.optimum) else f", of its optimum {found.optimum:.6g}"
     sections = [
         f"# Speed against accuracy: {escaped(problem.title)}",
         f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
-        f"(SI). {_digits(found)}",
+        f"(SI). Double precision against 50 digits, from the kinematics of every cylinder to the "
+        f"{' and '.join(part.covered)}: relative error {max(part.error, 1e-17):.0e}.",
         f"**Take** {advice(found)}",
         f"![Time against error of every fidelity; colour is regret]({picture})"
         if picture
@@ -50,15 +51,6 @@ def as_page(found: Trade, picture: str | None, command: str) -> str:
         f"```sh\n{command}\n```",
     ]
     return "\n\n".join(sections) + "\n"
-
-
-def _digits(found: Trade) -> str:
-    """What double precision costs, and of which measures that was found."""
-    part = found.rigid_part
-    return (
-        "Double precision against 50 digits, from the kinematics of every cylinder to the "
-        f"{' and '.join(part.covered)}: relative error {max(part.error, 1e-17):.0e}."
-    )
 
 
 def _beyond(found: Trade) -> list[str]:
@@ -106,15 +98,14 @@ def _quick(rows: Sequence[Row], time: Callable[[Row], float]) -> Row:
 
 def as_json(found: Trade) -> str:
     """The table for scripts."""
-    content = {
+    return strict({
         "problem": found.problem.name,
         "reference": {"objective": found.value, "optimum": found.optimum},
         "rigid_part": asdict(found.rigid_part),
         "uneven_speed": found.flywheel and dict(zip(("crank_inertia", "change"), found.flywheel, strict=True)),
         "time_domain": found.time_domain and asdict(found.time_domain),
         "rows": [asdict(row) for row in found.rows],
-    }
-    return strict(content)
+    })  # fmt: skip
 
 
 def index(trades: Sequence[Trade]) -> str:

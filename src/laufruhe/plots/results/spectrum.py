@@ -33,7 +33,7 @@ def figure(result: Result) -> Figure:
     """Mount forces by order; of an engine without mounts, the shaking force and its couples."""
     k, series = hardest_point(result), series_of(result, loads=True)
     with_mounts = bool(result.problem.engine.mounts)
-    panels = _mount_panels(result) if with_mounts else _shaking_panels()
+    panels = _panels(len(result.problem.engine.mounts))
     base = float(main_load(series[0].design.loads[k]).base)
     amplitudes = [_seen([measure(one.design.loads[k]) for one in series], base) for _, measure in panels]
     last = base * max(len(values[0]) - 1 for values in amplitudes)
@@ -50,21 +50,15 @@ def figure(result: Result) -> Figure:
     return headed(drawn, result, title, lines, legend)
 
 
-def _mount_panels(result: Result) -> list[Panel]:
-    count = len(result.problem.engine.mounts)
-    label = "amplitude [N]" if count == 1 else f"amplitude, mean of {count} mounts [N]"
-    return [(label, lambda loads: mount_orders(main_load(loads)).mean(axis=1))]
+def _panels(mounts: int) -> list[Panel]:
+    if mounts:
+        label = "amplitude [N]" if mounts == 1 else f"amplitude, mean of {mounts} mounts [N]"
+        return [(label, lambda loads: mount_orders(main_load(loads)).mean(axis=1))]
 
+    def part(first: int, last: int) -> Callable[[PointLoads], Array]:
+        return lambda loads: order_amplitude(loads.wrench.coefficients[:, first:last])
 
-def _shaking_panels() -> list[Panel]:
-    def part(components: slice) -> Callable[[PointLoads], Array]:
-        return lambda loads: order_amplitude(loads.wrench.coefficients[:, components])
-
-    return [
-        ("shaking force [N]", part(slice(0, 3))),
-        ("rocking couple [N m]", part(slice(4, 6))),
-        ("roll moment [N m]", part(slice(3, 4))),
-    ]
+    return [("shaking force [N]", part(0, 3)), ("rocking couple [N m]", part(4, 6)), ("roll moment [N m]", part(3, 4))]
 
 
 def _seen(series: list[Array], base: float) -> list[Array]:
