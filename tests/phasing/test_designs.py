@@ -63,7 +63,7 @@ def test_rows_of_a_star_are_those_of_the_exact_model(tmp_path, name):
         given = model.phasing.realise(model.phasing.star(star, model.space.phases, model.geometry))
         unbalances = [domain.complex_value(x) for domain in model.domains]
         # decisions at any angle are counted from upright in the model: with equal drives that is the same rotor
-        turned = [u if not d.free_angle else u * _turn(d) for u, d in zip(unbalances, given.decisions, strict=True)]
+        turned = [u if not d.set.free_angle else u * _turn(d) for u, d in zip(unbalances, given.decisions, strict=True)]
         value = objective_value(given, evaluate(given, given.design(turned)))
         again = model.at(model.samples).at(star).objective(x)
         tolerance = 2e-3 if name == "maximum" else 1e-9
