@@ -11,18 +11,45 @@ from laufruhe.problem.measure import Measure
 
 
 class AtItsValues:
-    """A program whose heads are the values that they stand for; what it holds is kept."""
+    """A program whose variables are the values that they start from; what it holds is kept."""
 
     def __init__(self) -> None:
         self.held: list[Any] = []
+        self.has_free = False
 
     def head(self, value: Any) -> Any:
         """The value itself."""
         return value
 
+    def free(self, value: Any) -> Any:
+        """The value itself, from which a solver goes on to a better one."""
+        self.has_free = True
+        return value
+
     def hold(self, expression: Any) -> None:
         """Nothing but kept."""
         self.held.append(expression)
+
+
+class WithVariables:
+    """A program whose variables are symbols of their own."""
+
+    def __init__(self) -> None:
+        self.held: list[Any] = []
+        self.variables: list[Any] = []
+
+    def head(self, value: Any) -> Any:
+        """One more variable."""
+        return self.free(value)
+
+    def free(self, value: Any) -> Any:
+        """As many as the value has numbers."""
+        self.variables.append(ca.SX.sym(f"v{len(self.variables)}", *value.shape))
+        return self.variables[-1]
+
+    def hold(self, expression: Any) -> None:
+        """Nothing but kept."""
+        self.held.append(ca.reshape(expression, -1, 1))
 
 
 def smooth_value(model: UnevenModel, measure: Measure, at: Symbols, share: float) -> Any:
