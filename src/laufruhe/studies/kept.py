@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO
 
 from laufruhe.errors import Complaint, InputError
@@ -13,15 +13,10 @@ from laufruhe.errors import Complaint, InputError
 NAME = ".unfinished-points.jsonl"
 
 
-class KeptPoints:
-    """Records by fingerprint, on disk as soon as they are known.
+class KeptPoints(AbstractContextManager["KeptPoints"]):
+    """Records by fingerprint, on disk as soon as they are known, in a file made with the first.
 
     A line that was cut when the study was killed is dropped: its point is solved again.
-
-    Parameters
-    ----------
-    path
-        Made with the first record, its folder too, so that a study that is refused leaves none.
 
     Raises
     ------
@@ -34,22 +29,15 @@ class KeptPoints:
         self.records: dict[str, Any] = {}
         self.seconds: dict[str, float] = {}
         self._stream: BinaryIO | None = None
-        self._whole = self._read()
-
-    def _read(self) -> int:
-        """Takes in what is there; returns how many bytes of it are whole lines."""
-        if not self.path.is_file():
-            return 0
-        content = self.path.read_bytes()
-        whole = content.rfind(b"\n") + 1
-        for number, line in enumerate(content[:whole].splitlines(), 1):
+        content = path.read_bytes() if path.is_file() else b""
+        self._whole = content.rfind(b"\n") + 1
+        for number, line in enumerate(content[: self._whole].splitlines(), 1):
             try:
                 mark, seconds, record = json.loads(line)
                 self.records[str(mark)], self.seconds[str(mark)] = dict(record), float(seconds)
             except (ValueError, TypeError):
                 rule, remedy = "is no finished point of a study", "remove this line, and the point is solved again"
-                raise InputError(str(self.path), (Complaint(f"line {number}", "", rule, remedy),)) from None
-        return whole
+                raise InputError(str(path), (Complaint(f"line {number}", "", rule, remedy),)) from None
 
     def keep(self, mark: str, seconds: float, record: dict[str, Any]) -> None:
         """Write a record and what it took; it has left the process when this returns."""
@@ -63,12 +51,7 @@ class KeptPoints:
         self._stream.flush()
         self.records[mark], self.seconds[mark] = record, seconds
 
-    def __enter__(self) -> KeptPoints:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._stream is not None:
             os.fsync(self._stream.fileno())
             self._stream.close()

@@ -24,16 +24,7 @@ def colour(k: int, count: int) -> Colour:
 class Line:
     """Dots, joined unless `width` is zero. One with a label stands in the legend, drawn or not.
 
-    Attributes
-    ----------
-    width, size
-        Of line and dots [points].
-    dash
-        Lengths drawn and left out [points]; empty for a whole line.
-    marker
-        As matplotlib names it.
-    behind
-        Whether it lies under the other marks.
+    Width, size of dots and dashes (lengths drawn and left out) are in points; markers are matplotlib's.
     """
 
     x: Any = ()
@@ -93,20 +84,10 @@ Mark: TypeAlias = Line | Bars | Area | Words
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis.
+    """One axis, of numbers or of texts at their places (`ticks`, `small` their size [points]).
 
-    Attributes
-    ----------
-    ends
-        First and last value; the last may be the smaller one. None where the marks decide.
-    ticks
-        Texts by their places, in place of numbers.
-    log
-        Whether equal factors are equally far apart; with the first figures of its ticks.
-    small
-        Size of the ticks' texts [points].
-    grid
-        Whether lines go through the ticks.
+    The end may be the smaller value; without ends the marks decide. A logarithmic axis is told the first figures
+    of its ticks.
     """
 
     label: str = ""
@@ -132,16 +113,7 @@ class Panel:
 class Picture:
     """Panels side by side or one under the other, a title and what is seen above, the credit below.
 
-    Attributes
-    ----------
-    size
-        Width and height of each panel [inch].
-    columns
-        Panels side by side.
-    gap
-        Between panels [inch].
-    room
-        Left of the first panel, for long names [inch].
+    Size of each panel, the gap between them and room left of the first, for long names, are in inches.
     """
 
     title: str

@@ -69,16 +69,12 @@ def load_study(path: Path) -> StudyFile:
         where = f"study.parts[{k + 1}]"
         if names.count(part.name) > 1:
             raise _refused(path, f"{where}.name", part.name, "is given twice", "give each part its own name")
-        _check_cases(part, path, where)
+        cases = [case.name for case in part.cases]
+        if len(set(cases)) < len(cases):
+            raise _refused(path, f"{where}.cases", "", "has two cases of one name", "give each its own")
         if isinstance(part, SweptPart):
             _check_sweeps(part, path, where)
     return file
-
-
-def _check_cases(part: Part, path: Path, where: str) -> None:
-    cases = [case.name for case in part.cases]
-    if len(set(cases)) < len(cases):
-        raise _refused(path, f"{where}.cases", "", "has two cases of one name", "give each its own")
 
 
 def _check_sweeps(part: SweptPart, path: Path, where: str) -> None:

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from laufruhe.files.file_models import QuantityName
@@ -17,7 +13,7 @@ from laufruhe.files.study_parts import SweepTable
 from laufruhe.files.study_sweeps import Axis, axis_of
 from laufruhe.problem import channels
 from laufruhe.problem.problem import Problem
-from laufruhe.studies.outcome import Outcome, solved
+from laufruhe.studies.outcome import dataset, solved
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept_shown import by_point
@@ -49,9 +45,8 @@ class SweptPart(Part):
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The proven optimum of one scene, or its numbers as given where nothing is open."""
-        problem = scenes.problem(point)
         with scenes.blamed(point):
-            return asdict(solved(problem))
+            return solved(scenes.problem(point))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """All that is kept of every scene, along its point."""
@@ -116,66 +111,3 @@ def coordinates(axes: Sequence[Axis], points: Sequence[Point]) -> dict[str, Any]
 
 def _label(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def dataset(
-    points: Sequence[Point], records: Sequence[Mapping[str, Any]], extra: Mapping[str, Any], about: Mapping[str, Any]
-) -> xr.Dataset:
-    """One labelled dataset of solved scenes, along its points.
-
-    Engines of one part may have different mounts and decisions; those that one lacks are NaN.
-
-    Parameters
-    ----------
-    extra
-        Coordinates along the points.
-    about
-        Attributes.
-    """
-    import xarray as xr
-
-    outcomes = [Outcome(**record) for record in records]
-    mounts = list(dict.fromkeys(name for o in outcomes for name in o.mounts))
-    decided = {name: unit for o in outcomes for name, unit in o.units.items()}
-    metric, unit = _metric(outcomes)
-
-    def per_mount(name: str) -> tuple[tuple[str, str], Any, dict[str, str]]:
-        rows = [dict(zip(o.mounts, getattr(o, name), strict=True)) for o in outcomes]
-        words = f"{name.replace('_', ' ')} of the mount's force"
-        return ("point", "mount"), _table(rows, mounts), {"units": "N", "long_name": words}
-
-    def each(name: str, words: str) -> tuple[str, Any, dict[str, str]]:
-        return "point", np.array([getattr(o, name) for o in outcomes]), {"units": unit, "long_name": words}
-
-    in_unit = {"long_name": "value decided, in decision_unit"}
-    return xr.Dataset(
-        {
-            "objective_given": each("objective_given", f"{metric} of the design as given"),
-            "objective": each("objective", f"{metric} of the design as decided"),
-            "lower_bound": each("lower_bound", f"{metric} that no design falls below"),
-            **{name: per_mount(name) for name in ("mean_given", "maximum_given", "mean", "maximum")},
-            "decided": (("point", "decision"), _table([o.decisions for o in outcomes], list(decided)), in_unit),
-        },
-        coords={
-            "mount": mounts,
-            "decision": list(decided),
-            "decision_unit": ("decision", list(decided.values())),
-            "case": ("point", [point.case.name for point in points]),
-            "status": ("point", [o.status for o in outcomes]),
-            "proof": ("point", [o.proof for o in outcomes]),
-            **extra,
-        },
-        attrs={**about, "metric": metric},
-    )
-
-
-def _metric(outcomes: Sequence[Outcome]) -> tuple[str, str]:
-    """What the outcomes measure, and its unit: one, or `SweptPart.checked` has refused them."""
-    metrics = {o.metric: o.unit for o in outcomes if o.metric}
-    return next(iter(metrics), "") if len(metrics) == 1 else "objective", next(iter(metrics.values()), "")
-
-
-def _table(rows: Sequence[Mapping[str, float]], columns: Sequence[str]) -> NDArray[np.float64]:
-    """A row each, NaN where it has no such column, shape (rows, columns)."""
-    values = [[row.get(column, math.nan) for column in columns] for row in rows]
-    return np.array(values, dtype=float).reshape(len(rows), len(columns))

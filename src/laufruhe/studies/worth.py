@@ -17,7 +17,6 @@ verdict, but where a share is closer to its threshold than the gap of the proof.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -31,6 +30,7 @@ from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdi
 
 Judgement = Literal["negligible", "noticeable", "better", "worth building", "not worth building"]
 JUDGEMENTS: tuple[Judgement, ...] = get_args(Judgement)
+_ALLOWED = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted rod ratio and gas trace move it by"
 
 
 @dataclass(frozen=True)
@@ -88,51 +88,30 @@ def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
         says, falls, against, where = (row[f"claim{end}"].item() for end in ("", "ed_fall", "ed_against", "ed_where"))
         statement = f"{name}: beside {against}" + (f" ({where})" if where else "")
         own: list[Verdict] = []
+        fall = _fall(data, name, against)
         if says:
-            agrees, ours, why = _RULES[says](data, name, against)
-            own.append(Verdict(statement, says, ours, "% of the force", agrees, why))
+            agrees, why = _judged(data, name, against, says)
+            own.append(Verdict(statement, says, -100.0 * fall, "% of the force", agrees, why))
         if not np.isnan(falls):
-            ours, said = _fall(data, name, against), f"{-100.0 * falls:.0f} %"
-            agrees = abs(ours - falls) <= PRINTED_FALL
-            own.append(Verdict(statement, said, -100.0 * ours, "% of the force", agrees, _ALLOWED))
+            agrees, said = abs(fall - falls) <= PRINTED_FALL, f"{-100.0 * falls:.0f} %"
+            own.append(Verdict(statement, said, -100.0 * fall, "% of the force", agrees, _ALLOWED))
         if own:
             found[name] = tuple(own)
     return found
 
 
-_ALLOWED = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted rod ratio and gas trace move it by"
-Rule = Callable[[xr.Dataset, str, str], tuple[bool, float, str]]
-
-
-def _negligible(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
-    most = 1.0 - _bound(data, build) / _optimum(data, against)
-    ours = -100.0 * _fall(data, build, against)
-    return most < NEGLIGIBLE, ours, f"W1: under {100.0 * NEGLIGIBLE:.0f} %; proven, none of these shafts does more"
-
-
-def _noticeable(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
-    fall = _fall(data, build, against)
-    return fall >= NOTICEABLE, -100.0 * fall, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
-
-
-def _better(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
-    better = _optimum(data, build) < _bound(data, against)
-    return better, -100.0 * _fall(data, build, against), "its force lies under the other's lower bound"
-
-
-def _worth_building(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
+def _judged(data: xr.Dataset, build: str, against: str, says: str) -> tuple[bool, str]:
+    """Whether a judgement holds, and by which rule."""
+    if says == "negligible":
+        most = 1.0 - _bound(data, build) / _optimum(data, against)
+        return most < NEGLIGIBLE, f"W1: under {100.0 * NEGLIGIBLE:.0f} %; proven, none of these shafts does more"
+    if says == "noticeable":
+        return _fall(data, build, against) >= NOTICEABLE, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
+    if says == "better":
+        better = _optimum(data, build) < _bound(data, against)
+        return better, "its force lies under the other's lower bound"
     found = _worth(data, build)
-    return found.worth, -100.0 * _fall(data, build, against), f"W3: {found.why}"
-
-
-def _not_worth_building(data: xr.Dataset, build: str, against: str) -> tuple[bool, float, str]:
-    worth, ours, why = _worth_building(data, build, against)
-    return not worth, ours, why
-
-
-_RULES: dict[str, Rule] = dict(
-    zip(JUDGEMENTS, (_negligible, _noticeable, _better, _worth_building, _not_worth_building), strict=True)
-)
+    return found.worth == (says == "worth building"), f"W3: {found.why}"
 
 
 def _fewer(data: xr.Dataset, build: str) -> list[str]:

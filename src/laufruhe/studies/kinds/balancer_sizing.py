@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -65,7 +65,7 @@ class BalancerSizing(SweptPart):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The proven optimum of one set of shafts."""
         with scenes.blamed(point):
-            return asdict(solved(_counting(with_shafts(scenes.problem(point), point.shafts or ()))))
+            return solved(_counting(with_shafts(scenes.problem(point), point.shafts or ())))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """As of every sweep, with the shafts of every point."""

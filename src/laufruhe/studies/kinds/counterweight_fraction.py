@@ -11,8 +11,9 @@ import numpy as np
 from laufruhe.files.study_paths import at
 from laufruhe.files.study_sweeps import Axis
 from laufruhe.studies import picture as p
+from laufruhe.studies.outcome import dataset
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import SweptPart, coordinates, dataset
+from laufruhe.studies.swept import SweptPart, coordinates
 from laufruhe.studies.swept_shown import (
     bars,
     claimed,
@@ -109,7 +110,7 @@ def _left_open(point: Point, fraction: Axis, scenes: Scenes) -> dict[str, Any]:
 
 def _decided(record: Mapping[str, Any], quantity: str) -> float:
     """The fraction decided for the counterweight of this path, which may count it instead of naming it."""
-    decided = {name: value for name, value in record["decisions"].items() if name.endswith(_FRACTION)}
+    decided = {name: value for name, value in record["decided"].items() if name.endswith(_FRACTION)}
     only = next(iter(decided.values())) if len(decided) == 1 else math.nan
     return float(decided.get(quantity.split(".", 1)[-1], only))
 
