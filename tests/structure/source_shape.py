@@ -15,8 +15,8 @@ EXCEPTIONS = Path(__file__).with_name("exceptions.toml")
 ROOT = "laufruhe"
 FILE_LINES = 350
 FUNCTION_LINES = 45
-# Libraries that cost tens of milliseconds to load may be imported where they are needed; the commands may import
-# anything late, so that `--help` answers at once, and so may the package itself, for `import laufruhe`.
+# Libraries that cost tens of milliseconds to load, and modules that load one, may be imported where they are
+# needed. The commands may import anything late, so that `--help` answers at once, and so may the package itself.
 HEAVY = {"casadi", "clarabel", "cvxpy", "matplotlib", "mpmath", "netCDF4", "pint", "pyscipopt", "scipy", "xarray"}
 LATE_ROOMS = ("", "cli")
 # Modules whose objects answer for themselves: nobody outside asks which one it is.
@@ -134,7 +134,19 @@ def long_functions(known: Trees) -> set[str]:
     }
 
 
+def loading(known: Trees) -> set[str]:
+    """Modules that load a heavy library when they are imported, by themselves or by what they import."""
+    top = {
+        module: {name for node in tree.body for name in imported(node, module, known)} for module, tree in known.items()
+    }
+    found = {module for module, names in top.items() if any(name.partition(".")[0] in HEAVY for name in names)}
+    while more := {module for module, names in top.items() if names & found} - found:
+        found |= more
+    return found
+
+
 def late_imports(known: Trees) -> set[str]:
+    heavy = loading(known)
     return {
         f"{module} -> {name}"
         for module, tree in known.items()
@@ -142,7 +154,7 @@ def late_imports(known: Trees) -> set[str]:
         for _, function in functions(tree)
         for node in ast.walk(function)
         for name in imported(node, module, known)
-        if name.partition(".")[0] not in HEAVY
+        if name.partition(".")[0] not in HEAVY and name not in heavy
     }
 
 

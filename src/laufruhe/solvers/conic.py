@@ -194,13 +194,7 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
         for w, unit, d in zip(weights, units, problem.domains, strict=True)
     ]
     held = [c for d, unit in zip(problem.domains, units, strict=True) for c in membership(d, y[d.columns], unit)]
-    for maximum, norm in problem.limits:
-        moves = np.einsum("kdn,nm->kdm", norm.slope, step)
-        if np.any(moves != 0.0) and norm.norm.sums_lengths:
-            k, d = norm.constant.shape
-            rows = norm.rows(x) + cp.reshape(moves.reshape(k * d, -1) @ z, (k, d), order="C")
-            held.append(norm.grid.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
-    program = cp.Problem(cp.Minimize(cp.sum(cp.hstack(sizes))), held)
+    program = cp.Problem(cp.Minimize(cp.sum(cp.hstack(sizes))), [*held, *_masses_held(problem, x, step, z)])
     with warnings.catch_warnings():
         # the loads stay what they are however accurate this is
         warnings.simplefilter("ignore")
@@ -214,3 +208,15 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
     for domain in problem.domains:
         lighter[domain.columns] = domain.project(lighter)
     return np.asarray(lighter)
+
+
+def _masses_held(problem: AffineProblem, x: Array, step: Array, z: Any) -> list[Any]:
+    """Limits on masses, along the directions that no load can tell apart."""
+    held = []
+    for maximum, norm in problem.limits:
+        moves = np.einsum("kdn,nm->kdm", norm.slope, step)
+        if np.any(moves != 0.0) and norm.norm.sums_lengths:
+            k, d = norm.constant.shape
+            rows = norm.rows(x) + cp.reshape(moves.reshape(k * d, -1) @ z, (k, d), order="C")
+            held.append(norm.grid.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
+    return held

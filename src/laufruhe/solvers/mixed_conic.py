@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import SolverError
 from laufruhe.load_models.star_model import StarNorm, StarProblem
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.phasing import ShaftChoice
 from laufruhe.solvers.conic import held_norm, membership
 
 Array = NDArray[np.float64]
@@ -57,10 +58,7 @@ def solve_program(
     problem: StarProblem,
     space: StarSpace,
     owners: Sequence[int] = (),
-    shaft_counts: Sequence[int] = (),
-    shaft_masses: Sequence[float] = (),
-    most: float = float("inf"),
-    most_mass: float = float("inf"),
+    shafts: ShaftChoice = ShaftChoice(),
     time_limit: float = 600.0,
 ) -> ProgramFound:
     """Solve the program of every star and set of shafts at once.
@@ -73,8 +71,8 @@ def solve_program(
         Stars allowed.
     owners
         The set of shafts that each decision belongs to, -1 for none.
-    shaft_counts, shaft_masses, most, most_mass
-        Of the sets, and the limits on their sums [kg].
+    shafts
+        Optional ones, and the limits on their number and mass.
     time_limit
         [s].
 
@@ -89,8 +87,8 @@ def solve_program(
     size = sum(domain.width for domain in problem.domains)
     scales = np.concatenate([np.full(d.width, d.scale) for d in problem.domains]) if size else np.zeros(0)
     y = cp.Variable(max(size, 1))
-    built = cp.Variable(max(len(shaft_counts), 1), boolean=True)
-    held = [*_stars(steps, space), *_shafts(built, shaft_counts, shaft_masses, most, most_mass)]
+    built = cp.Variable(max(len(shafts.optional), 1), boolean=True)
+    held = [*_stars(steps, space), *_shafts(built, shafts)]
     for domain, own in zip(problem.domains, owners, strict=True):
         held += membership(domain, y[domain.columns], domain.scale, 1.0 if own < 0 else built[own])
     if not size:
@@ -98,7 +96,7 @@ def solve_program(
     unit = max((_reach(norm) for _, norm in problem.terms), default=0.0) or 1.0
     objective, cones = _weighed(problem, _Rows(steps, y, scales, size), unit)
     program = cp.Problem(cp.Minimize(objective), [*held, *cones])
-    return _answer(program, steps, built, unit, bool(shaft_counts), time_limit)
+    return _answer(program, steps, built, unit, bool(shafts.optional), time_limit)
 
 
 def _weighed(problem: StarProblem, rows: _Rows, unit: float) -> tuple[Any, list[Any]]:
@@ -164,14 +162,14 @@ def _stars(steps: Any, space: StarSpace) -> list[Any]:
     return held
 
 
-def _shafts(built: Any, counts: Sequence[int], masses: Sequence[float], most: float, most_mass: float) -> list[Any]:
-    if not counts:
+def _shafts(built: Any, shafts: ShaftChoice) -> list[Any]:
+    if not shafts.optional:
         return [built == 0]
     held = []
-    if np.isfinite(most):
-        held.append(np.array(counts, dtype=float) @ built <= most)
-    if np.isfinite(most_mass):
-        held.append(np.array(masses) @ built <= most_mass)
+    if np.isfinite(shafts.most):
+        held.append(np.array([len(names) for names in shafts.optional], dtype=float) @ built <= shafts.most)
+    if np.isfinite(shafts.most_mass):
+        held.append(np.array(shafts.masses) @ built <= shafts.most_mass)
     return held
 
 

@@ -22,10 +22,6 @@ than the last e from the truth.
 
 from __future__ import annotations
 
-import os
-import pickle
-import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -36,8 +32,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import SolverError
 from laufruhe.numerics.cores import processors
+from laufruhe.solvers.processes import answer, apart
 
 Array = NDArray[np.float64]
 
@@ -244,7 +240,7 @@ def solve_nonlinear(
     task = _task(program, max_iterations, max_seconds)
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
     count = min(len(points), workers if workers is not None else processors())
-    found = _run(task, points) if count <= 1 else _run_apart(task, points, count)
+    found = _run(task, points) if count <= 1 else apart("laufruhe.solvers.nonlinear", task, points, count)
     return tuple(sorted(found, key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
 
 
@@ -293,12 +289,12 @@ def _from_start(task: _Task, solver: Any, slopes: Any, k: int, point: Array) -> 
     sides = {"lbx": task.lower, "ubx": task.upper, "lbg": task.constraint_lower, "ubg": task.constraint_upper}
     m = b = np.zeros(0)
     for stage in task.stages:
-        answer = solver(x0=y, p=list(stage), **sides)
+        found = solver(x0=y, p=list(stage), **sides)
         stats = solver.stats()
         iterations += int(stats["iter_count"])
         ending = _ENDINGS.get(stats["return_status"], Ending.FAILED)
-        y = np.clip(_flat(answer["x"]), task.lower, task.upper)
-        m, b = _flat(answer["lam_g"]), _flat(answer["lam_x"])
+        y = np.clip(_flat(found["x"]), task.lower, task.upper)
+        m, b = _flat(found["lam_g"]), _flat(found["lam_x"])
         if ending in (Ending.FAILED, Ending.INFEASIBLE):
             break
     f, g, gradient, jacobian = slopes(y, list(task.stages[-1]))
@@ -347,48 +343,6 @@ def _slack(multiplier: Array, value: Array, lower: Array, upper: Array) -> float
     return float((size * np.where(np.isfinite(distance), distance, 1.0)).max(initial=0.0))
 
 
-def _run_apart(task: _Task, points: Sequence[tuple[int, Array]], count: int) -> list[LocalOptimum]:
-    """Each share of the starts in an interpreter of its own.
-
-    Neither forks of a threaded process nor the caller's main module are involved, so it
-    works from any script, notebook or test.
-    """
-    program = "from laufruhe.solvers.nonlinear import serve; serve()"
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "OMP_NUM_THREADS": "1"}
-    children = []
-    try:
-        for k in range(count):
-            child = subprocess.Popen(
-                [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL, env=environment,
-            )  # fmt: skip
-            children.append(child)
-            assert child.stdin is not None
-            try:
-                pickle.dump((task, points[k::count]), child.stdin)
-                child.stdin.close()
-            except BrokenPipeError:
-                raise SolverError("a process of the nonlinear solver could not start; try one worker") from None
-        found: list[LocalOptimum] = []
-        for child in children:
-            assert child.stdout is not None
-            answer = child.stdout.read()
-            child.stdout.close()
-            if child.wait() != 0:
-                raise SolverError("a process of the nonlinear solver died; try fewer workers")
-            found += pickle.loads(answer)
-        return found
-    finally:
-        for child in children:
-            if child.poll() is None:
-                child.kill()
-                child.wait()
-
-
 def serve() -> None:
     """Read a share of the starts from standard input, write their optima to standard output."""
-    answer_to = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    task, points = pickle.load(sys.stdin.buffer)
-    pickle.dump(_run(task, points), answer_to)
-    answer_to.close()
+    answer(_run)

@@ -117,11 +117,8 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         model = StarModel(phasing, space, family.geometry, family.fixed)
         exact = all(term.measure.norm.is_euclidean for term in problem.objective) and not problem.limits
         samples = model.samples if exact else PROGRAM_SAMPLES
-        owners, shafts = owners_of(model), phasing.shafts
-        program = solve_program(
-            model.at(samples), space, owners, [len(names) for names in shafts.optional], shafts.masses,
-            shafts.most, shafts.most_mass, phasing.time_limit,
-        )  # fmt: skip
+        owners = owners_of(model)
+        program = solve_program(model.at(samples), space, owners, phasing.shafts, phasing.time_limit)
         if program.star is None:
             answers.append(Answer((), math.inf, program.status == "infeasible", 0, "SCIP"))
             continue

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.load_models.star_model import StarModel, StarProblem
@@ -22,6 +21,7 @@ from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import ShaftChoice
 from laufruhe.prove.certificate import Multipliers, best_bound
+from laufruhe.prove.star_cut import Cut, cut_of
 
 COARSE = 48
 _CHUNK = 1 << 17
@@ -133,44 +133,63 @@ def search_designs(
         Value beside which a gap is relative when the best is smaller [SI].
     """
     started = time.perf_counter()
-    owners = owners_of(model)
-    sets = allowed_sets(model.phasing.shafts, model.domains, owners)
-    bounds = np.zeros((len(stars), len(sets)))
-    open_ = np.ones(bounds.shape, dtype=bool)
-    solved: list[Solved] = []
-    infeasible, complete = 0, True
-    while open_.any():
-        values = distinct_values(model.space, solved)
-        target = values[count - 1] if len(values) >= count else float("inf")
-        row, column = divmod(int(np.argmin(np.where(open_, bounds, np.inf))), len(sets))
-        if bounds[row, column] >= target - tolerance * max(target, floor):
-            break
+    search = _Search(model, stars, tolerance, floor)
+    complete = True
+    while (place := search.nearest(count)) is not None:
         if time.perf_counter() - started > time_limit:
             complete = False
             break
-        star, built = tuple(int(p) for p in stars[row]), sets[column]
-        answer = solve_design(model, star, built, owners, tolerance, floor)
-        open_[row, column] = False
-        if answer is None:
-            infeasible += 1
-            bounds[row, column] = np.inf
-            continue
-        found, cut = answer
-        solved.append(found)
-        _raise(bounds, cut, stars, sets, owners)
-        bounds[row, column] = max(found.bound, bounds[row, column])
-    beyond = float(np.where(open_, bounds, np.inf).min(initial=np.inf))
-    solved.sort(key=lambda s: (s.value, s.star, s.built))
-    least = min([beyond, *(s.bound for s in solved)])
+        search.solve(*place)
+    solved = sorted(search.solved, key=lambda s: (s.value, s.star, s.built))
+    least = min([search.beyond, *(s.bound for s in solved)])
     seconds = time.perf_counter() - started
-    return CutsFound(tuple(solved), least, beyond, complete, bounds.size, infeasible, seconds)
+    size = search.bounds.size
+    return CutsFound(tuple(solved), least, search.beyond, complete, size, search.infeasible, seconds)
 
 
-def _raise(bounds: Array, cut: Cut, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> None:
-    """What a cut proves of every star and set of shafts, in place and in blocks."""
-    for start in range(0, len(stars), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        np.maximum(bounds[part], cut.bounds(stars[part], sets, owners), out=bounds[part])
+class _Search:
+    """Bounds of every star and set of shafts, and what has been solved of them."""
+
+    def __init__(self, model: StarModel, stars: Stars, tolerance: float, floor: float) -> None:
+        self._model, self._stars, self._tolerance, self._floor = model, stars, tolerance, floor
+        self._owners = owners_of(model)
+        self._sets = allowed_sets(model.phasing.shafts, model.domains, self._owners)
+        self.bounds = np.zeros((len(stars), len(self._sets)))
+        self._open = np.ones(self.bounds.shape, dtype=bool)
+        self.solved: list[Solved] = []
+        self.infeasible = 0
+
+    @property
+    def beyond(self) -> float:
+        """Least bound of what was not solved."""
+        return float(np.where(self._open, self.bounds, np.inf).min(initial=np.inf))
+
+    def nearest(self, count: int) -> tuple[int, int] | None:
+        """The star and set of the least bound; None where it cannot be among the best `count`."""
+        if not self._open.any():
+            return None
+        values = distinct_values(self._model.space, self.solved)
+        target = values[count - 1] if len(values) >= count else float("inf")
+        row, column = divmod(int(np.argmin(np.where(self._open, self.bounds, np.inf))), len(self._sets))
+        met = self.bounds[row, column] >= target - self._tolerance * max(target, self._floor)
+        return None if met else (row, column)
+
+    def solve(self, row: int, column: int) -> None:
+        """One design, and what it proves of all others."""
+        star, built = tuple(int(p) for p in self._stars[row]), self._sets[column]
+        answer = solve_design(self._model, star, built, self._owners, self._tolerance, self._floor)
+        self._open[row, column] = False
+        if answer is None:
+            self.infeasible += 1
+            self.bounds[row, column] = np.inf
+            return
+        found, cut = answer
+        self.solved.append(found)
+        for start in range(0, len(self._stars), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            proven = cut.bounds(self._stars[part], self._sets, self._owners)
+            np.maximum(self.bounds[part], proven, out=self.bounds[part])
+        self.bounds[row, column] = max(found.bound, self.bounds[row, column])
 
 
 def distinct_values(space: StarSpace, solved: Sequence[Solved]) -> list[float]:
@@ -273,83 +292,3 @@ def _spread(x: Array, affine: AffineProblem, kept: Sequence[bool]) -> Array:
     columns = np.concatenate([np.full(d.width, keep) for d, keep in zip(affine.domains, kept, strict=True)])
     out[columns] = x
     return out
-
-
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """c + sum_k A[k, p_k] + sum over decisions of min_x (g + sum_k G[k, p_k]) . x, under every objective (S14).
-
-    Attributes
-    ----------
-    constant, moves
-        c and A, shape (throws, steps).
-    gradient, turns
-        g and G, shapes (n,) and (throws, steps, n); no G where g is the same for every star.
-    domains
-        Of the decisions.
-    """
-
-    constant: float
-    moves: Array
-    gradient: Array
-    turns: Array | None
-    domains: tuple[Domain, ...]
-
-    def bounds(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
-        """Lower bounds of stars with sets of shafts, shape (stars, sets); never under zero."""
-        total = np.full(len(stars), self.constant)
-        for k in range(stars.shape[1]):
-            total += self.moves[k, stars[:, k]]
-        least = self._least(stars)
-        out = np.empty((len(stars), len(sets)))
-        for column, built in enumerate(sets):
-            chosen = [d for d, own in enumerate(owners) if own < 0 or own in built]
-            out[:, column] = total + (least[:, chosen].sum(axis=1) if chosen else 0.0)
-        return np.maximum(out, 0.0)
-
-    def least(self, space: StarSpace) -> float:
-        """A bound of every star: the best assignment of throws to steps; never under zero."""
-        if self.turns is not None:
-            return 0.0
-        rest = sum(domain.least(self.gradient) for domain in self.domains)
-        values = []
-        for pattern in space.patterns:
-            places = np.repeat(np.arange(space.phases), pattern)
-            # the first throw stands on step 0
-            places = np.delete(places, 0)
-            cost = self.moves[1:][:, places]
-            rows, columns = linear_sum_assignment(cost)
-            values.append(self.moves[0, 0] + float(cost[rows, columns].sum()))
-        return float(max(0.0, self.constant + rest + min(values)))
-
-    def _least(self, stars: Stars) -> Array:
-        """min g . x of every decision, shape (stars, decisions)."""
-        if self.turns is None:
-            return np.tile([domain.least(self.gradient) for domain in self.domains], (len(stars), 1))
-        gradients = np.tile(self.gradient, (len(stars), 1))
-        for k in range(stars.shape[1]):
-            gradients += self.turns[k, stars[:, k]]
-        return np.array([[domain.least(g) for domain in self.domains] for g in gradients])
-
-
-def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
-    """What dual rows prove of every star (S14)."""
-    throws, steps = fine.terms[0][1].moves.shape[:2]
-    size = fine.terms[0][1].slope.shape[-1]
-    constant, moves = 0.0, np.zeros((throws, steps))
-    gradient, turns, turning = np.zeros(size), np.zeros((throws, steps, size)), False
-    parts = []
-    for (weight, norm), given in zip(fine.terms, multipliers.terms, strict=True):
-        parts.append((weight * norm.norm.dual_feasible(norm.grid, given), norm))
-    for (maximum, norm), given in zip(fine.limits, multipliers.limits, strict=True):
-        z = norm.norm.balanced(norm.grid, given)
-        constant -= norm.norm.dual_norm(norm.grid, z) * maximum
-        parts.append((z, norm))
-    for z, norm in parts:
-        constant += float(np.vdot(z, norm.constant))
-        moves += np.einsum("kd,tpkd->tp", z, norm.moves)
-        gradient += np.einsum("kd,kdn->n", z, norm.slope)
-        if norm.turns is not None:
-            turning = True
-            turns += np.einsum("kd,tpkdn->tpn", z, norm.turns)
-    return Cut(constant, moves, gradient, turns if turning else None, fine.domains)

@@ -1,0 +1,95 @@
+"""What the dual rows of one star prove of all others (S14)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from laufruhe.load_models.star_model import StarProblem
+from laufruhe.physics.crank_stars import Array, Stars
+from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.decision import Domain
+from laufruhe.prove.certificate import Multipliers
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """c + sum_k A[k, p_k] + sum over decisions of min_x (g + sum_k G[k, p_k]) . x, under every objective (S14).
+
+    Attributes
+    ----------
+    constant, moves
+        c and A, shape (throws, steps).
+    gradient, turns
+        g and G, shapes (n,) and (throws, steps, n); no G where g is the same for every star.
+    domains
+        Of the decisions.
+    """
+
+    constant: float
+    moves: Array
+    gradient: Array
+    turns: Array | None
+    domains: tuple[Domain, ...]
+
+    def bounds(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
+        """Lower bounds of stars with sets of shafts, shape (stars, sets); never under zero."""
+        total = np.full(len(stars), self.constant)
+        for k in range(stars.shape[1]):
+            total += self.moves[k, stars[:, k]]
+        least = self._least(stars)
+        out = np.empty((len(stars), len(sets)))
+        for column, built in enumerate(sets):
+            chosen = [d for d, own in enumerate(owners) if own < 0 or own in built]
+            out[:, column] = total + (least[:, chosen].sum(axis=1) if chosen else 0.0)
+        return np.maximum(out, 0.0)
+
+    def least(self, space: StarSpace) -> float:
+        """A bound of every star: the best assignment of throws to steps; never under zero."""
+        if self.turns is not None:
+            return 0.0
+        rest = sum(domain.least(self.gradient) for domain in self.domains)
+        values = []
+        for pattern in space.patterns:
+            places = np.repeat(np.arange(space.phases), pattern)
+            # the first throw stands on step 0
+            places = np.delete(places, 0)
+            cost = self.moves[1:][:, places]
+            rows, columns = linear_sum_assignment(cost)
+            values.append(self.moves[0, 0] + float(cost[rows, columns].sum()))
+        return float(max(0.0, self.constant + rest + min(values)))
+
+    def _least(self, stars: Stars) -> Array:
+        """min g . x of every decision, shape (stars, decisions)."""
+        if self.turns is None:
+            return np.tile([domain.least(self.gradient) for domain in self.domains], (len(stars), 1))
+        gradients = np.tile(self.gradient, (len(stars), 1))
+        for k in range(stars.shape[1]):
+            gradients += self.turns[k, stars[:, k]]
+        return np.array([[domain.least(g) for domain in self.domains] for g in gradients])
+
+
+def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
+    """What dual rows prove of every star (S14)."""
+    throws, steps = fine.terms[0][1].moves.shape[:2]
+    size = fine.terms[0][1].slope.shape[-1]
+    constant, moves = 0.0, np.zeros((throws, steps))
+    gradient, turns, turning = np.zeros(size), np.zeros((throws, steps, size)), False
+    parts = []
+    for (weight, norm), given in zip(fine.terms, multipliers.terms, strict=True):
+        parts.append((weight * norm.norm.dual_feasible(norm.grid, given), norm))
+    for (maximum, norm), given in zip(fine.limits, multipliers.limits, strict=True):
+        z = norm.norm.balanced(norm.grid, given)
+        constant -= norm.norm.dual_norm(norm.grid, z) * maximum
+        parts.append((z, norm))
+    for z, norm in parts:
+        constant += float(np.vdot(z, norm.constant))
+        moves += np.einsum("kd,tpkd->tp", z, norm.moves)
+        gradient += np.einsum("kd,kdn->n", z, norm.slope)
+        if norm.turns is not None:
+            turning = True
+            turns += np.einsum("kd,tpkdn->tpn", z, norm.turns)
+    return Cut(constant, moves, gradient, turns if turning else None, fine.domains)
