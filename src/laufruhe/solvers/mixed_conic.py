@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 # what SCIP's own feasibility tolerance may hide of the objective
 TRUST = 1e-6
+NO_SHAFTS = ShaftChoice()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,7 @@ def solve_program(
     problem: StarProblem,
     space: StarSpace,
     owners: Sequence[int] = (),
-    shafts: ShaftChoice = ShaftChoice(),
+    shafts: ShaftChoice = NO_SHAFTS,
     time_limit: float = 600.0,
 ) -> ProgramFound:
     """Solve the program of every star and set of shafts at once.
