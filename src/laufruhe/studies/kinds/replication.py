@@ -11,14 +11,21 @@ from pydantic import Field, model_validator
 
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import nearest
 from laufruhe.files.study_paths import joined
 from laufruhe.solvers import Status, solve
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.replication.computations import COMPUTATIONS
 from laufruhe.studies.replication.drawing import drawn
-from laufruhe.studies.replication.expressions import ExpressionError, check, expressions_in, filled, grid, numbers_of
+from laufruhe.studies.replication.expressions import (
+    ExpressionError,
+    check,
+    check_among,
+    expressions_in,
+    filled,
+    grid,
+    numbers_of,
+)
 from laufruhe.studies.replication.judging import judged, rows
 from laufruhe.studies.replication.models import PictureTable, ReplicaCase, StatementTable
 from laufruhe.studies.replication.quantities import AskedTable, asked, check_asked
@@ -56,11 +63,11 @@ class Replication(Part):
     def _check(self) -> None:
         known = {*self.numbers, *self.quantities, "value"}
         for case in self.cases:
-            if case.computation and case.computation not in COMPUTATIONS:
-                raise ModelError(
-                    f"'{case.computation}' is no computation; {nearest(case.computation, [*COMPUTATIONS])}"
-                )
-            known |= {*COMPUTATIONS[case.computation].gives} if case.computation else set()
+            if case.computation:
+                check_among(case.computation, COMPUTATIONS, "computation")
+                known |= {*COMPUTATIONS[case.computation].gives}
+        for name in self.problems:
+            self._check_like(name)
         for what in self.quantities.values():
             check_asked(what)
         cases = [case.name for case in self.cases]
@@ -70,6 +77,14 @@ class Replication(Part):
         for one in self.statements:
             for text in (one.value, one.holds or "0", *expressions_in(one.why)):
                 check(text, known, cases)
+
+    def _check_like(self, name: str) -> None:
+        seen: list[str] = []
+        while name in self.problems:
+            if name in seen:
+                raise ModelError(f"problem '{name}' is like itself; take out one like")
+            seen.append(name)
+            name = str(self.problems[name].get("like"))
 
     def settings(self) -> dict[str, Any]:
         """What is asked of every case; numbers and problems stand in the scenes."""
@@ -86,9 +101,7 @@ class Replication(Part):
         return [point for case in self.cases for point in self._points(case, scenes)]
 
     def _points(self, case: ReplicaCase, scenes: Scenes) -> Iterator[Point]:
-        grids = {
-            name: grid(name, table.model_dump(by_alias=True)).values.tolist() for name, table in case.sweep.items()
-        }
+        grids = {name: grid(name, table).values.tolist() for name, table in case.sweep.items()}
         for values in itertools.product(*grids.values()):
             swept = dict(zip(grids, values, strict=True))
             try:
@@ -136,9 +149,8 @@ class Replication(Part):
         )
         for name in dict.fromkeys(name for record in records for name in record):
             data = data.merge(_along_points([record.get(name) for record in records], name))
-        names = self.names(data)
         try:
-            return data.assign_coords(judged(self.statements, names))
+            return data.assign_coords(judged(self.statements, self.names(data)))
         except ExpressionError as error:
             raise self._refused("statements", *str(error).split("; ", 1)) from None
 
@@ -173,7 +185,7 @@ class _Cases(dict[str, Any]):
     """What each case gave, by its name."""
 
     def __missing__(self, name: str) -> Any:
-        raise ExpressionError(f"'{name}' is no case; {nearest(str(name), list(self))}")
+        check_among(name, self, "case")
 
 
 def _by_case(data: xr.Dataset, name: str) -> _Cases:

@@ -93,10 +93,13 @@ def _bars(bars: BarsTable, names: Names) -> Iterator[Mark]:
         if bars.outline:
             yield Bars(places, high, 0.9 * width, bars.colours[k], hollow=True)
         for x, inner, outer in zip(places, low, high, strict=True):
-            yield Words(x, outer + ABOVE * top, _number(outer, top), 6.5, "faint", "center", "bottom")
+            yield Words(x, outer + ABOVE * top, _number(outer, top, bars.number), 6.5, "faint", "center", "bottom")
             if bars.outline and inner > LEAST_INSIDE * top:
-                yield Words(x, inner - ABOVE * top, _number(inner, top), 6.5, "white", "center", "top")
+                yield Words(x, inner - ABOVE * top, _number(inner, top, bars.number), 6.5, "white", "center", "top")
 
 
-def _number(value: float, top: float) -> str:
-    return f"{value:#.{DIGITS}g}".rstrip(".") if value > LEAST_SHOWN * top else "0"
+def _number(value: float, top: float, spec: str) -> str:
+    if spec:
+        return format(value, spec)
+    figures = f"{value:#.{DIGITS}g}".rstrip(".") if abs(value) < 10.0**DIGITS else f"{value:.0f}"
+    return figures if abs(value) > LEAST_SHOWN * top else "0"

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import ast
 import operator
+import re
 from collections.abc import Callable, Collection, Mapping
 from string import Formatter
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from laufruhe.errors import ModelError
 from laufruhe.files.complaints import nearest
 from laufruhe.studies.replication.functions import CONSTANTS, FUNCTIONS
+from laufruhe.studies.replication.models import GridTable
 
 MOST_LETTERS = 2000
 _BINARY: Mapping[type, Callable[[Any, Any], Any]] = {
@@ -26,6 +29,7 @@ _BINARY: Mapping[type, Callable[[Any, Any], Any]] = {
 _COMPARED: Mapping[type, Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq,
 }  # fmt: skip
+_SPEC = re.compile(r"[+#]{0,2}(\.\d)?[efg]")
 _UNARY: Mapping[type, Callable[[Any], Any]] = {ast.USub: operator.neg, ast.Not: operator.not_}
 
 
@@ -49,19 +53,26 @@ def check(text: str, names: Collection[str], cases: Collection[str]) -> None:
     for node in nodes:
         _check_node(node)
         if isinstance(node, ast.Name) and id(node) not in called:
-            _check_among(node.id, known, "name")
+            check_among(node.id, known, "name")
         elif isinstance(node, ast.Subscript) and isinstance(case := getattr(node.slice, "value", None), str):
-            _check_among(case, cases, "case")
+            check_among(case, cases, "case")
 
 
 def _check_node(node: ast.expr) -> None:
     if type(node) not in _NODES:
         raise ExpressionError(f"'{ast.unparse(node)}' is not allowed here; use numbers, names and functions alone")
     if isinstance(node, ast.Call):
-        _check_among(ast.unparse(node.func), FUNCTIONS, "function")
+        check_among(ast.unparse(node.func), FUNCTIONS, "function")
 
 
-def _check_among(name: str, known: Collection[str], what: str) -> None:
+def check_among(name: str, known: Collection[str], what: str) -> None:
+    """Whether a name is one of those that there are.
+
+    Raises
+    ------
+    ExpressionError
+        With the nearest one.
+    """
     if name not in known:
         raise ExpressionError(f"'{name}' is no {what} here; {nearest(name, list(known))}")
 
@@ -88,7 +99,7 @@ def value_of(text: Any, names: Mapping[str, Any]) -> Any:
         return _value(_parsed(text), names)
     except ExpressionError:
         raise
-    except (TypeError, ValueError, KeyError, IndexError, ZeroDivisionError, OverflowError, AttributeError) as error:
+    except (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, RecursionError) as error:
         raise ExpressionError(f"'{text}' has no value ({str(error).splitlines()[0]}); correct it") from None
 
 
@@ -111,7 +122,11 @@ def filled(text: Any, names: Mapping[str, Any]) -> Any:
 
 def _shown(field: str, spec: str, names: Mapping[str, Any]) -> str:
     value = value_of(field, names)
-    return format(float(value) if spec else value, spec) if not isinstance(value, str) else value
+    if not spec:
+        return str(value)
+    if not _SPEC.fullmatch(spec):
+        raise ExpressionError(f"'{spec}' is no format of a number; write for example .1f, .3g or .0f")
+    return format(float(value), spec)
 
 
 def _parsed(text: str) -> ast.expr:
@@ -131,7 +146,7 @@ def _value(node: ast.expr, names: Mapping[str, Any]) -> Any:
 
 
 def _name(node: ast.Name, names: Mapping[str, Any]) -> Any:
-    _check_among(node.id, {*names, *CONSTANTS}, "name")
+    check_among(node.id, {*names, *CONSTANTS}, "name")
     return names[node.id] if node.id in names else CONSTANTS[node.id]
 
 
@@ -158,6 +173,13 @@ def _joined(node: ast.BoolOp, names: Mapping[str, Any]) -> bool:
     return all(values) if isinstance(node.op, ast.And) else any(values)
 
 
+def _number(node: ast.expr, names: Mapping[str, Any]) -> Any:
+    value = _value(node, names)
+    if isinstance(value, str | list):
+        raise TypeError("texts and lists are no numbers")
+    return value
+
+
 def _constant(node: ast.Constant, _: Mapping[str, Any]) -> Any:
     if not isinstance(node.value, int | float | str):
         raise ExpressionError(f"'{node.value!r}' is neither number nor text; write one")
@@ -173,7 +195,7 @@ _NODES: Mapping[type, Callable[[Any, Mapping[str, Any]], Any]] = {
     ast.List: lambda node, names: [_value(one, names) for one in node.elts],
     ast.Subscript: lambda node, names: _value(node.value, names)[_value(node.slice, names)],
     ast.UnaryOp: lambda node, names: _UNARY[type(node.op)](_value(node.operand, names)),
-    ast.BinOp: lambda node, names: _BINARY[type(node.op)](_value(node.left, names), _value(node.right, names)),
+    ast.BinOp: lambda node, names: _BINARY[type(node.op)](*(_number(one, names) for one in (node.left, node.right))),
 }
 
 
@@ -187,13 +209,17 @@ def numbers_of(given: Mapping[str, Any], names: Mapping[str, Any]) -> dict[str, 
     """
     found = dict(names)
     for name, text in given.items():
-        found[name] = grid(name, text) if isinstance(text, dict) else value_of(text, found)
+        found[name] = grid(name, text) if isinstance(text, dict | GridTable) else value_of(text, found)
     return found
 
 
-def grid(name: str, given: Mapping[str, Any]) -> Any:
+def grid(name: str, given: GridTable | Mapping[str, Any]) -> Any:
     """Values listed, or so many from one end to the other, labelled by themselves."""
     import xarray as xr
 
-    values = given.get("values") or np.linspace(given["from"], given["to"], cast(int, given["points"]))
+    try:
+        table = GridTable.model_validate(given)
+    except ValidationError:
+        raise ExpressionError(f"'{name}' is no grid; give values, or from, to and points") from None
+    values = table.values or np.linspace(table.first or 0.0, table.last or 0.0, table.points or 2)
     return xr.DataArray(values, dims=name, coords={name: values})

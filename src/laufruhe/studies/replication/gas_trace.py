@@ -1,18 +1,17 @@
 """Which gas trace a four-cylinder study may have had: parameters fitted to what it says in words.
 
-Hasselgruber (1964) prints no trace, and says five things that bear on it: the largest mount force of the gas on
-a single; the piston speed at which second-order gas and inertia torques cancel; the best share of a moment pair;
-what the force pair takes off the mean mount force, and what the moment pair takes off the rest.
+Hasselgruber (1964) prints no trace, and says five things that bear on it (`CLAIMS`): the largest mount force of
+the gas on a single; the piston speed at which second-order gas and inertia torques cancel; the best share of a
+moment pair; what the force pair takes off the mean mount force, and what the moment pair takes off the rest.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,87 +38,49 @@ PRESSURE = 1e4 * GRAVITY
 """One kp/cm2 [Pa]."""
 NEARNESS = 0.05
 """Weight of a parameter's distance from its assumed value, over its range, beside what is allowed of a claim."""
-BURN = {"shape": 3.0, "compression_ratio": 13.0}
 CLAIMS = ("gas_force", "cancelling_speed", "best_share", "first_fall", "second_fall")
 PARAMETERS = ("ratio", "compression", "expansion", "peak", "rod ratio", "first", "last")
 GIVES = (*CLAIMS, "met", "parameters", "highest_pressure")
 
 
-@dataclass(frozen=True)
-class Unprinted:
+class Unprinted(NamedTuple):
     """What decides over the gas torque and is not printed.
 
-    Attributes
-    ----------
-    part_share
-        Where the peak at part load lies between the end of compression (0) and the highest
-        that this load and the printed peak allow (1).
+    `peak` is where that at part load lies between the end of compression (0) and the highest that this load
+    and the printed peak allow (1).
     """
 
-    compression_ratio: float
-    compression_exponent: float
-    expansion_exponent: float
-    part_share: float
+    ratio: float
+    compression: float
+    expansion: float
+    peak: float
     rod_ratio: float
 
 
-@dataclass(frozen=True)
-class _Trace:
-    """A set of parameters, the trace at full load, and the one that statements are judged on."""
+class Trace(NamedTuple):
+    """A set of parameters, the trace at full load, and the one that claims are judged on."""
 
     name: str
     full: GasModel | None
     judged: GasModel
     how: Unprinted
 
-    @property
-    def parameters(self) -> list[float]:
-        """In the order of `PARAMETERS`; not a number where the trace has none."""
-        if isinstance(self.judged, Wiebe):
-            burn = [math.degrees(self.judged.start), math.degrees(self.judged.start + self.judged.duration)]
-            return [self.judged.compression_ratio, *[math.nan] * 3, self.how.rod_ratio, *burn]
-        peak = self.judged.peak_pressure / PRESSURE  # type: ignore[union-attr]
-        ratio, compression, expansion = astuple(self.how)[:3]
-        return [ratio, compression, expansion, peak, self.how.rod_ratio, math.nan, math.nan]
-
 
 @dataclass(frozen=True)
-class _Study:
-    """The four-cylinder with both pairs, and what is said of it [SI, forces in kp].
-
-    Attributes
-    ----------
-    share
-        Of the whole moment pair, that the problem has.
-    """
+class Study:
+    """The four-cylinder with both pairs, and what is said of it, as `fitted_traces` has them."""
 
     problem: Problem
     said: Mapping[str, Any]
 
-    @cached_property
-    def claimed(self) -> dict[str, float]:
-        """By the names of `CLAIMS`."""
-        return dict(zip(CLAIMS, self.said["claimed"], strict=True))
-
-    @cached_property
-    def allowed(self) -> dict[str, float]:
-        """What 'about' is taken to mean."""
-        return dict(zip(CLAIMS, self.said["allowed"], strict=True))
-
-    @cached_property
-    def assumed(self) -> Unprinted:
-        """Of every other figure."""
-        return Unprinted(*self.said["assumed"])
-
-    def cylinder(self, rod_ratio: float) -> SliderCrank:
-        """The first one, its rod as long as a rod ratio wants it."""
-        part = self.problem.engine.slider_cranks[0]
+    def cylinder(self, rod_ratio: float, part: SliderCrank | None = None) -> SliderCrank:
+        """The first one or another, its rod as long as a rod ratio wants it."""
+        part = part or self.problem.engine.slider_cranks[0]
         return replace(part, rod_length=part.crank_radius / rod_ratio)
 
     def cycle(self, how: Unprinted, imep: float, peak: float) -> Seiliger:
         """The mixed cycle at a load."""
-        exponents = how.compression_exponent, how.expansion_exponent
-        return Seiliger(peak, imep, *exponents, compression_ratio=how.compression_ratio)
+        return Seiliger(peak, imep, how.compression, how.expansion, compression_ratio=how.ratio)
 
     def fired(self, how: Unprinted, imep: float, share: float = 1.0) -> Seiliger:
         """With the peak at a share between the end of compression and the highest: all heat at constant volume."""
@@ -128,8 +89,7 @@ class _Study:
         # the mean pressure is linear in the peak pressure
         reached = [seiliger_imep(self.cycle(how, imep, peak), FOUR, 1.0) for peak in (low, high)]
         peak = low + (imep - reached[0]) / (reached[1] - reached[0]) * (high - low)
-        highest = max(min(peak, self.said["peak"]), end)
-        return self.cycle(how, imep, highest if share == 1.0 else end + share * (highest - end))
+        return self.cycle(how, imep, end + share * (max(min(peak, self.said["peak"]), end) - end))
 
     def full(self, how: Unprinted) -> Seiliger:
         """At full load."""
@@ -137,14 +97,16 @@ class _Study:
 
     def part(self, how: Unprinted) -> Seiliger:
         """At part load."""
-        return self.fired(how, self.said["part_load"], how.part_share)
+        return self.fired(how, self.said["part_load"], how.peak)
 
     def motored(self, how: Unprinted) -> Seiliger:
         """No heat."""
         return motored_cycle(self.cycle(how, 0.0, self.said["peak"]), FOUR)
 
-    def gas_force(self, gas: GasModel, rod_ratio: float, samples: int = 4 * SAMPLES) -> float:
+    def gas_force(self, gas: GasModel | None, rod_ratio: float, samples: int = 4 * SAMPLES) -> float:
         """Largest mount force A = T / b of a single (eq. 1, Fig. 2) [kp]."""
+        if gas is None:
+            return math.nan
         torque = gas_torque(gas, self.cylinder(rod_ratio), FOUR, samples)
         across = [mount.position[1] for mount in self.problem.engine.mounts]
         return float(np.abs(torque).max()) / (max(across) - min(across)) / GRAVITY
@@ -153,57 +115,44 @@ class _Study:
         """Mean piston speed [m/s] at which least of the second-order torque is left."""
         part = self.cylinder(rod_ratio)
         torque = complex(spectrum_of(gas_torque(gas, part, FOUR, SAMPLES), Fraction(1, 2)).at(2))
-        # at 1 m/s
-        scale = part.reciprocating_mass * part.crank_radius**2 * (math.pi / (2.0 * part.crank_radius)) ** 2
+        # m r^2 w^2 at 1 m/s
+        scale = part.reciprocating_mass * (0.5 * math.pi) ** 2
         inertia = complex(scale * inertia_roll_orders(rod_ratio, 0.0, 1.0, 4)[2])
         return math.sqrt(max(-(torque * inertia.conjugate()).real / abs(inertia) ** 2, 0.0))
 
-    def balanced(self, gas: GasModel, rod_ratio: float) -> dict[str, float]:
-        """What force pair and moment pair do, and the best share of the latter (Fig. 22)."""
+    def balanced(self, gas: GasModel, rod_ratio: float) -> list[float]:
+        """Best share of the moment pair, and what force and moment pair take off (Fig. 22): the last three claims."""
         engine = self.problem.engine
-        longer = tuple(replace(part, rod_length=part.crank_radius / rod_ratio) for part in engine.slider_cranks)
-        plain = replace(engine, slider_cranks=longer, rotors=())
-        point = replace(self.problem.points[0], gas=gas)
+        longer = tuple(self.cylinder(rod_ratio, part) for part in engine.slider_cranks)
+        plain, point = replace(engine, slider_cranks=longer, rotors=()), replace(self.problem.points[0], gas=gas)
         bare = shaking_loads(plain, point, Fidelity(samples=SAMPLES))
-        force, moment = ([r for r in engine.rotors if r.shaft.name.startswith(name)] for name in ("force", "moment"))
-        gain = rod_ratio / self.assumed.rod_ratio
-        pair = [replace(rotor, unbalance=gain * rotor.unbalance) for rotor in force]
+        gain = rod_ratio / self.said["assumed"][-1]
+        pair = [replace(r, unbalance=gain * r.unbalance) for r in engine.rotors if r.shaft.name.startswith("force")]
         left = _sampled(plain, bare + rotor_loads(pair, point.speed, FOUR))
+        moment = [r for r in engine.rotors if r.shaft.name.startswith("moment")]
         slope = _sampled(plain, rotor_loads(moment, point.speed, FOUR)) / self.said["share"]
-        means = np.array([_mean(left + share * slope) for share in SHARES])
+        best = SHARES[np.argmin([_mean(left + share * slope) for share in SHARES])]
         second = 1.0 - _mean(left + self.said["share"] * slope) / _mean(left)
-        first = 1.0 - _mean(left) / _mean(_sampled(plain, bare))
-        return {"best_share": float(SHARES[np.argmin(means)]), "first_fall": first, "second_fall": second}
+        return [float(best), 1.0 - _mean(left) / _mean(_sampled(plain, bare)), second]
 
-    def found(self, trace: _Trace) -> dict[str, float]:
-        """Every claim's number under a trace."""
-        ratio = trace.how.rod_ratio
-        return {
-            "gas_force": math.nan if trace.full is None else self.gas_force(trace.full, ratio),
-            "cancelling_speed": self.cancelling_speed(trace.judged, ratio),
-            **self.balanced(trace.judged, ratio),
-        }
-
-    def misses(self, gas: GasModel, how: Unprinted, *, speed_alone: bool = False) -> list[float]:
+    def misses(self, found: Sequence[float], *names: str) -> list[float]:
         """How far claims are missed, over what is allowed."""
-        found = {"cancelling_speed": self.cancelling_speed(gas, how.rod_ratio)}
-        found |= {} if speed_alone else self.balanced(gas, how.rod_ratio)
-        return [(value - self.claimed[name]) / self.allowed[name] for name, value in found.items()]
+        places = [CLAIMS.index(name) for name in names]
+        claimed, allowed = ([self.said[key][k] for k in places] for key in ("claimed", "allowed"))
+        return [(f - c) / a for f, c, a in zip(found, claimed, allowed, strict=True)]
 
-    def force_miss(self, how: Unprinted, samples: int = SAMPLES) -> float:
-        """The same of the gas force at full load."""
-        found = self.gas_force(self.full(how), how.rod_ratio, samples)
-        return (found - self.claimed["gas_force"]) / self.allowed["gas_force"]
+    def torque_misses(self, gas: GasModel, how: Unprinted) -> list[float]:
+        """Of all but the gas force."""
+        found = [self.cancelling_speed(gas, how.rod_ratio), *self.balanced(gas, how.rod_ratio)]
+        return self.misses(found, *CLAIMS[1:])
 
+    def force_miss(self, how: Unprinted, samples: int = SAMPLES) -> list[float]:
+        """Of the gas force at full load."""
+        return self.misses([self.gas_force(self.full(how), how.rod_ratio, samples)], CLAIMS[0])
 
-def _sampled(engine: Engine, load: Spectrum) -> Array:
-    """Mount forces of a load over the cycle."""
-    return rigid_mounting(engine.mounts).forces(load).rebased(engine.cycle.base_order).sample(SAMPLES)
-
-
-def _mean(samples: Array) -> float:
-    """Mean length of vectors (..., 3)."""
-    return float(np.sqrt(np.sum(samples**2, axis=-1)).mean())
+    def speed_miss(self, gas: GasModel, rod_ratio: float) -> list[float]:
+        """Of the speed at which torques cancel."""
+        return self.misses([self.cancelling_speed(gas, rod_ratio)], CLAIMS[1])
 
 
 def fitted_traces(problem: Problem, said: Mapping[str, Any]) -> dict[str, Labelled]:
@@ -217,80 +166,100 @@ def fitted_traces(problem: Problem, said: Mapping[str, Any]) -> dict[str, Labell
         `claimed` and `allowed` in the order of `CLAIMS`; `assumed`, `lowest`, `highest` and
         `starts` of `Unprinted`; `peak`, `full_load` and `part_load` [Pa]; the `share` of the moment pair.
     """
-    study = _Study(problem, said)
+    study = Study(problem, said)
     traces = _traces(study)
-    found = [study.found(trace) for trace in traces]
+    ratios = [trace.how.rod_ratio for trace in traces]
+    found = [
+        [study.gas_force(t.full, ratio), study.cancelling_speed(t.judged, ratio), *study.balanced(t.judged, ratio)]
+        for t, ratio in zip(traces, ratios, strict=True)
+    ]
     names = {"trace": [trace.name for trace in traces]}
-    met = [
-        sum(abs(row[c] - study.claimed[c]) <= study.allowed[c] * (1.0 + 1e-9) for c in CLAIMS) for row in found
-    ]  # fmt: skip
-    pressure = [cylinder_pressure(t.judged, study.cylinder(t.how.rod_ratio), FOUR, SAMPLES).max() for t in traces]
+    met = [sum(abs(miss) <= 1.0 + 1e-9 for miss in study.misses(row, *CLAIMS)) for row in found]
+    highest = [cylinder_pressure(t.judged, study.cylinder(t.how.rod_ratio), FOUR, SAMPLES).max() for t in traces]
     return {
-        **{claim: Labelled([row[claim] for row in found], names) for claim in CLAIMS},
+        **{claim: Labelled([row[k] for row in found], names) for k, claim in enumerate(CLAIMS)},
         "met": Labelled(met, names),
-        "parameters": Labelled([t.parameters for t in traces], {**names, "parameter": list(PARAMETERS)}),
-        "highest_pressure": Labelled([float(p) / PRESSURE for p in pressure], names),
+        "parameters": Labelled([_parameters(t) for t in traces], {**names, "parameter": list(PARAMETERS)}),
+        "highest_pressure": Labelled([float(pressure) / PRESSURE for pressure in highest], names),
     }
 
 
-def _traces(study: _Study) -> list[_Trace]:
-    assumed = study.assumed
-    starts = [assumed, *(Unprinted(*start) for start in study.said["starts"])]
-    steep = replace(assumed, compression_ratio=_ratio_for_gas_force(study))
-    soft = _fitted(study, lambda how: study.misses(study.part(how), how, speed_alone=True), starts)
-    fired = _fitted(study, lambda how: [study.force_miss(how), *study.misses(study.part(how), how)], starts)
-    idle = _fitted(study, lambda how: study.misses(study.motored(how), how), starts[:1])
+def _parameters(trace: Trace) -> list[float]:
+    """In the order of `PARAMETERS`; not a number where the trace has none."""
+    how, gas = trace.how, trace.judged
+    if isinstance(gas, Wiebe):
+        burn = [math.degrees(gas.start), math.degrees(gas.start + gas.duration)]
+        return [gas.compression_ratio, *[math.nan] * 3, how.rod_ratio, *burn]
+    peak = gas.peak_pressure / PRESSURE if isinstance(gas, Seiliger) else math.nan
+    return [how.ratio, how.compression, how.expansion, peak, how.rod_ratio, math.nan, math.nan]
+
+
+def _traces(study: Study) -> list[Trace]:
+    assumed, *others = (Unprinted(*start) for start in (study.said["assumed"], *study.said["starts"]))
+    starts = [assumed, *others]
+    steep = assumed._replace(ratio=_ratio_for_gas_force(study, assumed))
+    soft = _fitted(study, lambda how: study.speed_miss(study.part(how), how.rod_ratio), starts)
+    fired = _fitted(study, lambda how: study.force_miss(how) + study.torque_misses(study.part(how), how), starts)
+    idle = _fitted(study, lambda how: study.torque_misses(study.motored(how), how), [assumed])
     return [
-        _Trace("assumed here", study.full(assumed), study.part(assumed), assumed),
-        _Trace("largest force met", study.full(steep), study.part(steep), steep),
-        _Trace("softest fired", study.full(soft), study.part(soft), soft),
-        _Trace("fired, all five", study.full(fired), study.part(fired), fired),
-        _Trace("burn too late", None, _late_burn(study), assumed),
-        _Trace("no load, assumed", study.full(assumed), study.motored(assumed), assumed),
-        _Trace("no load, fitted", study.full(idle), study.motored(idle), idle),
+        Trace("assumed here", study.full(assumed), study.part(assumed), assumed),
+        Trace("largest force met", study.full(steep), study.part(steep), steep),
+        Trace("softest fired", study.full(soft), study.part(soft), soft),
+        Trace("fired, all five", study.full(fired), study.part(fired), fired),
+        Trace("burn too late", None, _late_burn(study, assumed), assumed),
+        Trace("no load, assumed", study.full(assumed), study.motored(assumed), assumed),
+        Trace("no load, fitted", study.full(idle), study.motored(idle), idle),
     ]
 
 
-def _ratio_for_gas_force(study: _Study) -> float:
+def _ratio_for_gas_force(study: Study, assumed: Unprinted) -> float:
     # late, for it takes longer than all the rest of a small problem
     from scipy.optimize import brentq
 
-    def short(ratio: float) -> float:
-        return study.force_miss(replace(study.assumed, compression_ratio=ratio), 4 * SAMPLES)
-
-    return float(brentq(short, 15.0, 22.0, xtol=1e-3))
+    return float(brentq(lambda x: study.force_miss(assumed._replace(ratio=x), 4 * SAMPLES)[0], 15.0, 22.0, xtol=1e-3))
 
 
-def _fitted(study: _Study, misses: Callable[[Unprinted], list[float]], starts: Sequence[Unprinted]) -> Unprinted:
+def _fitted(study: Study, misses: Callable[[Unprinted], list[float]], starts: Sequence[Unprinted]) -> Unprinted:
     """Least squares within bounds of what a diesel engine of the time can have been."""
     from scipy.optimize import least_squares
 
-    low, high = np.array(study.said["lowest"]), np.array(study.said["highest"])
-    assumed = (np.array(astuple(study.assumed)) - low) / (high - low)
+    low, high, assumed = (np.array(study.said[key]) for key in ("lowest", "highest", "assumed"))
 
     def scaled(x: Array) -> Array:
         # of what serves equally well the nearest to what is assumed elsewhere
-        return np.array([*misses(Unprinted(*(low + x * (high - low)))), *(NEARNESS * (x - assumed))])
+        near = NEARNESS * (x - (assumed - low) / (high - low))
+        return np.array([*misses(Unprinted(*(low + x * (high - low)))), *near])
 
     def fit(start: Unprinted) -> Any:
-        first = np.clip((np.array(astuple(start)) - low) / (high - low), 0.02, 0.98)
+        first = np.clip((np.array(start) - low) / (high - low), 0.02, 0.98)
         step = [2e-3] * len(low)
         return least_squares(scaled, first, bounds=(0.0, 1.0), diff_step=step, ftol=1e-4, xtol=1e-4, max_nfev=30)
 
     best = min(map(fit, starts), key=lambda found: float(found.cost))
-    return Unprinted(*(float(v) for v in low + best.x * (high - low)))
+    return Unprinted(*(low + best.x * (high - low)).tolist())
 
 
-def _late_burn(study: _Study) -> Wiebe:
+def _late_burn(study: Study, assumed: Unprinted) -> Wiebe:
     """Finite heat release at part load, its start and duration driven to the speed that is said."""
     from scipy.optimize import least_squares
 
     def burn(x: Array) -> Wiebe:
-        return Wiebe(study.said["part_load"], math.radians(x[0]), math.radians(x[1]), **BURN)
+        first, lasts = math.radians(x[0]), math.radians(x[1])
+        return Wiebe(study.said["part_load"], first, lasts, shape=3.0, compression_ratio=13.0)
 
     def miss(x: Array) -> Array:
-        ratio = study.assumed.rod_ratio
-        return np.array([study.cancelling_speed(burn(x), ratio) - study.claimed["cancelling_speed"]])
+        (found,) = study.speed_miss(burn(x), assumed.rod_ratio)
+        return np.array([study.said["allowed"][1] * found])
 
     bounds = ([-20.0, 30.0], [20.0, 110.0])
     return burn(least_squares(miss, [0.0, 60.0], bounds=bounds, diff_step=[1e-3, 1e-3], max_nfev=15).x)
+
+
+def _sampled(engine: Engine, load: Spectrum) -> Array:
+    """Mount forces of a load over the cycle."""
+    return rigid_mounting(engine.mounts).forces(load).rebased(engine.cycle.base_order).sample(SAMPLES)
+
+
+def _mean(samples: Array) -> float:
+    """Mean length of vectors (..., 3)."""
+    return float(np.sqrt(np.sum(samples**2, axis=-1)).mean())

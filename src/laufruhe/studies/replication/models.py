@@ -106,6 +106,11 @@ class BarsTable(Table):
     each: Each = Field(default_factory=dict, alias="for")
     label: str = ""
     labels: list[str] = Field(default_factory=list)
+    number: str = Field(
+        default="",
+        pattern=r"^(#?(\.\d)?[efg])?$",
+        description="Format of the numbers on the bars; three figures where left out.",
+    )
     colours: list[str] = Field(default=["grey", "sky", "orange", "blue", "vermilion", "green"])
 
 

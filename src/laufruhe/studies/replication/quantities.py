@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from laufruhe.errors import ModelError
 from laufruhe.files.asked import Scene
-from laufruhe.files.complaints import nearest
 from laufruhe.files.file_models import QuantityTable
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import cycle_measures, turning_parts
@@ -22,6 +20,7 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import mount_samples
 from laufruhe.problem.measure import MEASURES
 from laufruhe.solvers.result import Result
+from laufruhe.studies.replication.expressions import check_among
 
 ORDERS = (1.0, 2.0, 4.0, 6.0)
 FORCE, COUPLE = slice(0, 3), slice(4, 6)
@@ -52,13 +51,12 @@ def check_asked(what: str | AskedTable) -> None:
 
     Raises
     ------
-    ModelError
+    ExpressionError
         With the nearest one.
     """
     name = what if isinstance(what, str) else what.quantity
-    known = [*RESULTS, *MEASURES]
-    if name not in known and not name.startswith(DECISION):
-        raise ModelError(f"'{name}' is no quantity; {nearest(name, known)}")
+    if not name.startswith(DECISION):
+        check_among(name, [*RESULTS, *MEASURES], "quantity")
 
 
 def asked(result: Result, what: str | AskedTable) -> Labelled:

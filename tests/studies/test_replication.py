@@ -1,0 +1,203 @@
+"""Replications: the language of their files, what they keep and judge, and the ready ones."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from laufruhe.cli import app
+from laufruhe.plots.picture import draw
+from laufruhe.studies.kinds.replication import Replication
+from laufruhe.studies.replication.expressions import ExpressionError, check, filled, numbers_of, value_of
+from laufruhe.studies.replication.judging import CONFIRMED, DEPENDS, NOT_CONFIRMED, counted, judged, rows
+from laufruhe.studies.replication.models import StatementTable
+from laufruhe.studies.scenes import Scenes
+from laufruhe.studies.text import Rows
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+READY = {
+    "replication-five-cylinder": (6, ["Second-order couple (Fig. 2.8.13)"]),
+    "replication-free-couples": (17, []),
+    "replication-three-mounts": (12, []),
+}
+GRID = xr.DataArray([4.0, 1.0, 3.0], dims="k", coords={"k": [0.0, 1.0, 2.0]})
+NAMES = {"x": 2.0, "y": {"a": GRID}, "throws": [0, 180, 180, 0]}
+
+
+class TestExpressions:
+    """Arithmetic, comparisons and named functions, and nothing else."""
+
+    @pytest.mark.parametrize(("text", "value"), [
+        ("1 + 2 * x ** 3 / 4 % 5", 5.0),
+        ("-x < 0 <= 1 and not x > 3", True),
+        ("x > 3 or x == 2", True),
+        ("max(y['a']) - min(y['a'])", 3.0),
+        ("argmin(y['a'])", 1.0),
+        ("at(y['a'], k=1.8)", 3.0),
+        ("y['a'][0]", 4.0),
+        ("sum(y['a'] * 2)", 16.0),
+        ("max([x, 7, 3])", 7.0),
+        ("rising([1, 2, 3]) and not rising(y['a'])", True),
+        ("len(throws)", 4),
+        ("abs(couple_star([0, 240, 120]))", 3.0**0.5),
+        ("degrees(couple_star([0, 180]))", 0.0),
+        ("root(2 - u ** 2, u, 0, 3)", 2.0**0.5),
+        ("negligible < noticeable", True),
+    ])  # fmt: skip
+    def test_values(self, text: str, value: Any) -> None:
+        assert value_of(text, NAMES) == pytest.approx(value)
+        check(text, NAMES, ["a"])
+
+    @pytest.mark.parametrize("text", [
+        "x.real", "().__class__", "__import__('os').system('ls')", "(lambda: 1)()", "[k for k in throws]",
+        "x if x else 0", "open('f')", "f'{x}'", "throws.append(1)", "x := 3", "{1: 2}", "max(*throws)", "x @ x", "b'a'", "None", "1j",
+    ])  # fmt: skip
+    def test_what_is_no_arithmetic_is_refused(self, text: str) -> None:
+        with pytest.raises(ExpressionError):
+            value_of(text, NAMES)
+
+    @pytest.mark.parametrize("text", [
+        "'a' * 1000000000", "throws * 1000000000", "'%1000000000d' % 1", "9 ** 9 ** 9 ** 9", "-" * 1990 + "x", "1 / 0",
+        "y['b']", "throws[9]", "max([])", "1 < throws", "",
+        "(" * 900 + "x" + ")" * 900, "x" * 3000, "sqrt(throws, 1, 2, 3)",
+    ])  # fmt: skip
+    def test_nothing_takes_long_or_escapes(self, text: str) -> None:
+        started = time.perf_counter()
+        with pytest.raises(ExpressionError):
+            value_of(text, NAMES)
+        assert time.perf_counter() - started < 1.0
+
+    def test_texts_are_filled(self) -> None:
+        told = {"a": ["{x} kg", "{throws}", 3], "b": "{x:.2f} and {2 * x:.0f} %", "c": "plain"}
+        assert filled(told, NAMES) == {"a": ["2.0 kg", [0, 180, 180, 0], 3], "b": "2.00 and 4 %", "c": "plain"}
+        for wrong in ("{x", "{x:1000000000f}", "{x:d}", "{z}"):
+            with pytest.raises(ExpressionError):
+                filled(wrong, NAMES)
+
+    def test_numbers_build_on_one_another(self) -> None:
+        given = {"r": 2, "area": "pi * r**2", "k": {"from": 0, "to": 1, "points": 3}, "half": "k / 2"}
+        found = numbers_of({**given, "r": 3}, {})
+        assert found["area"] == pytest.approx(9.0 * np.pi)
+        assert found["half"].values.tolist() == [0.0, 0.25, 0.5]
+        with pytest.raises(ExpressionError, match="'k' is no grid"):
+            numbers_of({"k": {"from": 0}}, {})
+
+
+def _judged(**more: Any) -> str:
+    statement = StatementTable.model_validate({"text": "s", "printed": "1", "value": "x", **more})
+    return str(judged([statement], NAMES)["verdict"][1][0])
+
+
+@pytest.mark.parametrize(("more", "verdict"), [
+    ({"is": 2.1, "within": "5 %"}, CONFIRMED),
+    ({"is": 2.2, "within": "5 %"}, NOT_CONFIRMED),
+    ({"is": "2 + 0.25", "within": 0.25}, CONFIRMED),
+    ({"holds": "value > 1"}, CONFIRMED),
+    ({"holds": "value > 2"}, NOT_CONFIRMED),
+    ({"holds": "value > 2", "assuming": {"what": "twice", "holds": "2 * value > 2"}}, f"{DEPENDS}: twice"),
+    ({"holds": "value > 2", "assuming": {"what": "half the mass", "holds": "value / 2 > 2"}}, NOT_CONFIRMED),
+    ({"holds": "value > 1", "printed": None}, "not in the study"),
+])  # fmt: skip
+def test_verdicts(more: dict[str, Any], verdict: str) -> None:
+    assert _judged(**more) == verdict
+
+
+def test_table_and_count() -> None:
+    both = [
+        {"text": "holds", "where": "p. 3", "printed": "2", "value": "x", "is": 2, "within": 0},
+        {"text": "fails", "printed": "3 kp", "value": "x", "unit": "kp", "is": 3, "within": 0, "why": "{x:.1f}"},
+    ]
+    data = xr.Dataset(coords=judged([StatementTable.model_validate(one) for one in both], NAMES))
+    (table,) = rows(data)
+    assert isinstance(table, Rows)
+    assert table.rows == [["holds (p. 3)", "2", "2", "yes", ""], ["fails", "3 kp", "2 kp", "**no**", "2.0"]]
+    assert counted([data, xr.Dataset()]) == "1 of 2 statements are confirmed."
+
+
+def _part(**more: Any) -> Replication:
+    return Replication.model_validate({
+        "name": "p", "kind": "replication", "title": "t", "numbers": {"kappa": 0, "cm": 10},
+        "problems": {"web": {"like": "tractor-single.toml", "gas": {"imep": "5 kp/cm^2"},
+                             "operating_points": [{"mean_piston_speed": "{cm} m/s"}],
+                             "counterweights": [{"name": "web", "balance_fraction": "{kappa}"}]}},
+        "quantities": {"mean": "mean mount force", "each": "mean force by mount"}, **more,
+    })  # fmt: skip
+
+
+def _data(part: Replication) -> xr.Dataset:
+    points = part.points(Scenes(PROBLEMS))
+    return part.dataset(points, [part.answer(point, Scenes(PROBLEMS)) for point in points])
+
+
+def test_cases_sweep_and_keep_their_own_dimensions() -> None:
+    """Two swept numbers, one case without any, and mounts that the other engine does not have."""
+    sweep = {"cm": {"values": [6, 9]}, "kappa": {"from": 0, "to": 1, "points": 3}}
+    part = _part(cases=[
+        {"name": "swept", "problem": "web", "sweep": sweep},
+        {"name": "half", "problem": "web", "numbers": {"kappa": 0.5, "cm": 9}},
+        {"name": "set", "problem": "web", "numbers": {"kappa": 1},
+         "set": {"operating_points.1.mean_piston_speed": "{3 * 3} m/s"}},
+        {"name": "three", "problem": "tractor-three.toml"},
+    ])  # fmt: skip
+    names = part.names(_data(part))
+    mean, each = names["mean"], names["each"]
+    assert mean["swept"].dims == ("cm", "kappa")
+    assert mean["half"] == value_of("at(mean['swept'], cm=9, kappa=0.5)", names)
+    assert mean["set"] == value_of("at(mean['swept'], cm=9, kappa=1)", names)
+    assert each["half"]["mount"].values.tolist() == ["left", "right"]
+    assert each["three"].sizes == {"mount": 4}
+    assert value_of("mean(each['half'])", names) == pytest.approx(mean["half"])
+
+
+def test_picture_says_what_the_file_says() -> None:
+    panels = [{
+        "x": {"ends": [0, "2 * 0.5"]},
+        "curves": [{"x": "kappa", "y": "at(mean['swept'], cm=v)", "for": {"v": [6, 9]}, "label": "{v}", "end": "end {v}"}],
+        "words": [{"x": 0.5, "y": 1, "text": "{max(mean['swept']):.0f} N"}],
+        "areas": [{"x": [0, 1], "y": [0, 10]}],
+    }]  # fmt: skip
+    cases = [{"name": "swept", "problem": "web", "sweep": {"cm": {"values": [6, 9]}, "kappa": {"values": [0, 1]}}}]
+    data = _data(_part(cases=cases, picture={"title": "T", "panels": panels}))
+    picture = Replication.picture(data)
+    (axes,) = draw(picture).axes
+    assert picture.title == "T"
+    assert axes.get_xlim() == (0.0, 1.0)
+    assert [line.get_xdata().tolist() for line in axes.get_lines()] == [[0.0, 1.0], [0.0, 1.0]]
+    assert [text.get_text().strip() for text in axes.texts] == ["end 6", "end 9", f"{float(data['mean'].max()):.0f} N"]
+
+
+@pytest.mark.parametrize(("more", "said"), [
+    ({"problems": {"a": {"like": "b"}, "b": {"like": "a"}}}, "is like itself"),
+    ({"define": {"a": "b", "b": "1"}}, "'b' is no name here"),
+    ({"cases": [{"name": "c", "computation": "gas"}]}, "no computation here"),
+])  # fmt: skip
+def test_refused(more: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        _part(**more)
+
+
+@pytest.mark.parametrize("name", READY)
+def test_ready_replication(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """By its command, in seconds; every statement confirmed but those whose source is wrong."""
+    confirmed, wrong = READY[name]
+    monkeypatch.chdir(tmp_path)
+    started = time.perf_counter()
+    answer = CliRunner().invoke(app, ["study", str(PROBLEMS / f"{name}.toml")])
+    assert answer.exit_code == 0, answer.output
+    assert time.perf_counter() - started < 20.0
+    page = (tmp_path / "results" / name / "report.md").read_text(encoding="utf-8")
+    assert f"{confirmed} of {confirmed + len(wrong)} statements are confirmed." in page
+    assert [line.split(" | ")[0].strip("| ") for line in page.splitlines() if "**no**" in line] == wrong
+    assert "Source:" in page
+
+
+def test_second_order_couple_of_five_cylinders(worth: Callable[..., Any]) -> None:
+    """The textbook draws 3260 Nm; the star of 1-2-4-5-3 has 4.98 F a = 3.7 kN m."""
+    assert worth("example-5", "second", "replication-five-cylinder") == pytest.approx(3686.1, abs=0.1)
