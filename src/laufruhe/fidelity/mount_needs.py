@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +17,10 @@ from numpy.typing import NDArray
 from laufruhe.fidelity.automatic import Choice
 from laufruhe.fidelity.knob import LeftOut
 from laufruhe.fidelity.knobs import KNOBS, mode_names
-from laufruhe.machine import Engine
-from laufruhe.machine.mount import Matrix3
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -34,42 +32,28 @@ MORE = 1.1
 
 
 def needs(problem: Problem) -> Choice:
-    """What of the physics enters the mount quantities of an objective and its limits.
-
-    Returns
-    -------
-    Choice without error: what is left out changes nothing.
-    """
-    wanted = _asked(problem)
-    whole = _values(problem, wanted)
-    kept, left = [], []
-    parts = [*_loads(problem)] if _moved(whole, _values(replace(problem, points=()), wanted)) else []
+    """What of the physics enters what an objective and its limits ask of mounts; what is left out changes nothing."""
+    whole, kept, left = _values(problem), [], []
+    parts = [*_loads(problem)] if _moved(whole, _values(replace(problem, points=()))) else []
     if not parts:
-        left.append(
-            LeftOut("loads at every speed: gas, pistons, rods, rotors", "nothing that is asked depends on them")
-        )
+        what = "loads at every speed: gas, pistons, rods, rotors"
+        left.append(LeftOut(what, "nothing that is asked depends on them"))
     for name, changed in (*parts, *_of_the_block(problem)):
-        change = _moved(whole, _values(changed, wanted))
+        change = _moved(whole, _values(changed))
         if change > SAME:
             kept.append(f"{name}: without, or changed by a tenth, what is asked moves by up to {100.0 * change:.3g} %")
         else:
             left.append(LeftOut(name, "nothing that is asked depends on it"))
-    left += _modes_of_the_sag(problem, wanted)
-    return Choice(problem.fidelity, 0.0, tuple(kept), tuple(left), _numbers(problem, bool(parts)))
+    left += _modes_of_the_sag(problem)
+    # mount force components sampled for what is asked, and by an evaluation with all loads
+    count = problem.fidelity.samples * 3 * len(problem.engine.mounts) * len(problem.points)
+    return Choice(problem.fidelity, 0.0, tuple(kept), tuple(left), (count if parts else 0, count))
 
 
-def _asked(problem: Problem) -> list[Measure]:
-    """Quantities of the objective and of the limits."""
-    return [measure for measure in problem.measures if measure.is_mounting]
-
-
-def _values(problem: Problem, wanted: list[Measure]) -> Array:
-    """All that is asked; of natural frequencies all six."""
-    evaluation = evaluate(problem)
-    found: list[float] = []
-    for quantity in wanted:
-        found += evaluation.values(quantity)
-    return np.array(found)
+def _values(problem: Problem) -> Array:
+    """All that is asked of mounts; of natural frequencies all six."""
+    evaluation, wanted = evaluate(problem), [measure for measure in problem.measures if measure.is_mounting]
+    return np.array([value for measure in wanted for value in evaluation.values(measure)])
 
 
 def _moved(before: Array, after: Array) -> float:
@@ -88,51 +72,27 @@ def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
 
 def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
     """Parts of block and mounts, each with the problem that lacks it or has more of it."""
-    engine = problem.engine
-    if engine.block is None:
-        return
-    block, mounts = engine.block, engine.mounts
-    yield (
-        "stiffness and places of the mounts",
-        _with(problem, replace(engine, mounts=tuple(replace(m, stiffness=_more(m.stiffness)) for m in mounts))),
-    )
-    yield "mass of the block", _with(problem, replace(engine, block=replace(block, mass=MORE * block.mass)))
-    yield (
-        "moments of inertia of the block",
-        _with(problem, replace(engine, block=replace(block, inertia=_scaled(block.inertia)))),
-    )
-    if any(mount.loss_factor for mount in mounts) or any(any(mount.damping) for mount in mounts):
+    block, mounts = mounting_in(problem.engine).block, problem.engine.mounts
+    stiff = tuple(replace(m, stiffness=tuple(np.multiply(m.stiffness, (MORE, 1.0, 1.0 / MORE)))) for m in mounts)
+    inertia = tuple(tuple(MORE * value for value in row) for row in block.inertia)
+    parts: list[tuple[str, dict[str, Any]]] = [
+        ("stiffness and places of the mounts", {"mounts": stiff}),
+        ("mass of the block", {"block": replace(block, mass=MORE * block.mass)}),
+        ("moments of inertia of the block", {"block": replace(block, **{"inertia": inertia})}),
+    ]
+    if any(mount.loss_factor or any(mount.damping) for mount in mounts):
         firm = tuple(replace(mount, loss_factor=0.0, damping=(0.0, 0.0, 0.0)) for mount in mounts)
-        yield "loss and damping of the mounts", _with(problem, replace(engine, mounts=firm))
+        parts.append(("loss and damping of the mounts", {"mounts": firm}))
+    for name, changed in parts:
+        yield name, replace(problem, engine=replace(problem.engine, **changed))
 
 
-def _modes_of_the_sag(problem: Problem, wanted: list[Measure]) -> list[LeftOut]:
-    """Modes that weight does not move, where sag alone is asked of them."""
-    if {quantity.channel for quantity in wanted} != {channels.SAG}:
+def _modes_of_the_sag(problem: Problem) -> list[LeftOut]:
+    """Modes that weight does not move, where sag alone is asked of mounts."""
+    if {measure.channel for measure in problem.measures if measure.is_mounting} != {channels.SAG}:
         return []
     mounting = mounting_in(problem.engine)
     drive = np.abs(mounting.modes.shapes.T @ weight_wrench(mounting.block))
     still = [k + 1 for k in range(len(drive)) if drive[k] <= SAME * drive.max()]
-    return (
-        [LeftOut(f"mode(s) {mode_names(mounting, still)} of the block", "weight does not move them")] if still else []
-    )
-
-
-def _numbers(problem: Problem, with_loads: bool) -> tuple[int, int]:
-    """Mount force components sampled for what is asked, and by an evaluation with all loads."""
-    whole = problem.fidelity.samples * 3 * len(problem.engine.mounts) * len(problem.points)
-    return (whole if with_loads else 0), whole
-
-
-def _with(problem: Problem, engine: Engine) -> Problem:
-    return replace(problem, engine=engine)
-
-
-def _more(values: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = values
-    return MORE * x, y, z / MORE
-
-
-def _scaled(rows: Matrix3) -> Matrix3:
-    first, second, third = (tuple(MORE * value for value in row) for row in rows)
-    return first, second, third  # type: ignore[return-value]
+    what = f"mode(s) {mode_names(mounting, still)} of the block"
+    return [LeftOut(what, "weight does not move them")] if still else []

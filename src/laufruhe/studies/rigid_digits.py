@@ -1,9 +1,9 @@
-"""The rigid reference in 50 digits, from slider-cranks and rotors to the measure (F13).
+"""The rigid reference in 50 digits, from slider-cranks and rotors to the vectors that are measured (F13).
 
-Nothing here goes by orders but the gas: kinematics, wrenches, the mounts' normal equations
-and the lengths are taken step by step in mpmath. Torque of the gas is a series that is
-given: its double coefficients count as exact. The double model is then read at the same
-steps, so that the difference is arithmetic and the orders' closed forms, not sampling.
+Nothing here goes by orders but the gas: kinematics, wrenches and the mounts' normal
+equations are taken step by step in mpmath. Torque of the gas is a series that is given:
+its double coefficients count as exact. The double model is then read at the same steps,
+so that the difference is arithmetic and the orders' closed forms, not sampling.
 """
 
 from __future__ import annotations
@@ -12,7 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from laufruhe.machine import Cycle, Engine, GasModel, Mount, OperatingPoint, Rotor
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Engine, GasModel, Mount, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import spectrum_of
@@ -34,7 +38,7 @@ FREE = 1e-20
 """Of a stiffness over the largest: what is under it is a direction that no mount carries."""
 WHOLE_LOADS = Measure(channels.SHAKING_FORCE, NORMS["mean"]), Measure(channels.ROLL_MOMENT, NORMS["mean"])
 
-Vector = list[Any]
+Digits = NDArray[np.object_]
 
 
 @dataclass(frozen=True)
@@ -44,9 +48,8 @@ class RigidPart:
     Attributes
     ----------
     error
-        Relative, the largest of what is covered.
-    covered
-        Names of the measures compared.
+        Relative, the largest of the measures covered: of the vectors' difference, which is
+        not less than that of their norms.
     """
 
     error: float
@@ -60,8 +63,6 @@ def rigid_part(problem: Problem) -> RigidPart:
     mounts, of measures of single orders and of problems that measure no load, the mean
     shaking force and roll moment.
     """
-    import mpmath
-
     own = tuple(term.measure for term in problem.objective if _is_covered(term.measure, problem.engine))
     used = replace(problem, fidelity=Fidelity(samples=STEPS, gas_samples=GAS_STEPS))
     if not own:
@@ -69,156 +70,96 @@ def rigid_part(problem: Problem) -> RigidPart:
     evaluation, errors, names = evaluate(used), [], []
     with mpmath.workdps(DIGITS):
         wrenches = [wrench_in_digits(used.engine, point) for point in used.points]
-        for quantity in own or WHOLE_LOADS:
-            exact = _measure(quantity, used, wrenches)
+        size = max(float(np.abs(wrench).max()) for wrench in wrenches)
+        for measure in own or WHOLE_LOADS:
+            rows = evaluation.rows(measure, STEPS)
+            off = np.array(rows.vectors - _vectors(measure, used, wrenches), dtype=float)
             # a load that cancels has no relative error
-            if exact > 1e-9 * _size(wrenches):
-                errors.append(float(abs(mpmath.mpf(evaluation.rows(quantity, STEPS).value) - exact) / exact))
-                names.append(quantity.name)
+            if rows.value > 1e-9 * size:
+                errors.append(rows.norm.value(rows.grid, off) / rows.value)
+                names.append(measure.name)
     return RigidPart(max(errors, default=0.0), tuple(names))
 
 
-def _is_covered(quantity: Measure, engine: Engine) -> bool:
-    if not quantity.is_load or not quantity.norm.of_row_lengths or quantity.orders is not None:
+def _is_covered(measure: Measure, engine: Engine) -> bool:
+    if not measure.is_load or measure.orders is not None:
         return False
-    return quantity.channel is not channels.MOUNT_TRAVEL and (
-        quantity.channel is not channels.MOUNT_FORCE or engine.block is None
-    )
+    return not measure.on_mounts or (measure.channel is channels.MOUNT_FORCE and engine.block is None)
 
 
-def wrench_in_digits(engine: Engine, point: OperatingPoint) -> list[Vector]:
-    """Wrench on the block at STEPS equal steps over the cycle, in mpmath's digits (L1-L5)."""
-    out = []
-    gas = None if point.gas is None else _gas_series(engine, point.gas)
+def wrench_in_digits(engine: Engine, point: OperatingPoint) -> Digits:
+    """Wrench on the block at STEPS equal steps over the cycle, shape (steps, 6) (L1-L5)."""
+    rows = []
     for k in range(STEPS):
-        total: Vector = [0] * 6
-        for part in engine.slider_cranks:
-            _add(total, _cylinder(part, _turn_of(engine.cycle, k), point.speed))
-        for rotor in engine.rotors:
-            _add(total, _rotor(rotor, rotor.unbalance, 0, _turn_of(engine.cycle, k), point.speed))
-        if gas is not None:
-            total[3] += _gas_at(gas, k)
-        out.append(total)
-    return out
-
-
-def _turn_of(cycle: Cycle, step: int) -> Any:
-    """Crank angle of a step as a part of a turn."""
-    import mpmath
-
-    return mpmath.mpf(step * cycle.turns) / STEPS
+        turn = mpmath.mpf(k * engine.cycle.turns) / STEPS
+        loads = [_cylinder(part, turn, point.speed) for part in engine.slider_cranks]
+        loads += [_rotor(rotor, rotor.unbalance, 0, turn, point.speed) for rotor in engine.rotors]
+        rows.append(np.sum(loads, axis=0))
+    wrench = np.array(rows)
+    if point.gas is not None:
+        wrench[:, 3] += _gas_torque(engine, point.gas)
+    return wrench
 
 
 def _exact(turn: Turn) -> Any:
-    import mpmath
-
     return mpmath.mpf(turn) if isinstance(turn, float) else mpmath.mpf(turn.numerator) / turn.denominator
 
 
-def _add(total: Vector, load: Sequence[Any]) -> None:
-    for j, value in enumerate(load):
-        total[j] += value
-
-
-def _cylinder(part: Any, turn: Any, speed: float) -> Vector:
-    """Pistons, rods and the rotating mass of one cylinder (L1-L4, L7)."""
-    import mpmath
-
-    mpf, ratio = mpmath.mpf, mpmath.mpf(part.shaft.ratio)
+def _cylinder(part: SliderCrank, turn: Any, speed: float) -> Digits:
+    """Piston, rods and the rotating mass of one cylinder (L1-L4, L7)."""
+    ratio = mpmath.mpf(part.shaft.ratio)
     alpha = 2 * mpmath.pi * (ratio * turn + _exact(part.star_turn))
-    force, roll, rods = momentum_loads(part, part.motion(mpmath, alpha), (ratio * mpf(speed)) ** 2)
+    force, roll, rods = momentum_loads(part, part.motion(mpmath, alpha), (ratio * mpmath.mpf(speed)) ** 2)
     force *= mpmath.expjpi(2 * _exact(as_turn(part.bank)))
-    load = list(plane_wrench(force.imag, force.real, part.x, part.shaft))
+    load = plane_wrench(force.imag, force.real, part.x, part.shaft)
     load[3] += roll + rods
-    if part.rotating_mass > 0.0:
-        pin = Rotor("pin", part.x, 0.0, part.shaft)
-        _add(
-            load,
-            _rotor(pin, mpf(part.rotating_mass) * mpf(part.crank_radius), _exact(as_turn(part.throw)), turn, speed),
-        )
-    return load
+    pin = mpmath.mpf(part.rotating_mass) * mpmath.mpf(part.crank_radius)
+    return np.asarray(
+        load + _rotor(Rotor("pin", part.x, 0.0, part.shaft), pin, _exact(as_turn(part.throw)), turn, speed)
+    )
 
 
-def _rotor(rotor: Rotor, unbalance: Any, ahead: Any, turn: Any, speed: float) -> Vector:
+def _rotor(rotor: Rotor, unbalance: Any, ahead: Any, turn: Any, speed: float) -> Digits:
     """U (n w)^2 e^{i n phi}, of an unbalance turned `ahead` by a part of a turn (L1)."""
-    import mpmath
-
     ratio = mpmath.mpf(rotor.shaft.ratio)
     pull = mpmath.mpc(unbalance) * (ratio * mpmath.mpf(speed)) ** 2 * mpmath.expjpi(2 * (ratio * turn + ahead))
-    return list(plane_wrench(pull.imag, pull.real, rotor.x, rotor.shaft))
+    return plane_wrench(pull.imag, pull.real, rotor.x, rotor.shaft)
 
 
-def _gas_series(engine: Engine, gas: GasModel) -> list[Any]:
-    """Coefficients of the gas' roll moment, every firing in its place (L5)."""
-    import mpmath
-
-    out: list[Any] = [mpmath.mpc(0)] * (GAS_STEPS // 2 + 1)
+def _gas_torque(engine: Engine, gas: GasModel) -> Digits:
+    """Roll moment of the gas at every step, every firing in its place (L5)."""
+    series: list[Any] = [mpmath.mpc(0)] * (GAS_STEPS // 2 + 1)
     for part in engine.slider_cranks:
         torque = spectrum_of(gas_torque(gas, part, engine.cycle, GAS_STEPS), engine.cycle.base_order).coefficients
         late = -_exact(as_turn(part.firing_angle)) / engine.cycle.turns
         for h, value in enumerate(torque):
-            out[h] += mpmath.mpc(complex(value)) * mpmath.expjpi(2 * h * late)
-    return out
-
-
-def _gas_at(series: list[Any], step: int) -> Any:
-    import mpmath
-
+            series[h] += mpmath.mpc(complex(value)) * mpmath.expjpi(2 * h * late)
     roots = [mpmath.expjpi(mpmath.mpf(2 * k) / STEPS) for k in range(STEPS)]
-    return mpmath.fsum((value * roots[h * step % STEPS]).real for h, value in enumerate(series))
+    return np.array([
+        mpmath.fsum((value * roots[h * k % STEPS]).real for h, value in enumerate(series)) for k in range(STEPS)
+    ])  # fmt: skip
 
 
-def mount_maps_in_digits(mounts: Sequence[Mount]) -> list[Any]:
-    """k_i G_i (sum G' k G)^+ of every mount, 3 x 6 matrices (M1, M2)."""
-    import mpmath
-
-    places = [mpmath.matrix(point_motion(NUMBERS, mount.position).tolist()) for mount in mounts]
-    springs = []
-    for mount in mounts:
-        turned = mpmath.matrix([list(row) for row in mount.orientation])
-        springs.append(turned.T * mpmath.diag(list(mount.stiffness)) * turned)
-    total = mpmath.matrix(6, 6)
-    for place, spring in zip(places, springs, strict=True):
-        total += place.T * spring * place
-    values, vectors = mpmath.eigsy(total)
-    largest = max(values)
-    inverse = mpmath.diag([1 / value if value > FREE * largest else mpmath.mpf(0) for value in values])
-    return [spring * place * vectors * inverse * vectors.T for place, spring in zip(places, springs, strict=True)]
+def mount_maps_in_digits(mounts: Sequence[Mount]) -> list[Digits]:
+    """k_i G_i (sum G' k G)^+ of every mount, shape (3, 6) each (M1, M2)."""
+    digits = np.vectorize(mpmath.mpf, otypes=[object])
+    places = [digits(point_motion(NUMBERS, mount.position)) for mount in mounts]
+    turns = [digits(np.array(mount.orientation)) for mount in mounts]
+    springs = [turn.T @ np.diag(digits(mount.stiffness)) @ turn for turn, mount in zip(turns, mounts, strict=True)]
+    total = sum(place.T @ spring @ place for place, spring in zip(places, springs, strict=True))
+    values, vectors = mpmath.eigsy(mpmath.matrix(total.tolist()))
+    axes, largest = np.array(vectors.tolist()), max(values)
+    inverse = axes @ np.diag([1 / value if value > FREE * largest else mpmath.mpf(0) for value in values]) @ axes.T
+    return [spring @ place @ inverse for place, spring in zip(places, springs, strict=True)]
 
 
-def _measure(quantity: Measure, problem: Problem, wrenches: Sequence[list[Vector]]) -> Any:
-    """A quantity from wrenches at equal steps (P1)."""
-    import mpmath
-
-    weights = [float(share) for share in quantity.shares(problem.points)]
-    squares = [_squares(quantity, problem.engine, wrench) for wrench in wrenches]
-    if not (quantity.norm.sums_lengths or quantity.norm.is_euclidean):
-        return mpmath.sqrt(max(max(s) for s, weight in zip(squares, weights, strict=True) if weight > 0.0))
-    is_mean = quantity.norm.sums_lengths
-    means = [mpmath.fsum(map(mpmath.sqrt, s) if is_mean else s) / len(s) for s in squares]
-    total = mpmath.fsum(mpmath.mpf(w) * mean for w, mean in zip(weights, means, strict=True)) / mpmath.fsum(weights)
-    return total if is_mean else mpmath.sqrt(total)
-
-
-def _squares(quantity: Measure, engine: Engine, wrenches: list[Vector]) -> list[Any]:
-    """Squared lengths of what a quantity measures, at every step and mount."""
-    import mpmath
-
-    if isinstance(quantity.channel, LoadChannel) and quantity.channel.part is not None:
-        columns = range(*quantity.channel.part.indices(6))
-        return [mpmath.fsum(wrench[j] ** 2 for j in columns) for wrench in wrenches]
-    counted = [m.name for m in engine.mounts] if quantity.mounts is None else quantity.mounts
-    factors = quantity.direction_weights or (1.0, 1.0, 1.0)
-    maps = mount_maps_in_digits(engine.mounts)
-    out = []
-    for wrench in wrenches:
-        column = mpmath.matrix(wrench)
-        for mount, one in zip(engine.mounts, maps, strict=True):
-            if mount.name in counted:
-                force = one * column
-                out.append(mpmath.fsum((factor * force[j]) ** 2 for j, factor in enumerate(factors)))
-    return out
-
-
-def _size(wrenches: Sequence[list[Vector]]) -> Any:
-    return max((abs(value) for wrench in wrenches for load in wrench for value in load), default=0)
+def _vectors(measure: Measure, problem: Problem, wrenches: Sequence[Digits]) -> Digits:
+    """The vectors whose norm a measure is, in the order of `load_rows` (P1)."""
+    shares = measure.shares(problem.points)
+    used = [wrench for wrench, share in zip(wrenches, shares, strict=True) if share > 0.0]
+    channel, engine = measure.channel, problem.engine
+    if isinstance(channel, LoadChannel) and channel.part is not None:
+        return np.concatenate([wrench[:, channel.part] for wrench in used])
+    maps, factors = mount_maps_in_digits(engine.mounts), np.array(measure.direction_weights or (1.0, 1.0, 1.0))
+    places = measure.places([mount.name for mount in engine.mounts])
+    return np.concatenate([wrench @ maps[m].T * factors for wrench in used for m in places])
