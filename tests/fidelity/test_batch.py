@@ -19,7 +19,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 # a study file has no engine of its own
-READY = sorted(path for path in PROBLEMS.glob("*.toml") if "[engine]" in path.read_text(encoding="utf-8"))
+READY = sorted(path for path in PROBLEMS.glob("*.toml") if "\n[engine]\n" in path.read_text(encoding="utf-8"))
 COUNT = 12
 
 

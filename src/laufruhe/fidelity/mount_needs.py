@@ -73,12 +73,12 @@ def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
 def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
     """Parts of block and mounts, each with the problem that lacks it or has more of it."""
     block, mounts = mounting_in(problem.engine).block, problem.engine.mounts
-    stiff = tuple(replace(m, stiffness=tuple(np.multiply(m.stiffness, (MORE, 1.0, 1.0 / MORE)))) for m in mounts)
-    inertia = tuple(tuple(MORE * value for value in row) for row in block.inertia)
+    stiff = tuple(replace(m, stiffness=(MORE * m.stiffness[0], m.stiffness[1], m.stiffness[2] / MORE)) for m in mounts)
+    inertia: Any = tuple(tuple(MORE * value for value in row) for row in block.inertia)
     parts: list[tuple[str, dict[str, Any]]] = [
         ("stiffness and places of the mounts", {"mounts": stiff}),
         ("mass of the block", {"block": replace(block, mass=MORE * block.mass)}),
-        ("moments of inertia of the block", {"block": replace(block, **{"inertia": inertia})}),
+        ("moments of inertia of the block", {"block": replace(block, inertia=inertia)}),
     ]
     if any(mount.loss_factor or any(mount.damping) for mount in mounts):
         firm = tuple(replace(mount, loss_factor=0.0, damping=(0.0, 0.0, 0.0)) for mount in mounts)
