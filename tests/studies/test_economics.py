@@ -19,7 +19,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
-from laufruhe.studies.economics import Build, Claim, Standing, best, compared, front
+from laufruhe.studies.economics import Claim, Standing, best, compared, front
 from laufruhe.studies.equal_power import at_equal_power, check_comparable
 from laufruhe.studies.shafts import shafts_of, with_shafts
 from laufruhe.studies.worth import JUDGEMENTS, verdicts, worths
@@ -127,13 +127,18 @@ def four() -> xr.Dataset:
     names = shafts_of(problem)
     assert names == ("force left", "force right", "moment left", "moment right")
     engines = {
-        Build("plain", Standing.PLAIN): with_shafts(problem, ()),
-        Build("force pair", claim=Claim("worth building", 0.70)): with_shafts(problem, names[:2]),
-        Build("moment pair", claim=Claim("negligible")): with_shafts(problem, names[2:]),
-        Build("both", claim=Claim("better", 0.53, "force pair", "Fig. 22")): problem,
-        Build("five", Standing.NEXT): at_equal_power(part_load, 4),
+        "plain": with_shafts(problem, ()),
+        "force pair": with_shafts(problem, names[:2]),
+        "moment pair": with_shafts(problem, names[2:]),
+        "both": problem,
+        "five": at_equal_power(part_load, 4),
     }
-    return compared(list(engines), [front(engine, (0.0, 0.5, 2.0)) for engine in engines.values()])
+    claims = {
+        "force pair": Claim(says="worth building", falls_by=0.70),
+        "moment pair": Claim(says="negligible"),
+        "both": Claim(says="better", falls_by=0.53, against="force pair", where="Fig. 22"),
+    }
+    return compared({name: front(engine, (0.0, 0.5, 2.0)) for name, engine in engines.items()}, claims, ["five"])
 
 
 def test_fronts_label_builds_and_units(four: xr.Dataset) -> None:
@@ -230,7 +235,7 @@ def test_unlike_objectives_and_unknown_shafts_are_refused() -> None:
     peak = replace(problem.objective[0], measure=Measure(channels.MOUNT_FORCE, NORMS["maximum"]))
     other: Problem = replace(problem, objective=(peak,))
     with pytest.raises(ModelError, match="minimise different things"):
-        compared([Build("a"), Build("b")], [front(problem, (1.0,)), front(other, (1.0,))])
+        compared({"a": front(problem, (1.0,)), "b": front(other, (1.0,))}, {}, ())
     mass = replace(problem.objective[0], measure=Measure(channels.BALANCER_MASS, NORMS["mean"]))
     with pytest.raises(ModelError, match="against a load"):
         front(replace(problem, objective=(mass,)), (1.0,))

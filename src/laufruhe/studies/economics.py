@@ -8,15 +8,17 @@ kilogram is worth. The engine with one more cylinder stands beside, rebuilt at e
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
+from pydantic import Field, model_validator
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.files.fields import Name, Table, refusal
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Limit, Measure
@@ -29,6 +31,7 @@ MASS_ON_SHAFTS = Measure(channels.BALANCER_MASS, NORMS["mean"])
 PLAIN = "plain"
 """Name of the engine without any of the shafts."""
 LIMIT_NAME = "mass on shafts"
+Judgement = Literal["negligible", "noticeable", "better", "worth building", "not worth building"]
 SAME = 1e-4
 """Relative difference of forces below which proofs cannot tell designs apart."""
 
@@ -41,26 +44,24 @@ class Standing(StrEnum):
     NEXT = "more cylinders"
 
 
-@dataclass(frozen=True)
-class Claim:
-    """What a source says of a build: a judgement of `laufruhe.studies.worth`, or by what share the force falls.
+class Claim(Table):
+    """What a source says of a set of shafts; it is confirmed or not."""
 
-    Either may be missing; the force is compared with that of the build named by `against`.
-    """
+    says: Judgement | None = None
+    falls_by: Annotated[float, Field(gt=0.0, lt=1.0)] | None = Field(
+        default=None, description="Share by which the force is said to fall."
+    )
+    against: Name = Field(default=PLAIN, description="Build that it is compared with.")
+    where: str = Field(default="", description="Figure or passage.")
 
-    says: str = ""
-    falls_by: float = float("nan")
-    against: str = PLAIN
-    where: str = ""
+    @model_validator(mode="after")
+    def _says_something(self) -> Claim:
+        if self.says is None and self.falls_by is None:
+            raise refusal("claims nothing; give says, falls_by, or both")
+        return self
 
 
-@dataclass(frozen=True)
-class Build:
-    """What one engine of a comparison is called, what it is, and what is said of it."""
-
-    name: str
-    standing: Standing = Standing.SHAFTS
-    claim: Claim = Claim()
+NO_CLAIM = Claim.model_construct()
 
 
 @dataclass(frozen=True)
@@ -150,27 +151,34 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> Front:
     )
 
 
-def compared(builds: Sequence[Build], fronts: Sequence[Front]) -> xr.Dataset:
-    """Fronts of several engines, at the same mass limits, as one labelled dataset.
+def compared(fronts: Mapping[str, Front], claims: Mapping[str, Claim], following: Collection[str]) -> xr.Dataset:
+    """Fronts of several engines, the plain one first, at the same mass limits, as one labelled dataset.
+
+    Parameters
+    ----------
+    following
+        Names of the plain engines with more cylinders.
 
     Raises
     ------
     ModelError
         If they do not minimise one and the same load.
     """
-    asked = sorted({line.objective for line in fronts})
+    lines = list(fronts.values())
+    asked = sorted({line.objective for line in lines})
     if len(asked) > 1:
         raise ModelError(f"engines minimise different things ({'; '.join(asked)}); give all one objective")
-    unit, claims = fronts[0].unit, [build.claim for build in builds]
+    unit, said = lines[0].unit, [claims.get(name, NO_CLAIM) for name in fronts]
+    standing = [Standing.NEXT if name in following else Standing.SHAFTS for name in fronts]
 
     def along(name: str, words: str, unit: str = "1") -> Any:
-        table = [[getattr(point, name) for point in line.points] for line in fronts]
+        table = [[getattr(point, name) for point in line.points] for line in lines]
         return variable(("build", "mass_limit"), table, words, unit)
 
     def each(name: str, words: str, unit: str) -> Any:
-        return variable("build", [getattr(line.optimum, name) for line in fronts], words, unit)
+        return variable("build", [getattr(line.optimum, name) for line in lines], words, unit)
 
-    limits = [point.mass_limit for point in fronts[0].points]
+    limits = [point.mass_limit for point in lines[0].points]
     data = xr.Dataset(
         {
             "force": along("force", "least objective", unit),
@@ -183,15 +191,15 @@ def compared(builds: Sequence[Build], fronts: Sequence[Front]) -> xr.Dataset:
             "optimum_mass": each("mass", "mass on the shafts at the least objective", "kg"),
         },
         coords={
-            "build": [build.name for build in builds],
+            "build": list(fronts),
             "mass_limit": variable("mass_limit", limits, "mass allowed on shafts", "kg"),
-            "shafts": variable("build", [line.shafts for line in fronts], "balancer shafts"),
-            "cylinders": ("build", [line.cylinders for line in fronts], {"units": "1"}),
-            "standing": ("build", [str(build.standing) for build in builds]),
-            "claim": ("build", [claim.says for claim in claims], {"long_name": "what the source says"}),
-            "claimed_fall": ("build", [claim.falls_by for claim in claims], {"units": "1"}),
-            "claimed_against": ("build", [claim.against for claim in claims]),
-            "claimed_where": ("build", [claim.where for claim in claims]),
+            "shafts": variable("build", [line.shafts for line in lines], "balancer shafts"),
+            "cylinders": ("build", [line.cylinders for line in lines], {"units": "1"}),
+            "standing": ("build", [str(Standing.PLAIN), *map(str, standing[1:])]),
+            "claim": ("build", [claim.says or "" for claim in said], {"long_name": "what the source says"}),
+            "claimed_fall": ("build", [claim.falls_by or np.nan for claim in said], {"units": "1"}),
+            "claimed_against": ("build", [claim.against for claim in said]),
+            "claimed_where": ("build", [claim.where for claim in said]),
         },
         attrs={"title": "", "kind": "", "objective": asked[0]},
     )

@@ -18,17 +18,16 @@ verdict, but where a share is closer to its threshold than the gap of the proof.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 import xarray as xr
 
 from laufruhe.errors import ModelError
 from laufruhe.present.numbers import percent
-from laufruhe.studies.economics import Standing
+from laufruhe.studies.economics import Judgement, Standing
 from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 
-Judgement = Literal["negligible", "noticeable", "better", "worth building", "not worth building"]
 JUDGEMENTS: tuple[Judgement, ...] = get_args(Judgement)
 _ALLOWED = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted rod ratio and gas trace move it by"
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -19,36 +19,19 @@ from laufruhe.files.study_parts import CaseTable
 from laufruhe.present.numbers import percent
 from laufruhe.problem.problem import Problem
 from laufruhe.studies import picture as p
-from laufruhe.studies.economics import PLAIN, Build, Claim, Front, FrontPoint, Standing, compared, front
+from laufruhe.studies.economics import PLAIN, Claim, Front, FrontPoint, Standing, compared, front
 from laufruhe.studies.equal_power import check_comparable
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.shafts import refuse_open_phasing, shafts_of, with_shafts
 from laufruhe.studies.text import NOTHING, Rows, Text, number, said
-from laufruhe.studies.worth import Judgement, verdicts, worths
+from laufruhe.studies.worth import verdicts, worths
 
 if TYPE_CHECKING:
     import xarray as xr
 
 LINE = 0.052
 """Height of a line of text over that of its panel."""
-
-
-class ClaimTable(Table):
-    """What the source says of a set of shafts; it is confirmed or not."""
-
-    says: Judgement | None = None
-    falls_by: Annotated[float, Field(gt=0.0, lt=1.0)] | None = Field(
-        default=None, description="Share by which the force is said to fall."
-    )
-    against: Name = Field(default=PLAIN, description="Build that it is compared with.")
-    where: str = Field(default="", description="Figure or passage.")
-
-    @model_validator(mode="after")
-    def _says_something(self) -> ClaimTable:
-        if self.says is None and self.falls_by is None:
-            raise f.refusal("claims nothing; give says, falls_by, or both")
-        return self
 
 
 class BuildTable(Table):
@@ -59,7 +42,7 @@ class BuildTable(Table):
     shafts: list[Name] = Field(
         default_factory=list, description="Balancer shafts that are built; none makes the plain engine of another case."
     )
-    claim: ClaimTable | None = None
+    claim: Claim | None = None
 
     @model_validator(mode="after")
     def _is_not_plain(self) -> BuildTable:
@@ -142,10 +125,11 @@ class Economics(Part):
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
         """Fronts side by side."""
-        builds = [Build(PLAIN, Standing.PLAIN)]
-        builds += [Build(build.name, Standing.SHAFTS, _claim(build)) for build in self.builds]
-        builds += [Build(case.name, Standing.NEXT) for case in self.more_cylinders]
-        return compared(builds, [_front(record) for record in records]).assign_attrs(self.about())
+        following = [case.name for case in self.more_cylinders]
+        names = [PLAIN, *(build.name for build in self.builds), *following]
+        fronts = {name: _front(record) for name, record in zip(names, records, strict=True)}
+        claims = {build.name: build.claim for build in self.builds if build.claim is not None}
+        return compared(fronts, claims, following).assign_attrs(self.about())
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
@@ -223,11 +207,6 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
         first, second = list(asked.values())[:2]
         rule = f"differs between '{first.case.name}' and '{second.case.name}'"
         raise scenes.refused(second.case, "objective", rule, "give all engines the same")
-
-
-def _claim(build: BuildTable) -> Claim:
-    given = build.claim
-    return Claim(given.says or "", given.falls_by or math.nan, given.against, given.where) if given else Claim()
 
 
 def _front(record: Mapping[str, Any]) -> Front:
