@@ -86,6 +86,13 @@ class Spectrum:
         waves = np.exp(1j * np.outer(angles, self.orders))
         return np.asarray(np.tensordot(waves, self.coefficients, axes=(1, 0)).real)
 
+    @property
+    def integral(self) -> Self:
+        """The integral over crank angle of all but the mean, itself without a mean."""
+        whole = np.zeros_like(self.coefficients)
+        whole[1:] = (self.coefficients[1:].T / (1j * self.orders[1:])).T
+        return type(self)(self.base, whole)
+
     def rebased(self, base: Fraction) -> Self:
         """The same signal counted in a finer lowest order."""
         factor = self.base / base

@@ -16,29 +16,12 @@ from laufruhe.physics.wiebe_cycle import wiebe_pressure
 
 
 def cylinder_pressure(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:
-    """Absolute cylinder pressure over one cycle.
-
-    Parameters
-    ----------
-    gas
-        Mixed cycle, finite heat release, or a measured trace.
-    part
-        The slider-crank whose piston the gas works on.
-    cycle
-        Two- or four-stroke.
-    samples
-        Number of equal steps.
-
-    Returns
-    -------
-    Shape (samples,) [Pa], at crank angles gamma = k cycle.angle / samples from the firing
-    dead centre.
+    """Absolute cylinder pressure [Pa] at equal steps of the crank angle from the firing dead centre, shape (samples,).
 
     Raises
     ------
     ModelError
-        If the model cannot meet its indicated mean pressure, or a trace does not cover
-        the cycle.
+        If the model cannot meet its indicated mean pressure, or a trace does not cover the cycle.
     """
     angles = cycle.angle * np.arange(samples) / samples
     if isinstance(gas, PressureTrace):

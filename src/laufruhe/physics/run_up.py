@@ -43,10 +43,8 @@ class TimeModel:
 
     Attributes
     ----------
-    stiffness, damping
-        Shape (6, 6).
     load
-        From a wrench about the origin to y, shape (6, 6).
+        From a wrench about the origin to y.
     travels
         From y to travel along the own axes of the mounts, shape (3 mounts, 6).
     forces, drag
@@ -123,16 +121,12 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
 
 @dataclass(frozen=True, eq=False)
 class SteadyState:
-    """One period of the motion that repeats itself.
+    """One period of the motion that repeats itself, at equal crank angles [rad], shape (n,).
 
     Attributes
     ----------
-    angles
-        Crank angles at equal steps [rad], shape (n,).
-    forces
-        On the mounts, shape (n, mounts, 3) [N].
-    travels
-        Along the own axes of the mounts, shape (n, mounts, 3) [m].
+    forces, travels
+        On the mounts, and along their own axes, shape (n, mounts, 3) [N], [m].
     mismatch
         Distance between end and start of the period, over its size.
     """
@@ -224,8 +218,6 @@ class RunUp:
         Crank speed at the end of every stretch [rad/s], shape (n,).
     force, travel
         Largest on any mount within the stretch, shape (n,) [N], [m].
-    worst_force, worst_travel
-        Over the whole run.
     """
 
     speeds: Array
@@ -234,12 +226,12 @@ class RunUp:
 
     @property
     def worst_force(self) -> float:
-        """Largest force on any mount [N]."""
+        """Over the whole run [N]."""
         return float(self.force.max())
 
     @property
     def worst_travel(self) -> float:
-        """Largest travel at any mount [m]."""
+        """Over the whole run [m]."""
         return float(self.travel.max())
 
 
@@ -258,20 +250,12 @@ def run_through(
 
     Parameters
     ----------
-    mounting
-        Block and mounts, bump stops included.
     inertia
         Wrench per square of crank speed [N s2, N m s2].
     gas
         Wrench that does not depend on speed; none for a motored engine.
-    first, last
-        Crank speeds [rad/s].
-    duration
-        Of the run [s].
     stretches
         Into which the run is cut for its envelope.
-    method, tolerance
-        Of the integration.
 
     Raises
     ------

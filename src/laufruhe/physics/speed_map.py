@@ -22,12 +22,7 @@ ComplexArray = NDArray[np.complex128]
 
 
 def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> tuple[Spectrum, Spectrum | None]:
-    """Wrench per square of crank speed, and that of the gas, which speed does not change.
-
-    Returns
-    -------
-    Inertia [N s2, N m s2] and gas [N, N m], both of shape (n, 6).
-    """
+    """Wrench per square of crank speed [N s2, N m s2], and that of the gas, which speed does not change [N, N m]."""
     inertia = shaking_loads(engine, replace(point, speed=1.0, gas=None), fidelity)
     gas = fidelity.gas_of(point)
     return inertia, None if gas is None else fidelity.kept(gas_loads(engine, gas, fidelity))
@@ -85,18 +80,9 @@ class SpeedMap:
 def speed_map(
     mounting: ElasticMounting, inertia: Spectrum, gas: Spectrum | None, speeds: Array, least: float = 1e-7
 ) -> SpeedMap:
-    """Mount forces at many speeds, all orders and speeds solved together.
+    """Mount forces at many speeds under the loads of `split_loads`, all orders and speeds solved together.
 
-    Parameters
-    ----------
-    mounting
-        Block and mounts.
-    inertia, gas
-        As from `split_loads`.
-    speeds
-        Crank speeds [rad/s].
-    least
-        Orders under this share of the largest, at every speed, are left out.
+    Orders under the share `least` of the largest, at every speed, are left out.
     """
     spectra = [inertia] if gas is None else [inertia, gas]
     base = common_base([spectrum.base for spectrum in spectra])

@@ -32,17 +32,7 @@ _CONVERGED = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class CrankMotion:
-    """Periodic motion of the crank at equal steps of time over one cycle.
-
-    Attributes
-    ----------
-    angle
-        Crank angle phi [rad], shape (n,).
-    speed
-        d phi / dt [rad/s].
-    acceleration
-        d2 phi / dt2 [rad/s2].
-    """
+    """Crank angle phi, and its derivatives, at equal steps of time over one cycle [rad, rad/s, rad/s2]."""
 
     angle: Array
     speed: Array
@@ -57,15 +47,6 @@ class CrankMotion:
 def crank_motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankMotion:
     """Motion under gas and inertia torque against a constant load torque (F2-F4).
 
-    Parameters
-    ----------
-    engine
-        Slider-cranks; inertia of what turns is in the fidelity.
-    point
-        Mean speed and working gas.
-    fidelity
-        Crank inertia, rod model, gas, and steps.
-
     Raises
     ------
     ModelError
@@ -79,18 +60,15 @@ def crank_motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> C
 def _motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankMotion:
     count = fidelity.samples
     phi = engine.cycle.angle * np.arange(count) / count
-    work = _work(engine, point, fidelity, phi)
-    inertia, _ = _inertia(engine, fidelity, phi)
-    start = _start_energy(work, inertia, point.speed)
-    pace = spectrum_of(point.speed / np.sqrt(2.0 * (start + work) / inertia), engine.cycle.base_order)
+    torque = _alternating_torque(engine, point, fidelity)
+    work, (inertia, _) = torque.integral, _inertia(engine, fidelity, phi)
+    start = _start_energy(work.sample(count), inertia, point.speed)
+    pace = spectrum_of(point.speed / np.sqrt(2.0 * (start + work.sample(count)) / inertia), engine.cycle.base_order)
     angle = _angles_at(pace, phi)
-    work_series, torque = _work_series(engine, point, fidelity)
-    work = work_series.values(angle) if work_series is not None else np.zeros(count)
     inertia, slope = _inertia(engine, fidelity, angle)
-    square = 2.0 * (start + work) / inertia
-    drive = torque.values(angle) if torque is not None else np.zeros(count)
+    square = 2.0 * (start + work.values(angle)) / inertia
     # d/d phi of J w^2 / 2 = torque less load (F2)
-    acceleration = (drive - 0.5 * slope * square) / inertia
+    acceleration = (torque.values(angle) - 0.5 * slope * square) / inertia
     motion = CrankMotion(angle, np.sqrt(square), acceleration)
     for values in (motion.angle, motion.speed, motion.acceleration):
         values.setflags(write=False)
@@ -98,24 +76,16 @@ def _motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankM
 
 
 def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Wrench on the block at a crank speed that varies (F5).
+    """Wrench on the block, shape (n, 6), in orders of the mean speed where that varies (F5).
 
-    Returns
-    -------
-    Spectrum of shape (n, 6) [N, N m] in orders of the mean speed. Its sums are taken at
-    sampled times: what a star cancels is zero to rounding only.
+    Its sums are taken at sampled times: what a star cancels is zero to rounding only.
     """
     motion = crank_motion(engine, point, fidelity)
     wrench = sum(
         (_slider_loads(part, motion, fidelity) for part in engine.slider_cranks), np.zeros((len(motion.angle), 6))
     )
     wrench = wrench + _rotor_loads((*engine.pins, *engine.rotors), motion)
-    _, torque = _work_series(engine, point, fidelity)
-    if torque is not None:
-        wrench[:, 3] += torque.values(motion.angle)
-    gas = fidelity.gas_of(point)
-    if gas is not None:
-        wrench[:, 3] += gas_loads(engine, gas, fidelity).coefficients[0, 3].real
+    wrench[:, 3] += _torque(engine, point, fidelity).values(motion.angle)
     last_rotor = max((math.ceil(abs(rotor.shaft.ratio)) for rotor in engine.rotors), default=1)
     return fidelity.kept(spectrum_of(wrench, engine.cycle.base_order), last_rotor)
 
@@ -126,23 +96,18 @@ def uneven_rotor_loads(rotors: Sequence[Rotor], engine: Engine, point: Operating
     return spectrum_of(_rotor_loads(rotors, motion), engine.cycle.base_order)
 
 
-def _work_series(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum | None, Spectrum | None]:
-    """Work of gas less load over the crank angle, and the torque that does it (F2)."""
-    gas = fidelity.gas_of(point)
+def _torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """Torque of the gas over the crank angle: its roll moment (L5)."""
+    gas, cycle = fidelity.gas_of(point), engine.cycle
     if gas is None:
-        return None, None
-    # the roll moment of the gas is its torque (L5); the load takes the mean of it
-    torque = gas_loads(engine, gas, fidelity).coefficients[:, 3].copy()
-    torque[0] = 0.0
-    orders = np.arange(len(torque)) * float(engine.cycle.base_order)
-    work = np.zeros_like(torque)
-    work[1:] = torque[1:] / (1j * orders[1:])
-    return Spectrum(engine.cycle.base_order, work), Spectrum(engine.cycle.base_order, torque)
+        return Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
+    return Spectrum(cycle.base_order, gas_loads(engine, gas, fidelity).coefficients[:, 3])
 
 
-def _work(engine: Engine, point: OperatingPoint, fidelity: Fidelity, phi: Array) -> Array:
-    work, _ = _work_series(engine, point, fidelity)
-    return np.zeros(len(phi)) if work is None else work.sample(len(phi))
+def _alternating_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """Torque of the gas less that of the load, which takes the mean of it (F2)."""
+    torque = _torque(engine, point, fidelity)
+    return Spectrum(torque.base, np.concatenate([[0.0], torque.coefficients[1:]]))
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:
@@ -190,9 +155,7 @@ def _start_energy(work: Array, inertia: Array, speed: float) -> float:
 
 def _angles_at(pace: Spectrum, times: Array) -> Array:
     """Crank angles at equal times: the inverse of t(phi), whose derivative is `pace`, by Newton."""
-    orders = pace.orders
-    shift = np.zeros_like(pace.coefficients)
-    shift[1:] = pace.coefficients[1:] / (1j * orders[1:])
+    shift = pace.integral.coefficients
     series = Spectrum(pace.base, np.stack([shift, pace.coefficients], axis=1))
     origin = float(shift.sum().real)
     angle = times.copy()
