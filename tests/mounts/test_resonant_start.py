@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,14 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.physics.elastic_mounts import ResonanceError
+from laufruhe.plots import draw
 from laufruhe.problem.evaluation import evaluate, measured, objective_value
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers import solve
+from laufruhe.report.json_result import as_json
+from laufruhe.report.markdown import as_markdown
+from laufruhe.solvers import solve, state
+from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
 
 # bounce at order 2 of 700 rpm: k = m (2 W)^2 / 4 on each of four mounts
@@ -44,6 +49,16 @@ def test_only_what_stands_on_the_resonance_is_infinite(tmp_path: Path) -> None:
     assert all(math.isinf(m.mean) for m in measured(start, 0))
     fourth = resonant(tmp_path, FORCE.replace("[search]", "orders = [4]\n[search]"))
     assert math.isfinite(objective_value(fourth, evaluate_start(fourth)))
+
+
+def test_a_result_that_stays_on_the_resonance_shows_what_is_finite(tmp_path: Path) -> None:
+    result = replace(state(resonant(tmp_path), to_start_from=True), status=Status.FAILED)
+    drawn = draw(result, tmp_path)
+    assert drawn == ("transmissibility.png", "campbell.png", "modes.png", "run_up.png")
+    text = as_markdown(result, drawn, "")
+    assert "## Natural modes" in text
+    assert "## Orders" not in text
+    assert json.loads(as_json(result))["mounts"][0]["mean"] is None
 
 
 def test_a_design_off_resonance_is_evaluated_as_ever(tmp_path: Path) -> None:

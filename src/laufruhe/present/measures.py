@@ -32,7 +32,9 @@ def main_load(loads: PointLoads) -> Spectrum:
 
 def mount_orders(spectrum: Spectrum) -> Array:
     """Amplitude by order of every mount's force, shape (orders, mounts) [N]."""
-    return order_amplitude(spectrum.coefficients)
+    # on a resonance there is none
+    with np.errstate(invalid="ignore"):
+        return order_amplitude(spectrum.coefficients)
 
 
 def shaking_orders(wrench: Spectrum) -> tuple[Array, Array]:
@@ -64,6 +66,16 @@ def is_met(limit: LimitValue) -> bool:
 def has_mounts(result: Result) -> bool:
     """Whether there are mounts, rigid or elastic."""
     return bool(result.problem.engine.mounts)
+
+
+def has_loads(result: Result) -> bool:
+    """Whether there are loads to draw: on a resonance they are infinite."""
+    return bool(result.problem.points) and not load_designs(result)[-1].resonance
+
+
+def has_mount_forces(result: Result) -> bool:
+    """Whether there are mount forces to draw."""
+    return has_mounts(result) and has_loads(result)
 
 
 def has_ranking(result: Result) -> bool:

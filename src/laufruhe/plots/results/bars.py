@@ -8,14 +8,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from laufruhe.plots.style import FAINT, Series, fitted, headed, page, series_of, thin
-from laufruhe.present.measures import Array, hardest_point, has_mounts
+from laufruhe.present.measures import Array, hardest_point, has_mount_forces
 from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.solvers.result import Result
 
 MOST_POINTS = 4
 WIDTH = 0.36
-applies = has_mounts
+applies = has_mount_forces
 
 
 def figure(result: Result) -> Figure:

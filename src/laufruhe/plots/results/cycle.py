@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from laufruhe.machine import Engine
 from laufruhe.plots.style import FAINT, INK, Series, entry, fitted, headed, page, series_of
-from laufruhe.present.measures import Array, hardest_point
+from laufruhe.present.measures import Array, hardest_point, has_loads
 from laufruhe.solvers.result import Result
 
 STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6
@@ -29,6 +29,7 @@ DIGIT = 0.085
 # smaller shares of the largest component of a row, and of all, are roundings
 SHARE, NOTHING = 1e-6, 1e-9
 LARGE = 1e4
+applies = has_loads
 STYLES = ("-", (0, (4, 1.6)), (0, (1.2, 1.2)))
 
 
@@ -46,11 +47,6 @@ class Row:
         """What the axis is called: vertical force, where that is the only component."""
         only = next(iter(self.curves)) if len(self.curves) == 1 else ""
         return f"{only} {self.label.split()[-1]}" if only else self.label
-
-
-def applies(result: Result) -> bool:
-    """Every result has loads."""
-    return bool(result.problem.points)
 
 
 def figure(result: Result) -> Figure:

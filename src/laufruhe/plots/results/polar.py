@@ -25,14 +25,14 @@ from laufruhe.plots.style import (
     series_of,
     thin,
 )  # fmt: skip
-from laufruhe.present.measures import Array, hardest_point, has_mounts
+from laufruhe.present.measures import Array, hardest_point, has_mount_forces
 from laufruhe.present.numbers import trimmed
 from laufruhe.problem.evaluation import mount_samples
 from laufruhe.solvers.result import Result
 
 MOST_PANELS = 12
 PANEL = 2.9
-applies = has_mounts
+applies = has_mount_forces
 
 
 def figure(result: Result) -> Figure:

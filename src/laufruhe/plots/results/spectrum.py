@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.plots.style import FAINT, headed, page, point_name, series_of
-from laufruhe.present.measures import Array, hardest_point, main_load, mount_orders, padded
+from laufruhe.present.measures import Array, hardest_point, has_loads, main_load, mount_orders, padded
 from laufruhe.problem.loads import PointLoads
 from laufruhe.solvers.result import Result
 
@@ -22,11 +22,7 @@ SHARE = 0.005
 LAST_ORDER = 24.0
 SHORTEST = 6.0
 NOTHING = 1e-9
-
-
-def applies(result: Result) -> bool:
-    """Every result has loads."""
-    return bool(result.problem.points)
+applies = has_loads
 
 
 def figure(result: Result) -> Figure:

@@ -7,6 +7,7 @@ import numpy as np
 from laufruhe.present.measures import (
     Array,
     hardest_point,
+    has_loads,
     has_mounts,
     load_designs,
     mount_orders,
@@ -24,6 +25,8 @@ SHARE = 0.005
 
 def tables(result: Result) -> list[Grid]:
     """Orders that make at least a small share of the largest, of the hardest operating point."""
+    if not has_loads(result):
+        return []
     k, designs = hardest_point(result), load_designs(result)
     series = [
         column for pair in zip(*(_columns(design.loads[k]) for design in designs), strict=True) for column in pair
