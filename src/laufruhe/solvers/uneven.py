@@ -38,6 +38,8 @@ Array = NDArray[np.float64]
 
 STARTS = 6
 ORDERS_WITH_GAS = 2
+# share of the objective as given that is a rounding
+NOTHING = 1e-12
 # share that keeps a design that stands on a limit from breaking it by a rounding
 SOFT_LIMIT = 1e-7
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
@@ -106,7 +108,7 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> U
         return best
     problem = replace(phasing.realise(start), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout(start.bank_angle, start.split_pin), start, intervals)
-    if not moves.size:
+    if not moves.size or _is_nothing(best):
         return best
     smooth = SmoothProgram(problem, moves=moves, unit=_size(problem, best), slack=SOFT_LIMIT)
     for optimum in solve_nonlinear(smooth.program, _points(smooth, best), workers=1, max_seconds=30.0):
@@ -119,6 +121,13 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> U
         if best is None or answer.value < best.value * (1.0 - 1e-9):
             best = answer
     return best
+
+
+def _is_nothing(best: Uneven | None) -> bool:
+    """Whether there is nothing to gain: no norm lies under zero."""
+    if best is None or best.result.objective is None:
+        return False
+    return best.value <= NOTHING * best.result.objective.initial
 
 
 def _size(problem: Problem, best: Uneven | None) -> float:
