@@ -44,6 +44,13 @@ def test_the_rules_are_those_that_are_measured(found):
     assert set(RULES) == set(found) == set(source_shape.exceptions())
 
 
+def test_every_room_has_its_tests():
+    package, tests = source_shape.SOURCE / source_shape.ROOT, source_shape.EXCEPTIONS.parents[1]
+    rooms = {path.parent.name for path in package.glob("*/__init__.py")}
+    tested = {path.parent.name for path in tests.glob("*/test_*.py")}
+    assert rooms <= tested
+
+
 def test_a_circle_is_found_also_through_a_third_module():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set(), "e": {"a"}}
     assert source_shape.circles(graph) == [{"a", "b", "c"}]
