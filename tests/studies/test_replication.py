@@ -57,7 +57,8 @@ class TestExpressions:
 
     @pytest.mark.parametrize("text", [
         "x.real", "().__class__", "__import__('os').system('ls')", "(lambda: 1)()", "[k for k in throws]",
-        "x if x else 0", "open('f')", "f'{x}'", "throws.append(1)", "x := 3", "{1: 2}", "max(*throws)", "x @ x", "b'a'", "None", "1j",
+        "x if x else 0", "open('f')", "f'{x}'", "throws.append(1)",
+        "x := 3", "{1: 2}", "max(*throws)", "x @ x", "b'a'", "None", "1j",
     ])  # fmt: skip
     def test_what_is_no_arithmetic_is_refused(self, text: str) -> None:
         with pytest.raises(ExpressionError):
@@ -159,7 +160,7 @@ def test_cases_sweep_and_keep_their_own_dimensions() -> None:
 def test_picture_says_what_the_file_says() -> None:
     panels = [{
         "x": {"ends": [0, "2 * 0.5"]},
-        "curves": [{"x": "kappa", "y": "at(mean['swept'], cm=v)", "for": {"v": [6, 9]}, "label": "{v}", "end": "end {v}"}],
+        "curves": [{"x": "kappa", "y": "at(mean['swept'], cm=v)", "for": {"v": [6, 9]}, "end": "end {v}"}],
         "words": [{"x": 0.5, "y": 1, "text": "{max(mean['swept']):.0f} N"}],
         "areas": [{"x": [0, 1], "y": [0, 10]}],
     }]  # fmt: skip

@@ -65,7 +65,7 @@ class Replication(Part):
         for case in self.cases:
             if case.computation:
                 check_among(case.computation, COMPUTATIONS, "computation")
-                known |= {*COMPUTATIONS[case.computation].gives}
+                known |= {*COMPUTATIONS[case.computation][1]}
         for name in self.problems:
             self._check_like(name)
         for what in self.quantities.values():
@@ -126,7 +126,7 @@ class Replication(Part):
         problem, case = scenes.problem(point), _case(point)
         with scenes.blamed(point):
             if case.computation:
-                found = COMPUTATIONS[case.computation].run(problem, case.numbers)
+                found = COMPUTATIONS[case.computation][0](problem, case.numbers)
                 return {name: values.as_dict() for name, values in found.items()}
             result = solve(problem, many=True)
             if result.status in (Status.INFEASIBLE, Status.FAILED):

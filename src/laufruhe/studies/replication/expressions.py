@@ -79,10 +79,7 @@ def check_among(name: str, known: Collection[str], what: str) -> None:
 
 def expressions_in(text: str) -> list[str]:
     """What stands in the braces of a text."""
-    try:
-        return [field for _, field, _, _ in Formatter().parse(text) if field]
-    except ValueError as error:
-        raise ExpressionError(f"'{text}' cannot be read ({error}); check its braces") from None
+    return [field for _, field, _ in _parts(text) if field]
 
 
 def value_of(text: Any, names: Mapping[str, Any]) -> Any:
@@ -111,22 +108,24 @@ def filled(text: Any, names: Mapping[str, Any]) -> Any:
         return [filled(value, names) for value in text]
     if not isinstance(text, str) or "{" not in text:
         return text
-    try:
-        parts = [(plain, field, spec) for plain, field, spec, _ in Formatter().parse(text)]
-    except ValueError as error:
-        raise ExpressionError(f"'{text}' cannot be read ({error}); check its braces") from None
+    parts = _parts(text)
     if len(parts) == 1 and not parts[0][0] and not parts[0][2]:
         return value_of(parts[0][1], names)
-    return "".join(plain + ("" if field is None else _shown(field, spec or "", names)) for plain, field, spec in parts)
+    return "".join(plain + (_shown(value_of(field, names), spec) if field else "") for plain, field, spec in parts)
 
 
-def _shown(field: str, spec: str, names: Mapping[str, Any]) -> str:
-    value = value_of(field, names)
-    if not spec:
-        return str(value)
-    if not _SPEC.fullmatch(spec):
+def _parts(text: str) -> list[tuple[str, str, str]]:
+    """Plain text, the expression after it, and how its number is written."""
+    try:
+        return [(plain, field or "", spec or "") for plain, field, spec, _ in Formatter().parse(text)]
+    except ValueError as error:
+        raise ExpressionError(f"'{text}' cannot be read ({error}); check its braces") from None
+
+
+def _shown(value: Any, spec: str) -> str:
+    if spec and not _SPEC.fullmatch(spec):
         raise ExpressionError(f"'{spec}' is no format of a number; write for example .1f, .3g or .0f")
-    return format(float(value), spec)
+    return format(float(value), spec) if spec else str(value)
 
 
 def _parsed(text: str) -> ast.expr:
@@ -146,8 +145,9 @@ def _value(node: ast.expr, names: Mapping[str, Any]) -> Any:
 
 
 def _name(node: ast.Name, names: Mapping[str, Any]) -> Any:
-    check_among(node.id, {*names, *CONSTANTS}, "name")
-    return names[node.id] if node.id in names else CONSTANTS[node.id]
+    known = {**CONSTANTS, **names}
+    check_among(node.id, known, "name")
+    return known[node.id]
 
 
 def _call(node: ast.Call, names: Mapping[str, Any]) -> Any:
@@ -163,14 +163,12 @@ def _call(node: ast.Call, names: Mapping[str, Any]) -> Any:
 
 def _compared(node: ast.Compare, names: Mapping[str, Any]) -> Any:
     values = [_value(one, names) for one in (node.left, *node.comparators)]
-    kinds = [type(one) for one in node.ops]
-    found = [_COMPARED[kind](a, b) for kind, a, b in zip(kinds, values, values[1:], strict=False)]
+    found = [_COMPARED[type(op)](a, b) for op, a, b in zip(node.ops, values, values[1:], strict=False)]
     return found[0] if len(found) == 1 else all(map(bool, found))
 
 
 def _joined(node: ast.BoolOp, names: Mapping[str, Any]) -> bool:
-    values = (bool(_value(one, names)) for one in node.values)
-    return all(values) if isinstance(node.op, ast.And) else any(values)
+    return (all if isinstance(node.op, ast.And) else any)(bool(_value(one, names)) for one in node.values)
 
 
 def _number(node: ast.expr, names: Mapping[str, Any]) -> Any:

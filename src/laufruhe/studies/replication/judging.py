@@ -35,20 +35,17 @@ def judged(statements: Sequence[StatementTable], names: Mapping[str, Any]) -> di
 
 def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
     """Whether a statement holds; `names` has our value as `value`."""
-    holds = bool(value_of(statement.holds, names)) if statement.holds is not None else _near(statement, names)
-    if statement.printed is None:
-        return BEYOND if holds else NOT_CONFIRMED
-    if not holds and statement.assuming is not None and value_of(statement.assuming.holds, names):
-        return f"{DEPENDS}: {statement.assuming.what}"
-    return CONFIRMED if holds else NOT_CONFIRMED
-
-
-def _near(statement: StatementTable, names: Mapping[str, Any]) -> bool:
-    expected = float(value_of(statement.expected, names))
-    allowed = statement.within
-    if isinstance(allowed, str):
-        allowed = 0.01 * float(allowed.removesuffix("%")) * abs(expected)
-    return bool(abs(names["value"] - expected) <= float(allowed or 0.0) * (1.0 + _SLACK))
+    if statement.holds is not None:
+        holds = bool(value_of(statement.holds, names))
+    else:
+        expected, allowed = float(value_of(statement.expected, names)), statement.within
+        if isinstance(allowed, str):
+            allowed = 0.01 * float(allowed.removesuffix("%")) * abs(expected)
+        holds = abs(names["value"] - expected) <= float(allowed or 0.0) * (1.0 + _SLACK)
+    if holds:
+        return BEYOND if statement.printed is None else CONFIRMED
+    assuming = statement.assuming
+    return f"{DEPENDS}: {assuming.what}" if assuming and value_of(assuming.holds, names) else NOT_CONFIRMED
 
 
 def rows(data: xr.Dataset) -> list[Text]:
@@ -69,5 +66,6 @@ def _shown(value: float) -> str:
 
 def counted(datasets: Iterable[xr.Dataset]) -> str:
     """How many of the statements of all parts are confirmed; empty where there are none."""
-    verdicts = [v for data in datasets if "verdict" in data.coords for v in data["verdict"].values if v != BEYOND]
+    judged_ones = [data for data in datasets if "verdict" in data.coords]
+    verdicts = [v for data in judged_ones for v in data["verdict"].values[data["printed"].values != UNSTATED]]
     return f"{verdicts.count(CONFIRMED)} of {len(verdicts)} statements are confirmed." if verdicts else ""
