@@ -197,7 +197,7 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
     for point in points:
         problem = scenes.problem(point)
         refuse_open_phasing(problem, point.case, scenes)
-        objective = tuple(problem.objective)
+        objective = tuple(problem.load_terms)
         if not objective:
             rule = f"is {problem.objective_name}, which is no load" if problem.objective_name else "is missing"
             remedy = "minimise a load, such as mean mount force"
