@@ -175,5 +175,7 @@ def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:
     Shape (...): the semi-major axis.
     """
     total = np.sum(np.abs(coefficient) ** 2, axis=-1)
-    alternating = np.abs(np.sum(coefficient**2, axis=-1))
+    # a load on a resonance that nothing damps is infinite, and so is its amplitude
+    finite = np.where(np.isfinite(total)[..., None], coefficient, 0.0)
+    alternating = np.abs(np.sum(finite**2, axis=-1))
     return np.asarray(np.sqrt(0.5 * (total + alternating)))
