@@ -105,7 +105,7 @@ def mechanisms(draw: st.DrawFn) -> tuple[float, ...]:
         draw(st.floats(0.02, 0.2)),
         draw(st.one_of(st.just(0.0), st.floats(0.05, 0.6))),
         draw(st.one_of(st.just(0.0), st.floats(-0.6, 0.6))),
-        draw(st.floats(0.0, 3.0)),
+        draw(st.floats(0.0, 3.0).map(lambda mass: round(mass, 9))),
         draw(st.floats(0.1, 3.0)),
         draw(st.floats(0.05, 0.95)),
         draw(st.floats(1e-4, 0.1)),

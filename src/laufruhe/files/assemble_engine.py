@@ -21,7 +21,7 @@ from laufruhe.files.file_models import (
 from laufruhe.files.read_trace import trace_of
 from laufruhe.machine import CRANKSHAFT, Cycle, OperatingPoint, PressureTrace, Rod, Shaft, SliderCrank
 from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
-from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, Mechanism, Throw, even_throws
+from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, Mechanism, Throw, even_throws, rod_of
 from laufruhe.machine.slider_crank import radius_for_stroke
 from laufruhe.physics.seiliger_cycle import motored_cycle
 
@@ -126,14 +126,8 @@ def _rod(table: EngineTable, length: float) -> Rod | None:
         return None
     if math.isinf(length):
         raise Refused("engine.rod", None, "means nothing in a Scotch yoke (rod_ratio = 0)", "leave it out")
-    if not 0.0 <= table.rod.centre_of_gravity <= length:
-        raise Refused(
-            "engine.rod.centre_of_gravity",
-            units.shown(table.rod.centre_of_gravity, "m"),
-            f"does not lie on the rod of {units.shown(length, 'm')}",
-            "count it from the crank pin",
-        )
-    return Rod(length, table.rod.mass, table.rod.centre_of_gravity, table.rod.inertia)
+    with blamed_on("engine.rod"):
+        return rod_of("rod", table.rod.model_dump(), length, "crank pin")
 
 
 def _radius_and_rod(table: EngineTable) -> tuple[float, float]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import Field, create_model
+from pydantic import BaseModel, Field, create_model
 
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Name, Table
 from laufruhe.machine.layouts import LAYOUTS
 
+T = TypeVar("T", bound=BaseModel)
 Count: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
@@ -49,8 +50,33 @@ class SliderCrankTable(Table):
     rod_inertia_deficit: f.Inertia | None = None
 
 
-class EngineKeys(Table):
-    """The keys of [engine] that no layout owns."""
+_KINDS: dict[str, Any] = {
+    "length": f.Length,
+    "positive length": f.PositiveLength,
+    "non-negative length": f.NonNegativeLength,
+    "angle": f.Angle,
+    "open angle": f.OpenAngle,
+    "angles": list[f.Angle],
+    "mass": f.Mass,
+    "cylinder": CylinderNumber,
+    "sign": Literal[1, -1],
+    "rod": RodTable,
+}
+
+
+def _with_layout_keys(table: type[T]) -> type[T]:
+    """[engine] with the names of all layouts, and a key for every one that they own."""
+    names: Any = tuple(LAYOUTS)
+    fields: dict[str, Any] = {"layout": (Literal[names], ...)}
+    for key in (key for kind in LAYOUTS.values() for key in kind.keys):
+        kind = _KINDS[key.kind] if key.default is not None else _KINDS[key.kind] | None
+        fields[key.name] = (kind, Field(default=key.default, description=key.description or None))
+    return create_model(table.__name__, __base__=table, __doc__=table.__doc__, __module__=__name__, **fields)
+
+
+@_with_layout_keys
+class EngineTable(Table):
+    """What the engine is."""
 
     layout: str
     cycle: Literal["two-stroke", "four-stroke"]
@@ -87,33 +113,3 @@ class EngineKeys(Table):
     def own(self, key: str) -> Any:
         """What stands at a key that a layout owns."""
         return getattr(self, key)
-
-
-_KINDS: dict[str, Any] = {
-    "length": f.Length,
-    "positive length": f.PositiveLength,
-    "angle": f.Angle,
-    "open angle": f.OpenAngle,
-    "sign": Literal[1, -1],
-    "non-negative length": f.NonNegativeLength,
-    "angles": list[f.Angle],
-    "cylinder": CylinderNumber,
-    "mass": f.Mass,
-    "rod": RodTable,
-}
-
-
-def _layout_fields() -> dict[str, Any]:
-    """The keys that layouts own, each as it may be left out or must not be nothing."""
-    names: Any = tuple(LAYOUTS)
-    fields: dict[str, Any] = {"layout": (Literal[names], ...)}
-    for key in (key for kind in LAYOUTS.values() for key in kind.keys):
-        kind = _KINDS[key.kind] if key.default is not None else _KINDS[key.kind] | None
-        fields[key.name] = (kind, Field(default=key.default, description=key.description or None))
-    return fields
-
-
-if TYPE_CHECKING:
-    EngineTable = EngineKeys
-else:
-    EngineTable = create_model("EngineTable", __base__=EngineKeys, __doc__="What the engine is.", **_layout_fields())

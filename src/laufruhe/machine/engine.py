@@ -49,12 +49,8 @@ class OperatingPoint:
 
     Attributes
     ----------
-    name
-        Unique in a problem.
     speed
         Crank speed [rad/s].
-    gas
-        Working gas of every cylinder; none for a motored engine.
     weight
         Share in a metric taken over several points.
     """
@@ -71,14 +67,8 @@ class Engine:
 
     Attributes
     ----------
-    name
-        Of the design.
-    cycle
-        Two- or four-stroke.
     slider_cranks
         In the order of cylinder numbers (C3).
-    rotors
-        Unbalances on the crank and on balancer shafts.
     mounts
         Empty for an engine whose shaking loads alone are asked for.
     block

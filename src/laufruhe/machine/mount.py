@@ -21,8 +21,6 @@ class Mount:
 
     Attributes
     ----------
-    name
-        Unique in an engine.
     position
         (x, y, z) [m] (C2).
     stiffness

@@ -14,8 +14,6 @@ class Shaft:
 
     Attributes
     ----------
-    name
-        Unique in an engine.
     ratio
         Speed over crank speed; negative runs against the crank (C3).
     y, z
@@ -49,14 +47,10 @@ class Rotor:
 
     Attributes
     ----------
-    name
-        Unique in an engine.
     x
         Place along the crank axis [m].
     unbalance
         Mass times eccentricity, at its angle when phi = 0 [kg m], zeta = z + i y.
-    shaft
-        The shaft that it turns with.
     role
         Part of a throw, counterweight, or balancer.
     radius

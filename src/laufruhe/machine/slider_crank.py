@@ -78,8 +78,6 @@ class SliderCrank:
 
     Attributes
     ----------
-    name
-        Unique in an engine.
     x
         Place along the crank axis [m].
     crank_radius
@@ -102,8 +100,6 @@ class SliderCrank:
         Piston diameter [m]; needed with gas only.
     firing_angle
         Crank angle phi at which this cylinder fires [rad], within the cycle (C5).
-    shaft
-        The crankshaft that it works on.
     """
 
     name: str

@@ -63,10 +63,6 @@ def indicated_mean_pressure(pressures: FloatArray, part: SliderCrank, cycle: Cyc
     ----------
     pressures
         Shape (n,) [Pa], at equal steps over one cycle from the firing dead centre.
-    part
-        The slider-crank whose piston the gas works on.
-    cycle
-        Two- or four-stroke.
 
     Returns
     -------

@@ -111,10 +111,6 @@ def seiliger_imep(gas: Seiliger, cycle: Cycle, cut_off_ratio: float) -> float:
 
     Parameters
     ----------
-    gas
-        Model; its own imep is not used.
-    cycle
-        Two- or four-stroke.
     cut_off_ratio
         Volume at the cut-off over the smallest volume, 1 to the compression ratio.
     """

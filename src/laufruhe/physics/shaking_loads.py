@@ -28,15 +28,6 @@ from laufruhe.physics.wrench import ROLL, plane_wrench
 def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Wrench on the block from everything that moves (C7).
 
-    Parameters
-    ----------
-    engine
-        Slider-cranks and rotors.
-    point
-        Speed and working gas.
-    fidelity
-        Kinematics and samples.
-
     Returns
     -------
     Spectrum of shape (n, 6): (Fx, Fy, Fz, Mx, My, Mz) about the origin of C2 [N, N m].

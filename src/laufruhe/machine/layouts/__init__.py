@@ -3,7 +3,7 @@
 Cylinders are counted from the front (C3).
 """
 
-from laufruhe.machine.layouts.base import Asked, Key, LayoutKind
+from laufruhe.machine.layouts.base import Asked, Key, LayoutKind, rod_of
 from laufruhe.machine.layouts.boxer import Boxer, boxer
 from laufruhe.machine.layouts.build import Mechanism, Throw, build, even_throws, firing_angles, throw_rotors
 from laufruhe.machine.layouts.inline import Inline, inline
@@ -39,6 +39,7 @@ __all__ = [
     "facing_pistons",
     "firing_angles",
     "inline",
+    "rod_of",
     "stations",
     "throw_rotors",
     "vee",

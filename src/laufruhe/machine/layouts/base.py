@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from laufruhe import units
 from laufruhe.errors import KeyedError
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.build import Mechanism, Throw, build
@@ -71,6 +72,14 @@ class Asked:
         if given is None and self.cylinders > 1:
             raise KeyedError("cylinder_spacing", 'is missing; add it, for example "125 mm"')
         return 1.0 if given is None else float(given)
+
+
+def rod_of(key: str, table: Mapping[str, float], length: float, end: str) -> Rod:
+    """The rod of a table of [engine] with mass, centre of gravity counted from the pin `end`, and inertia."""
+    if not 0.0 <= table["centre_of_gravity"] <= length:
+        rule = f"does not lie on the rod of {units.shown(length, 'm')}; count it from the {end}"
+        raise KeyedError(f"{key}.centre_of_gravity", rule, units.shown(table["centre_of_gravity"], "m"))
+    return Rod(length, **table)
 
 
 class LayoutKind(ABC):

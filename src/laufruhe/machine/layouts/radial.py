@@ -6,14 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
-from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
-from laufruhe.machine.layouts.base import Asked, Key, LayoutKind
+from laufruhe.machine.layouts.base import Asked, Key, LayoutKind, rod_of
 from laufruhe.machine.layouts.build import Mechanism, Throw, build
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
-from laufruhe.machine.slider_crank import Rod, SliderCrank
+from laufruhe.machine.slider_crank import SliderCrank
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +63,7 @@ class MasterRod(Mechanism):
             return super().cylinder(number, x, throw, bank, firing_angle, pin_mass, shaft)
         knuckle = self._knuckle(number)
         length = self.length or knuckle.length_to(_top(knuckle.master), bank)
-        rod = None if self.rod is None else _rod(length, self.rod)
+        rod = None if self.rod is None else rod_of("articulated_rod", self.rod, length, "knuckle pin")
         plain = replace(
             super().cylinder(number, x, throw, bank, firing_angle, shaft=shaft),
             rod_length=length,
@@ -87,14 +86,6 @@ class MasterRod(Mechanism):
 def _top(part: SliderCrank) -> complex:
     """The highest place of a piston pin in the plane of its cylinder [m]."""
     return complex(math.sqrt((part.rod_length + part.crank_radius) ** 2 - part.offset**2), part.offset)
-
-
-def _rod(length: float, rod: Mapping[str, float]) -> Rod:
-    if not 0.0 <= rod["centre_of_gravity"] <= length:
-        rule = f"does not lie on the rod of {units.shown(length, 'm')}; count it from the knuckle pin"
-        value = units.shown(rod["centre_of_gravity"], "m")
-        raise KeyedError("articulated_rod.centre_of_gravity", rule, value)
-    return Rod(length, **rod)
 
 
 class Radial(LayoutKind):
