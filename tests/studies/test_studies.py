@@ -174,6 +174,16 @@ def test_nothing_open_is_not_called_an_optimum(tmp_path: Path) -> None:
     assert parts["seconds"] > 0.0
 
 
+def test_a_scene_of_two_names_is_solved_once_and_shown_twice(tmp_path: Path) -> None:
+    text = (
+        part("layout comparison", ["boxer-four"]) + '[[study.parts.cases]]\nname = "b"\nproblem = "boxer-four.toml"\n'
+    )
+    data = computed(study(tmp_path, text))
+    assert data["case"].values.tolist() == ["boxer-four", "b"]
+    assert np.ptp(data["objective"].values) == 0.0
+    assert (tmp_path / "kept" / NAME).read_bytes().count(b"\n") == 1
+
+
 def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     force = Limit("force", problem.objective[0].measure, 1.0)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import xarray as xr
@@ -171,39 +171,42 @@ def compared(fronts: Mapping[str, Front], claims: Mapping[str, Claim], following
     unit, said = lines[0].unit, [claims.get(name, NO_CLAIM) for name in fronts]
     standing = [Standing.NEXT if name in following else Standing.SHAFTS for name in fronts]
 
-    def along(name: str, words: str, unit: str = "1") -> Any:
-        table = [[getattr(point, name) for point in line.points] for line in lines]
-        return variable(("build", "mass_limit"), table, words, unit)
-
-    def each(name: str, words: str, unit: str) -> Any:
-        return variable("build", [getattr(line.optimum, name) for line in lines], words, unit)
-
+    values = {
+        name: variable(("build", "mass_limit"), [[getattr(p, name) for p in line.points] for line in lines], words, per)
+        for name, (words, per) in _AT_LIMITS.items()
+    }
+    for name, (of, words, per) in _FREE.items():
+        values[name] = variable("build", [getattr(line.optimum, of) for line in lines], words, per)
+    for _, _, about in values.values():
+        about["units"] = about["units"].format(unit)
     limits = [point.mass_limit for point in lines[0].points]
-    data = xr.Dataset(
-        {
-            "force": along("force", "least objective", unit),
-            "lower_bound": along("lower_bound", "what no design falls below", unit),
-            "mass": along("mass", "mass on the shafts", "kg"),
-            "gap": along("gap", "relative gap of the proof"),
-            "price": along("price", "fall of the least objective per kilogram more", f"{unit} / kg"),
-            "optimum": each("force", "least objective whatever the shafts weigh", unit),
-            "optimum_bound": each("lower_bound", "what no design falls below, whatever the shafts weigh", unit),
-            "optimum_mass": each("mass", "mass on the shafts at the least objective", "kg"),
-        },
-        coords={
-            "build": list(fronts),
-            "mass_limit": variable("mass_limit", limits, "mass allowed on shafts", "kg"),
-            "shafts": variable("build", [line.shafts for line in lines], "balancer shafts"),
-            "cylinders": ("build", [line.cylinders for line in lines], {"units": "1"}),
-            "standing": ("build", [str(Standing.PLAIN), *map(str, standing[1:])]),
-            "claim": ("build", [claim.says or "" for claim in said], {"long_name": "what the source says"}),
-            "claimed_fall": ("build", [claim.falls_by or np.nan for claim in said], {"units": "1"}),
-            "claimed_against": ("build", [claim.against for claim in said]),
-            "claimed_where": ("build", [claim.where for claim in said]),
-        },
-        attrs={"title": "", "kind": "", "objective": asked[0]},
-    )
+    coords = {
+        "build": list(fronts),
+        "mass_limit": variable("mass_limit", limits, "mass allowed on shafts", "kg"),
+        "shafts": variable("build", [line.shafts for line in lines], "balancer shafts"),
+        "cylinders": ("build", [line.cylinders for line in lines], {"units": "1"}),
+        "standing": ("build", [str(Standing.PLAIN), *map(str, standing[1:])]),
+        "claim": ("build", [claim.says or "" for claim in said], {"long_name": "what the source says"}),
+        "claimed_fall": ("build", [claim.falls_by or np.nan for claim in said], {"units": "1"}),
+        "claimed_against": ("build", [claim.against for claim in said]),
+        "claimed_where": ("build", [claim.where for claim in said]),
+    }
+    data = xr.Dataset(values, coords, {"title": "", "kind": "", "objective": asked[0]})
     return data.assign(efficient=_efficient(data))
+
+
+_AT_LIMITS = {
+    "force": ("least objective", "{}"),
+    "lower_bound": ("what no design falls below", "{}"),
+    "mass": ("mass on the shafts", "kg"),
+    "gap": ("relative gap of the proof", "1"),
+    "price": ("fall of the least objective per kilogram more", "{} / kg"),
+}
+_FREE = {
+    "optimum": ("force", "least objective whatever the shafts weigh", "{}"),
+    "optimum_bound": ("lower_bound", "what no design falls below, whatever the shafts weigh", "{}"),
+    "optimum_mass": ("mass", "mass on the shafts at the least objective", "kg"),
+}
 
 
 def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str, str]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from laufruhe.studies.kept import KeptPoints
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.scenes import Scenes
-from laufruhe.studies.work import Task, answers
+from laufruhe.studies.work import answers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,16 +41,12 @@ def run(
     InputError
         If a scene of the study is bad.
     """
-    parts, scenes = study.study.parts, Scenes(folder)
-    points = {part.name: part.points(scenes) for part in parts}
-    marks = {part.name: [scenes.fingerprint(point, part.settings()) for point in points[part.name]] for part in parts}
+    scenes = Scenes(folder)
+    work = [(part, point) for part in study.study.parts for point in part.points(scenes)]
+    marks = [scenes.fingerprint(point, part.settings()) for part, point in work]
     with KeptPoints(kept) as store:
         # a scene that stands in two parts of one kind is solved once
-        wanted = {
-            mark: Task(part, point)
-            for part in parts
-            for point, mark in zip(points[part.name], marks[part.name], strict=True)
-        }
+        wanted = dict(zip(marks, work, strict=True))
         todo = {mark: task for mark, task in wanted.items() if mark not in store.records}
         names, whole = list(todo), len(wanted)
         say(whole - len(todo), whole)
@@ -58,8 +54,9 @@ def run(
             for count, answer in enumerate(found, 1):
                 store.keep(names[answer.task], answer.seconds, answer.record)
                 say(whole - len(todo) + count, whole)
-        datasets = {
-            part.name: part.dataset(points[part.name], [store.records[m] for m in marks[part.name]]) for part in parts
-        }
-        seconds = {part.name: sum(store.seconds[mark] for mark in set(marks[part.name])) for part in parts}
+    datasets, seconds = {}, {}
+    for part in study.study.parts:
+        own = [(mark, point) for mark, (of, point) in zip(marks, work, strict=True) if of is part]
+        datasets[part.name] = part.dataset([point for _, point in own], [store.records[mark] for mark, _ in own])
+        seconds[part.name] = sum(store.seconds[mark] for mark in {mark for mark, _ in own})
     return datasets, seconds

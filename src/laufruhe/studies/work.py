@@ -15,6 +15,7 @@ from functools import cache
 from multiprocessing import active_children, get_context, parent_process
 from multiprocessing.connection import wait
 from pathlib import Path
+from typing import TypeAlias
 
 from laufruhe.errors import SolverError
 from laufruhe.studies.part import Part, Record
@@ -25,12 +26,7 @@ POOL_PAYS = 4.0
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-@dataclass(frozen=True)
-class Task:
-    """A point of a part."""
-
-    part: Part
-    point: Point
+Task: TypeAlias = tuple[Part, Point]
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,8 @@ def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Answe
 
 def _answer(k: int, task: Task, scenes: Scenes) -> Answer:
     started = time.perf_counter()
-    record = task.part.answer(task.point, scenes)
+    part, point = task
+    record = part.answer(point, scenes)
     return Answer(k, record, time.perf_counter() - started)
 
 
