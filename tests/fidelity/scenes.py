@@ -44,7 +44,7 @@ def random_problem(rng: random.Random, gas: bool | None = None) -> Problem:
         for k in range(rng.choice([1, 1, 2]))
     )
     subject = rng.choice(SUBJECTS if count > 1 else SUBJECTS[:3])
-    norm = rng.choice([NORMS["mean"], NORMS["mean"], NORMS["rms"], NORMS["maximum"]])
+    norm = rng.choice(list(NORMS.values()))
     return Problem(
         "random", "random", Engine("random", cycle, parts, rotors, mounts), points,
         objective=(Term(Measure(subject, norm)),),

@@ -31,7 +31,8 @@ from laufruhe.solvers import solve
 from problem_files import written
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
-READY = sorted(path for path in PROBLEMS.glob("*.toml") if 'kind = "elastic"' in path.read_text(encoding="utf-8"))
+TEXTS = {path: path.read_text(encoding="utf-8") for path in sorted(PROBLEMS.glob("*.toml"))}
+READY = [path for path, text in TEXTS.items() if 'kind = "elastic"' in text and "\n[engine]\n" in text]
 QUICK, AUTOMATIC = 60, 20
 # five hundred engines, a hundred at a time
 SHARES, SHARE = 5, 100

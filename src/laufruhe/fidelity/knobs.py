@@ -28,6 +28,8 @@ PHYSICS_SHARE, GAS_SHARE, PART_SHARE = 0.5, 0.25, 0.1
 """Shares of the tolerance that all physics, the steps of the gas, and one whole part may use."""
 TIME_ORDERS, TIME_SAMPLES = 12, 360
 """Of a rung in the time domain: more orders cost minutes."""
+TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
+"""Rungs that a report speaks of."""
 
 
 class _Kinematics(Knob):
@@ -39,7 +41,7 @@ class _Kinematics(Knob):
 
     def rungs(self, scale: Scale) -> Rungs:
         quick = Fidelity("two-order", 48, gas_samples=_gas_steps(scale.problem))
-        return [("two-order, 48 steps", quick), ("two-order, 720 steps", Fidelity("two-order", 720))]
+        return [("two-order, 48 steps", quick), (TWO_ORDER, Fidelity("two-order", 720))]
 
 
 class _WholePart(Knob):
@@ -101,7 +103,7 @@ class _Rod(_WholePart):
 class _Gas(_WholePart):
     key, kind = "gas", bool
     told: ClassVar = {"description": "false leaves the working gas out."}
-    what, rung = "gas", "exact without gas, 720 steps"
+    what, rung = "gas", NO_GAS
     less: ClassVar = {"gas": False, "gas_orders": None}
     whole: ClassVar = {"gas": True, "gas_samples": REFERENCE_SAMPLES}
 
@@ -232,7 +234,7 @@ class _Mounts(_OfElasticMounts):
             return []
         cut, every = Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS), f"orders to {TIME_ORDERS}"
         return [
-            ("rigid mounts, 720 steps", Fidelity(samples=720, mounts="rigid")),
+            (RIGID, Fidelity(samples=720, mounts="rigid")),
             (f"{every}, {TIME_SAMPLES} steps", cut),
             (f"in time, {every}", replace(cut, mounts="time")),
         ]

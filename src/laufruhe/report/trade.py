@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
+from laufruhe.fidelity.knobs import NO_GAS, RIGID, TWO_ORDER
 from laufruhe.present.numbers import DASH
 from laufruhe.report.grid import escaped, piped
 from laufruhe.report.strict_json import strict
 from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade, is_local
 
 ALIKE = 1.3
-TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
 MOVED = " Throws leave their even steps here, and such optima are local: a regret may be below zero."
 LOCAL = (
     " Mounts are decided here: every fidelity searches from the design as given alone, and finds an optimum nearby. "
