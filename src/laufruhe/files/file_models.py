@@ -8,8 +8,9 @@ from pydantic import BaseModel, Field, create_model
 
 from laufruhe.fidelity.knobs import KNOBS
 from laufruhe.files import fields as f
-from laufruhe.files.engine_table import CylinderNumber, EngineTable
+from laufruhe.files.engine_table import EngineTable
 from laufruhe.files.fields import Name, Table
+from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
 from laufruhe.problem.measure import MEASURES
 
 QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": list(MEASURES)})]
@@ -159,52 +160,6 @@ class MountsTable(Table):
     loss_factor: f.LossFactor = Field(default=0.0, description="Of every elastic mount that gives none.")
     stop: StopTable | None = None
     places: list[MountTable] = Field(default_factory=list)
-
-
-class CounterweightTable(Table):
-    """A counterweight on the crankshaft, or one opposite every throw."""
-
-    name: Name
-    balance_fraction: f.Fraction | None = Field(
-        default=None, description="kappa: rotating mass and this share of the reciprocating mass, opposite each throw."
-    )
-    throws: list[CylinderNumber] | None = None
-    x: f.Length | None = None
-    opposite_throw: CylinderNumber | None = Field(default=None, description="Angle and place are counted from it.")
-    unbalance: f.OpenUnbalance | None = None
-    mass: f.OpenMass | None = None
-    radius: f.PositiveLength | None = None
-    angle: f.OpenAngle = 0.0
-
-
-class CoupledTable(Table):
-    """Follows another unbalance."""
-
-    to: str
-    how: Literal["equal", "opposite", "mirrored", "mirrored opposite"] = Field(alias="as")
-
-
-class UnbalanceTable(Table):
-    """One unbalance of a shaft."""
-
-    name: Name | None = None
-    x: f.Length = 0.0
-    unbalance: f.OpenUnbalance | None = None
-    mass: f.OpenMass | None = None
-    radius: f.PositiveLength | None = None
-    angle: f.OpenAngle = 0.0
-    coupled: CoupledTable | None = None
-
-
-class BalancerShaftTable(Table):
-    """A balancer shaft."""
-
-    name: Name
-    ratio: f.Ratio
-    position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
-    unbalances: list[UnbalanceTable] = Field(min_length=1)
-    optional: bool = Field(default=False, description="Whether it is built is decided too.")
-    shaft_mass: f.Mass = Field(default=0.0, description="Of an optional shaft, its unbalances not included.")
 
 
 class QuantityTable(Table):

@@ -12,7 +12,8 @@ from laufruhe.files.assemble_engine import cycle_of, layout_of
 from laufruhe.files.complaints import Refused
 from laufruhe.files.engine_table import EngineTable
 from laufruhe.files.fields import Open
-from laufruhe.files.file_models import BalancerShaftTable, PhasingTable, ProblemFile
+from laufruhe.files.file_models import PhasingTable, ProblemFile
+from laufruhe.files.rotors import BalancerShaftTable
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import (
     MOST_ORDERS,

@@ -13,11 +13,11 @@ from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.files.asked import Scene, limits_of, objective_of
 from laufruhe.files.assemble_engine import cycle_of, moving_parts, operating_points
 from laufruhe.files.assemble_mounts import mounts_of
-from laufruhe.files.assemble_rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.file_models import ProblemFile
 from laufruhe.files.read_fidelity import at_fidelity
 from laufruhe.files.read_phasing import is_open, opened
+from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.machine import Engine
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.problem.problem import Problem, Search

@@ -1,4 +1,4 @@
-"""From counterweights and balancer shafts of a problem file to rotors and decisions."""
+"""Counterweights and balancer shafts: their tables in a problem file, and the rotors and decisions they make."""
 
 from __future__ import annotations
 
@@ -6,17 +6,67 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from laufruhe import units
+from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, nearest
-from laufruhe.files.fields import Open
-from laufruhe.files.file_models import BalancerShaftTable, CounterweightTable, CoupledTable, UnbalanceTable
+from laufruhe.files.engine_table import CylinderNumber
+from laufruhe.files.fields import Name, Table
 from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.problem.decision import Decision, Interval, RotorDrive, Sector, Set
 
 _HOW = {"equal": (1.0, False), "opposite": (-1.0, False), "mirrored": (1.0, True), "mirrored opposite": (-1.0, True)}
+
+
+class CounterweightTable(Table):
+    """A counterweight on the crankshaft, or one opposite every throw."""
+
+    name: Name
+    balance_fraction: f.Fraction | None = Field(
+        default=None, description="kappa: rotating mass and this share of the reciprocating mass, opposite each throw."
+    )
+    throws: list[CylinderNumber] | None = None
+    x: f.Length | None = None
+    opposite_throw: CylinderNumber | None = Field(default=None, description="Angle and place are counted from it.")
+    unbalance: f.OpenUnbalance | None = None
+    mass: f.OpenMass | None = None
+    radius: f.PositiveLength | None = None
+    angle: f.OpenAngle = 0.0
+
+
+class CoupledTable(Table):
+    """Follows another unbalance."""
+
+    to: str
+    how: Literal["equal", "opposite", "mirrored", "mirrored opposite"] = Field(alias="as")
+
+
+class UnbalanceTable(Table):
+    """One unbalance of a shaft."""
+
+    name: Name | None = None
+    x: f.Length = 0.0
+    unbalance: f.OpenUnbalance | None = None
+    mass: f.OpenMass | None = None
+    radius: f.PositiveLength | None = None
+    angle: f.OpenAngle = 0.0
+    coupled: CoupledTable | None = None
+
+
+class BalancerShaftTable(Table):
+    """A balancer shaft."""
+
+    name: Name
+    ratio: f.Ratio
+    position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
+    unbalances: list[UnbalanceTable] = Field(min_length=1)
+    optional: bool = Field(default=False, description="Whether it is built is decided too.")
+    shaft_mass: f.Mass = Field(default=0.0, description="Of an optional shaft, its unbalances not included.")
 
 
 @dataclass
@@ -95,7 +145,7 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
         raise Refused(f"{where}.{clash}", None, "does not go with balance_fraction", "leave one of them out")
     chosen = range(1, len(pins) + 1) if table.throws is None else table.throws
     given = table.balance_fraction
-    start = given.start if isinstance(given, Open) else float(given or 0.0)
+    start = given.start if isinstance(given, f.Open) else float(given or 0.0)
     drives = []
     for number in chosen:
         pin = _pin(pins, number, f"{where}.throws")
@@ -103,7 +153,7 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
         name = f"{table.name}.{number}"
         into.add(Rotor(name, pin.x, -pin.rotating + start * gain, radius=table.radius), f"{where}.name")
         drives.append(RotorDrive(name, gain))
-    if isinstance(given, Open) and given.lower < given.upper:
+    if isinstance(given, f.Open) and given.lower < given.upper:
         into.decisions.append(
             Decision(
                 f"{table.name}.balance_fraction",
@@ -179,7 +229,7 @@ def _place(
     """One rotor, and the decision about it if its size or angle is open."""
     size, angle = _size(table, where), table.angle
     direction = cis(as_turn(reference))
-    low, high, start_angle = (angle.lower, angle.upper, angle.start) if isinstance(angle, Open) else (angle,) * 3
+    low, high, start_angle = (angle.lower, angle.upper, angle.start) if isinstance(angle, f.Open) else (angle,) * 3
     _check_convex(size, low, high, where)
     high = low + math.tau if _is_whole_turn(low, high) else high
     start = size.start * _direction(start_angle)
@@ -236,6 +286,6 @@ def _size(table: CounterweightTable | UnbalanceTable, where: str) -> _Size:
     if key == "mass" and table.radius is None:
         raise Refused(f"{where}.radius", None, "is missing, and a mass needs one", "add it")
     value = given[key]
-    bounds = (value.lower, value.upper, value.start) if isinstance(value, Open) else (float(value or 0.0),) * 3
+    bounds = (value.lower, value.upper, value.start) if isinstance(value, f.Open) else (float(value or 0.0),) * 3
     gain = float(table.radius or 1.0) if key == "mass" else 1.0
     return _Size("kg" if key == "mass" else "kg m", *bounds, gain)
