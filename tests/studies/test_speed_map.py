@@ -111,6 +111,18 @@ def test_limits_of_the_problem_are_drawn_at_its_points(tmp_path: Path) -> None:
     assert set(data["limit"].values[:, 1]) == {2000.0}
 
 
+def test_what_no_design_keeps_is_said_and_not_drawn(tmp_path: Path) -> None:
+    text = (PROBLEMS / "tractor-three.toml").read_text(encoding="utf-8")
+    limit = '\n[[constraints]]\nlimit = "maximum mount force"\nmax = "1 N"\n'
+    (tmp_path / "quiet.toml").write_text(text + limit, encoding="utf-8")
+    data = computed(tmp_path, part("quiet.toml", 'from = "1000 rpm", to = "3000 rpm", points = 3', "by_order = true"))
+    decided = data["design"].values == "as decided"
+    assert np.isnan(data["value"].values[decided]).all()
+    assert np.isfinite(data["value"].values[~decided]).all()
+    assert [row[-1] for row in KINDS["speed map"].table(data)[0].rows] == [*["as given"] * 2, *["infeasible"] * 2]
+    draw(KINDS["speed map"].picture(data))
+
+
 BAD = [
     ('from = "3000 rpm", to = "1000 rpm", points = 3', "", "go nowhere; write the lower speed first"),
     ('from = "1000 rpm", to = "3000 rpm"', "", "give points or step"),

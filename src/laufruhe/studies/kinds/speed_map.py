@@ -25,7 +25,7 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure, selected
 from laufruhe.problem.problem import Problem
 from laufruhe.studies import picture as p
-from laufruhe.studies.outcome import AS_GIVEN, decided
+from laufruhe.studies.outcome import AS_GIVEN, FAILED, decided
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import NOTHING, Rows, Text, number
@@ -139,13 +139,14 @@ class SpeedMap(Part):
             "designs": designs,
         }
 
-    def _engines(self, problem: Problem) -> Iterator[tuple[DesignName, Engine, str]]:
+    def _engines(self, problem: Problem) -> Iterator[tuple[DesignName, Engine | None, str]]:
         is_open = bool(problem.decisions or problem.phasing)
         if "as given" in self.designs or not is_open:
             yield "as given", problem.engine, AS_GIVEN
         if "as decided" in self.designs and is_open:
             result, status, proof = decided(problem)
-            yield "as decided", result.final.engine, proof if status in ("optimal", "feasible") else status
+            found = status in ("optimal", "feasible")
+            yield "as decided", result.final.engine if found else None, proof if found else status
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """A point for every case, design and speed, in that order; NaN on a resonance that nothing damps."""
@@ -177,16 +178,12 @@ class SpeedMap(Part):
         rows = []
         for case, design, one in _designs(data):
             for name, unit in zip(data["measure"].values, data["measure_unit"].values, strict=True):
-                values, limits = (one[what].sel(measure=name).values for what in ("value", "limit"))
-                if np.isnan(values).all():
-                    continue
-                speeds, most, known = one["speed"].values, int(np.nanargmax(values)), limits[np.isfinite(limits)]
-                over = speeds[values > limits * (1.0 + 1e-6)]
-                edges = f"{over.min():.4g} to {over.max():.4g}" if len(over) else "nowhere"
-                cells = [case, design, f"{name} [{unit}]" if unit else str(name), number(np.nanmin(values))]
-                cells += [number(values[most]), f"{speeds[most]:.4g}"]
-                rows.append([*cells, *((number(known[0]), edges) if len(known) else (NOTHING, NOTHING)),
-                             str(one["proof"].values[0])])  # fmt: skip
+                here = one.sel(measure=name)
+                proof, label = str(one["proof"].values[0]), f"{name} [{unit}]" if unit else str(name)
+                cells = _told(*(here[what].values for what in ("speed", "value", "limit")))
+                # what one case does not ask for is no line of it
+                if cells is not None or proof in ("infeasible", FAILED):
+                    rows.append([case, design, label, *(cells or [NOTHING] * 5), proof])
         return [Rows([*head, "proof"], rows)]
 
     @staticmethod
@@ -195,7 +192,7 @@ class SpeedMap(Part):
         data = _readable(data)
         designs = list(_designs(data))
         panels = [_panel(data, designs, k) for k in range(data.sizes["measure"])]
-        panels += [_orders(*one) for one in designs] if "amplitude" in data else []
+        panels += [_orders(*one) for one in designs if "amplitude" in data and one[2]["amplitude"].notnull().any()]
         words = "Each design at every speed, its load kept."
         words += " Strokes on the axis: an order meets a mode." if "amplitude" in data and "frequency" in data else ""
         legend = [replace(m, x=(), y=()) for m in panels[0].marks if isinstance(m, p.Line) and m.label]
@@ -204,11 +201,29 @@ class SpeedMap(Part):
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, gap=0.8, legend=legend)
 
 
+def _told(speeds: Array, values: Array, limits: Array) -> list[str] | None:
+    """Least, largest and where, limit and where over it; None where there is nothing."""
+    if np.isnan(values).all():
+        return None
+    most, known = int(np.nanargmax(values)), limits[np.isfinite(limits)]
+    cells = [number(np.nanmin(values)), number(values[most]), f"{speeds[most]:.4g}"]
+    over = speeds[values > limits * (1.0 + 1e-6)]
+    where = f"{over.min():.4g} to {over.max():.4g}" if len(over) else "nowhere"
+    return [*cells, number(known[0]), where] if len(known) else [*cells, NOTHING, NOTHING]
+
+
 def _mapped(
-    problem: Problem, load: OperatingPoint, speeds: Array, engine: Engine, measures: Sequence[Measure], by_order: bool
+    problem: Problem,
+    load: OperatingPoint,
+    speeds: Array,
+    engine: Engine | None,
+    measures: Sequence[Measure],
+    by_order: bool,
 ) -> Record:
     """Values (measures, speeds) of one design, amplitudes (orders, speeds), and natural frequencies [Hz]."""
     values = np.full((len(measures), len(speeds)), math.nan)
+    if engine is None:
+        return {"values": values.tolist(), "orders": [], "sizes": [], "modes": []}
     sizes: dict[float, Array] = {}
     channel = measures[0].channel
     for k, speed in enumerate(speeds):
@@ -313,6 +328,8 @@ def _orders(case: str, design: str, one: xr.Dataset) -> p.Panel:
     marks: list[p.Mark] = []
     for k, order in enumerate(one["order"].values):
         values, colour = one["amplitude"].values[:, k], p.colour(k, one.sizes["order"])
+        if np.isnan(values).all():
+            continue
         peak = int(np.argmax(np.nan_to_num(values)))
         side = "right" if speeds[peak] > speeds.mean() else "left"
         marks.append(p.Line(speeds, values, colour))
