@@ -20,18 +20,9 @@ _SIDES = {"max": "at most", "min": "at least"}
 
 @dataclass(frozen=True)
 class Axis:
-    """One swept quantity.
+    """One swept quantity: its path and values as the problem file has them, and as numbers, unless these are labels.
 
-    Attributes
-    ----------
-    quantity
-        Path in the problem file.
-    values
-        As they are put into the problem file.
-    unit
-        As the study file writes it; "1" of plain numbers, "" of labels.
-    numbers
-        Values in that unit; None where they are labels.
+    The unit is that of the study file; "1" of plain numbers, "" of labels.
     """
 
     quantity: str

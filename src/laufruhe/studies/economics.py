@@ -66,17 +66,11 @@ NO_CLAIM = Claim.model_construct()
 
 @dataclass(frozen=True)
 class FrontPoint:
-    """One point of a front.
+    """One point of a front: the mass allowed (infinite where nothing is asked of it) and used on shafts [kg].
 
-    Attributes
-    ----------
-    mass_limit, mass
-        Allowed and used on balancer shafts [kg]; infinite where nothing is asked of the mass.
-    force, lower_bound
-        Least objective at this limit, and what no design within it falls below [SI].
-    price
-        Fall of the least objective per kilogram more [SI / kg]; zero where the limit does
-        not bind, and at no mass at all, where the solver's price has nothing to vary.
+    The least objective at this limit, what no design within it falls below, and the fall per
+    kilogram more [SI / kg]; that is zero where the limit does not bind, and at no mass at all,
+    where the solver's price has nothing to vary.
     """
 
     mass_limit: float

@@ -25,20 +25,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Point:
-    """One piece of work of a part, not yet done.
+    """One piece of work of a part: a scene, values put into it by their paths, a metric in place of its objective.
 
-    Attributes
-    ----------
-    case
-        The scene.
-    changes
-        Values put into it, by their paths.
-    metric
-        In place of the scene's own objective.
-    shafts
-        Balancer shafts kept; all when None.
-    base
-        Tables to start from, in place of those of the case's problem file.
+    Of balancer shafts those named are kept, all when None; it starts from `base` in place of
+    the tables of the case's problem file.
     """
 
     case: CaseTable
@@ -52,13 +42,7 @@ class Point:
 
 
 class Scenes:
-    """Problem files of a study, each read once.
-
-    Parameters
-    ----------
-    folder
-        That problem files are named from.
-    """
+    """Problem files of a study, named from its folder, each read once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -145,21 +145,11 @@ def mean_mount_forces(problem: Problem, tolerances: Tolerances, builds: int, see
 
 @dataclass(frozen=True)
 class Spread:
-    """What tolerances do to the free force of one engine [N].
+    """What tolerances do to the free force of one engine [N], at a crank speed [rad/s].
 
-    Attributes
-    ----------
-    nominal
-        Largest over the cycle, of the engine as drawn.
-    worst
-        Largest that each cause adds, by its name.
-    mean, random
-        Of what is added at random: its mean, and what each share (SHARES) of engines stays below.
-    mount, mount_random
-        Mean mount force of the engine as drawn, and what each share of engines as built stays
-        below; NaN without mounts.
-    speed
-        Of the crank [rad/s].
+    The largest over the cycle of the drawing, and the worst that each cause adds; the mean of
+    what is added at random, and what each share (SHARES) of engines stays below. Of the mean
+    mount force the same, as drawn and at random; NaN without mounts.
     """
 
     nominal: float

@@ -18,23 +18,7 @@ full load five, and the study prints neither."""
 
 @dataclass(frozen=True)
 class Verdict:
-    """One statement, confirmed or not.
-
-    Attributes
-    ----------
-    statement
-        What is claimed.
-    paper
-        The study's number or judgement.
-    ours
-        The same quantity here.
-    unit
-        Of `ours`.
-    agrees
-        Whether the statement is confirmed.
-    why
-        The tolerance that was allowed, or what explains the difference.
-    """
+    """One statement, what the study says and what is found here, and the tolerance or the reason that decides."""
 
     statement: str
     paper: str

@@ -34,16 +34,10 @@ _ALLOWED = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted r
 
 @dataclass(frozen=True)
 class Worth:
-    """What one set of shafts does, and whether it is worth building (W3).
+    """What one set of shafts does, and whether and why it is worth building (W3).
 
-    Attributes
-    ----------
-    fall, further_fall
-        Share that it takes off the plain engine's force, and off the least of any smaller number of shafts.
-    beside_next
-        Its force over that of the first plain engine with more cylinders at equal power.
-    why
-        The rule that decides, in words.
+    Shares that it takes off the plain engine's force, and off the least of any smaller number of
+    shafts; its force over that of the first plain engine with more cylinders at equal power.
     """
 
     build: str

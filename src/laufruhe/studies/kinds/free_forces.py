@@ -47,12 +47,7 @@ _WORDS = {
 class FreeLoad:
     """What the pistons of an engine leave of one order, largest over a turn, over one cylinder's [1].
 
-    Attributes
-    ----------
-    force, couple
-        Couples over force times the spacing.
-    force_against, couple_against
-        The part that turns against the crank, which no crank weight takes.
+    Couples over force times the spacing; against is what turns against the crank, which no crank weight takes.
     """
 
     force: float
@@ -64,12 +59,7 @@ class FreeLoad:
 def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
     """Free force and couple of the reciprocating masses in an order, about the middle of the engine.
 
-    Parameters
-    ----------
-    order
-        Of crank speed.
-    spacing
-        Unit of length of the couples [m].
+    Order of crank speed; the spacing is the unit of length of the couples [m].
 
     Raises
     ------
