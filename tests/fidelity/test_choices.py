@@ -7,7 +7,7 @@ import random
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,8 @@ from fidelity.scenes import random_elastic_problem, random_problem
 from laufruhe.errors import InputError, ModelError
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import reference
+from laufruhe.fidelity.knobs import KNOBS
+from laufruhe.files.file_models import FidelityTable
 from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.norms import NORMS
@@ -200,3 +202,18 @@ def test_uneven_speed_from_a_file(tmp_path: Path) -> None:
 def test_no_orders_is_refused() -> None:
     with pytest.raises(ModelError, match="orders"):
         Fidelity(orders=0)
+
+
+def test_every_choice_has_its_knob() -> None:
+    """What a fidelity holds, a file may say, and one object answers for."""
+    keys = [knob.key for knob in KNOBS]
+    assert sorted([*keys, "tolerance"]) == sorted(field.name for field in fields(Fidelity))
+    assert set(FidelityTable.model_fields) == {*keys, "tolerance"}
+    assert all(hasattr(Fidelity(), key) for key in keys)
+
+
+def test_rods_of_any_mechanism_count() -> None:
+    """Whether rods have inertia of their own is asked of how they move, not of one mechanism's number."""
+    parts = tuple(replace(part, rod_inertia_deficit=-0.004) for part in tractor.engine((0, 120, 240)).slider_cranks)
+    text = " ".join(choose(tractor.problem(replace(tractor.engine((0, 120, 240)), slider_cranks=parts), []), 1e-6).kept)
+    assert "inertia of the rods" in text

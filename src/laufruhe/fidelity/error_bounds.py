@@ -21,7 +21,7 @@ from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import rotor_wrench
 from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
-from laufruhe.problem.measure import Measure, selected
+from laufruhe.problem.measure import Measure, Term, selected
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -44,24 +44,6 @@ def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
     found = evaluation.signals(channel) if isinstance(channel, LoadChannel) else []
     cycle = evaluation.engine.cycle
     return [selected(measure, signal, evaluation.mount_names) for signal in over(cycle.base_order, found)]
-
-
-def shares(measure: Measure, evaluation: Evaluation) -> Array:
-    """Weight of every operating point in a measure, zero where it does not count."""
-    return measure.shares([loads.point for loads in evaluation.loads])
-
-
-def sampling_bound(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-    """Largest error of a load that its samples can make (F7, F8), in its own unit."""
-    found, share = signals(measure, evaluation), shares(measure, evaluation)
-    return measure.norm.sampling_bound(found, share, evaluation.samples, finest)
-
-
-def left_out(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
-    """What a load can at most change by when their signals take the place of ours (F6)."""
-    pairs = zip(signals(measure, ours), signals(measure, theirs), strict=True)
-    difference = [x + Spectrum(y.base, -y.coefficients) for x, y in pairs]
-    return measure.norm.above(difference, shares(measure, theirs))
 
 
 def relative(bound: float, value: float) -> float:
@@ -89,11 +71,25 @@ class Scale:
 
     def lost(self, ours: Evaluation, theirs: Evaluation) -> float:
         """What the objective can at most change by when their signals take the place of ours (F6)."""
-        return sum(term.weight * left_out(term.measure, ours, theirs) for term in self.terms)
+        total = 0.0
+        for term in self.terms:
+            pairs = zip(signals(term.measure, ours), signals(term.measure, theirs), strict=True)
+            left_out = [x + Spectrum(y.base, -y.coefficients) for x, y in pairs]
+            total += term.weight * term.measure.norm.above(left_out, self._shares(term))
+        return total
 
     def missed(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
         """What the samples of an evaluation miss of the objective at most (F7, F8)."""
-        return sum(term.weight * sampling_bound(term.measure, evaluation, finest) for term in self.terms)
+        steps = evaluation.samples
+        return sum(
+            term.weight
+            * term.measure.norm.sampling_bound(signals(term.measure, evaluation), self._shares(term), steps, finest)
+            for term in self.terms
+        )
+
+    def _shares(self, term: Term) -> Array:
+        """Weight of every operating point in a term, zero where it does not count."""
+        return term.measure.shares([loads.point for loads in self.best.loads])
 
     @cached_property
     def doubted(self) -> float:

@@ -16,6 +16,7 @@ from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale
 from laufruhe.fidelity.knob import Knob, LeftOut, Rungs, first_enough, part_left_out
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity, Kinematics, MountModel, RodModel
+from laufruhe.physics.mechanism import rod_effects
 from laufruhe.physics.wrench import WRENCH
 from laufruhe.problem.problem import Problem
 
@@ -94,7 +95,7 @@ class _Rod(_WholePart):
     whole: ClassVar = {"rod": "rigid"}
 
     def is_there(self, problem: Problem) -> bool:
-        return any(part.rod_inertia_deficit != 0.0 for part in problem.engine.slider_cranks)
+        return any(rod_effects(part, EXACT) for part in problem.engine.slider_cranks)
 
     def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return ["inertia of the rods beyond that of two masses"] if self.is_kept(scale.problem, fidelity) else []

@@ -38,28 +38,21 @@ class Fidelity:
     samples
         Steps over the working cycle at which measures are taken.
     orders
-        Last order of crank speed kept of the loads of pistons, rods and gas; every
-        order when None. Rotors keep theirs: they have one each.
+        Last order of crank speed kept of pistons, rods and gas, all when None. Rotors have one each, and keep it.
     rod
         "rigid", or "mass-only": two masses without the inertia that they get wrong.
-    gas
-        Whether the working gas loads the engine.
-    gas_orders
-        Last order of crank speed kept of the gas alone; those of `orders` when None.
-    gas_samples
-        Steps over the cycle at which gas torque is taken; those of `samples` when None.
+    gas, gas_orders, gas_samples
+        Whether the working gas counts; the last order kept of it alone, and the steps over
+        the cycle at which its torque is taken, those of `orders` and `samples` when None.
     crank_inertia
-        Of everything that turns with the crank [kg m2], at crank speed. Infinite for a
-        crank that turns evenly; a finite one speeds up and slows down within the cycle.
+        Of all that turns with the crank [kg m2], at crank speed; a finite one turns unevenly.
     mounts
-        How a block on elastic mounts answers: order by order ("frequency"), as if no
-        mount gave way ("rigid"), or by integration in time ("time"), bump stops
-        included. Mounts of an engine without a block are rigid at every choice.
+        How a block on elastic mounts answers: order by order ("frequency"), as if no mount gave
+        way ("rigid"), or by integration in time ("time"), bump stops included.
     modes
         Natural modes that answer, 1 the lowest; all that are excited when None.
     tolerance
-        Relative error of the objective that was asked of an automatic choice; None for
-        one made by hand.
+        Relative error of the objective that an automatic choice was asked for.
 
     Raises
     ------

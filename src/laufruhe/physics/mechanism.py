@@ -21,6 +21,7 @@ from laufruhe.machine import SliderCrank
 from laufruhe.machine.slider_crank import Motion
 from laufruhe.physics import order_coefficients
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.wrench import plane_wrench
 
 ComplexArray: TypeAlias = NDArray[np.complex128]
 
@@ -87,6 +88,16 @@ def momentum_loads(part: SliderCrank, motion: Motion, square: Any, turning: Any 
     for inertia, (rate, acceleration) in motion.swings:
         rods = rods + inertia * (acceleration * square + rate * turning) * (1.0 - ratio * rate)
     return force, roll, rods
+
+
+def cylinder_wrench(part: SliderCrank, motion: Motion, axis: Any, square: Any, turning: Any = 0.0,
+                    with_rods: bool = True) -> Any:  # fmt: skip
+    """Wrench of `momentum_loads`, shape (6, ...), of a cylinder whose axis is a unit number (C4)."""
+    force, roll, rods = momentum_loads(part, motion, square, turning)
+    force = force * axis
+    wrench = plane_wrench(force.imag, force.real, part.x, part.shaft)
+    wrench[3] += roll + rods if with_rods else roll
+    return wrench
 
 
 def _slider_crank(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:

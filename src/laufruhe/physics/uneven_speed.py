@@ -21,7 +21,7 @@ from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_loads
-from laufruhe.physics.mechanism import momentum_loads
+from laufruhe.physics.mechanism import cylinder_wrench
 from laufruhe.physics.wrench import plane_wrench
 
 Array = NDArray[np.float64]
@@ -175,11 +175,8 @@ def _alpha(part: SliderCrank, phi: Array) -> Array:
 def _slider_loads(part: SliderCrank, motion: CrankMotion, fidelity: Fidelity) -> Array:
     """Loads of one piston and its rods, shape (n, 6): L7 with d2/dt2 in full (F5)."""
     square, turning = (part.shaft.ratio * motion.speed) ** 2, part.shaft.ratio * motion.acceleration
-    force, roll, rods = momentum_loads(part, part.motion(np, _alpha(part, motion.angle)), square, turning)
-    force = force * cis(as_turn(part.bank))
-    wrench = plane_wrench(force.imag, force.real, part.x, part.shaft).T
-    wrench[:, 3] += roll + rods if fidelity.rod == "rigid" else roll
-    return wrench
+    moving, axis = part.motion(np, _alpha(part, motion.angle)), cis(as_turn(part.bank))
+    return np.asarray(cylinder_wrench(part, moving, axis, square, turning, with_rods=fidelity.rod == "rigid").T)
 
 
 def _rotor_loads(rotors: Sequence[Rotor], motion: CrankMotion) -> Array:

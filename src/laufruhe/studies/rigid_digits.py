@@ -23,7 +23,7 @@ from laufruhe.numerics.spectrum import spectrum_of
 from laufruhe.numerics.turns import Turn, as_turn
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_torque
-from laufruhe.physics.mechanism import momentum_loads
+from laufruhe.physics.mechanism import cylinder_wrench
 from laufruhe.physics.rigid_body import point_motion
 from laufruhe.physics.wrench import plane_wrench
 from laufruhe.problem import channels
@@ -109,10 +109,8 @@ def _cylinder(part: SliderCrank, turn: Any, speed: float) -> Digits:
     """Piston, rods and the rotating mass of one cylinder (L1-L4, L7)."""
     ratio = mpmath.mpf(part.shaft.ratio)
     alpha = 2 * mpmath.pi * (ratio * turn + _exact(part.star_turn))
-    force, roll, rods = momentum_loads(part, part.motion(mpmath, alpha), (ratio * mpmath.mpf(speed)) ** 2)
-    force *= mpmath.expjpi(2 * _exact(as_turn(part.bank)))
-    load = plane_wrench(force.imag, force.real, part.x, part.shaft)
-    load[3] += roll + rods
+    axis, square = mpmath.expjpi(2 * _exact(as_turn(part.bank))), (ratio * mpmath.mpf(speed)) ** 2
+    load = cylinder_wrench(part, part.motion(mpmath, alpha), axis, square)
     pin = mpmath.mpf(part.rotating_mass) * mpmath.mpf(part.crank_radius)
     return np.asarray(
         load + _rotor(Rotor("pin", part.x, 0.0, part.shaft), pin, _exact(as_turn(part.throw)), turn, speed)
