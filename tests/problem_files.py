@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 from laufruhe.files.reader import load
 from laufruhe.problem.problem import Problem
+
+PROBLEMS = Path(__file__).parents[1] / "problems"
+_TABLES = {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in sorted(PROBLEMS.glob("*.toml"))}
+# a study file is no problem
+READY = [path for path, table in _TABLES.items() if "study" not in table]
+ELASTIC = [path for path in READY if _TABLES[path].get("mounts", {}).get("kind") == "elastic"]
 
 # further keys of [engine] may follow
 FOUR = """

@@ -6,12 +6,13 @@ import sys
 import time
 from dataclasses import replace
 
-from pages import PAGES, ROOT, publish
+from pages import PAGES, publish
 
 from laufruhe.files.reader import load
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from laufruhe.solvers.mount_convex import is_convex
+from problem_files import ELASTIC
 
 SEEDS = range(10)
 # of an open star; all of them are looked at by the ready problem itself
@@ -20,9 +21,7 @@ STARS = 12
 
 def elastic_problems() -> list[Problem]:
     """Ready problems that leave mounts open."""
-    # a study file is no problem, and the others are not read for nothing
-    files = [p for p in sorted((ROOT / "problems").glob("*.toml")) if 'kind = "elastic"' in p.read_text("utf-8")]
-    return [problem for problem in map(load, files) if problem.mount_decisions]
+    return [problem for problem in map(load, ELASTIC) if problem.mount_decisions]
 
 
 def row_of(problem: Problem) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -13,17 +12,13 @@ import numpy as np
 from pages import PAGES, ROOT, publish, spent
 from scipy.optimize import minimize
 
-from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import objective_value
-
-sys.path.insert(0, str(ROOT / "tests"))
-
 from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.cores import processors
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.speed_map import speed_map, split_loads
-from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.mount_nonlinear import ITERATIONS, solve_joint
 from laufruhe.solvers.mount_starts import start_points

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pages import PAGES, ROOT, publish, spent
+from pages import PAGES, publish, spent
 
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import Engine, Mount, OperatingPoint, Rotor
@@ -95,7 +95,6 @@ def mount_forces(engine: Engine, wrench: FloatArray) -> FloatArray:
 
 def scene() -> Scene:
     """The four-cylinder of the validation tests on four mounts."""
-    sys.path.insert(0, str(ROOT / "tests"))
     # exudyn reads this on import: the build without range checks
     vars(sys)["exudynFast"] = True
     multibody = import_module("validation.multibody")

@@ -6,19 +6,18 @@ Writes results/benchmarks/trade.md, and the page of each problem to results/trad
 from __future__ import annotations
 
 import re
-import tomllib
 
-from pages import PAGES, ROOT, publish
+from pages import PAGES, publish
 
 from laufruhe.cli.fidelity import traded
+from problem_files import READY
 
 FOLDER = PAGES.parent / "trade"
 
 
 def main() -> None:
     """Measure, and keep the table alone."""
-    files = sorted((ROOT / "problems").glob("*.toml"))
-    traded([path for path in files if "study" not in tomllib.loads(path.read_text("utf-8"))], FOLDER, print)
+    traded(READY, FOLDER, print)
     # the pages of single problems are not kept
     text = re.sub(r"\[([\w-]+)\]\(\1\.md\)", r"`\1`", (FOLDER / "README.md").read_text(encoding="utf-8"))
     publish(PAGES / "trade.md", text)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+# what tests share is shared with benchmarks
+sys.path.insert(0, str(ROOT / "tests"))
 # The rest of results/ is what the commands write, and not committed.
 PAGES = ROOT / "results" / "benchmarks"
 

@@ -28,11 +28,8 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
-from problem_files import written
+from problem_files import ELASTIC, PROBLEMS, written
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
-TEXTS = {path: path.read_text(encoding="utf-8") for path in sorted(PROBLEMS.glob("*.toml"))}
-READY = [path for path, text in TEXTS.items() if 'kind = "elastic"' in text and "\n[engine]\n" in text]
 QUICK, AUTOMATIC = 60, 20
 # five hundred engines, a hundred at a time
 SHARES, SHARE = 5, 100
@@ -85,7 +82,7 @@ def _held(path: Path) -> Problem:
     return replace(held, limits=(), objective=objective)
 
 
-@pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", ELASTIC, ids=lambda path: path.stem)
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-3])
 def test_automatic_on_ready_engines(path: Path, tolerance: float) -> None:
     _keeps_its_word(replace(_held(path), decisions=()), tolerance)
@@ -121,7 +118,7 @@ def test_modes_and_motion_are_really_dropped() -> None:
     assert any("nothing excites them" in part.why for part in symmetric.left_out)
 
 
-@pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", ELASTIC, ids=lambda path: path.stem)
 def test_modes_that_nothing_excites_answer_nothing(path: Path) -> None:
     """Motion by the whole matrices in the coordinates of the block, nothing left out."""
     problem = _held(path)

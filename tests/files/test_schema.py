@@ -14,13 +14,9 @@ import pytest
 
 from laufruhe.files import schema
 from laufruhe.files.reader import load
+from problem_files import READY
 
-FILES = sorted(
-    path
-    for path in (Path(__file__).parents[2] / "problems").glob("*.toml")
-    if "engine" in tomllib.loads(path.read_text(encoding="utf-8"))
-)
-LANCHESTER = next(path for path in FILES if path.stem == "tractor-four-lanchester")
+LANCHESTER = next(path for path in READY if path.stem == "tractor-four-lanchester")
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +31,7 @@ def test_shipped_schema_is_the_generated_one() -> None:
     assert schema.shipped() == schema.generated()
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
 def test_ready_problems_validate(path: Path, validator: jsonschema.Draft202012Validator) -> None:
     """Editors find nothing wrong with what the reader takes."""
     validator.validate(tomllib.loads(path.read_text(encoding="utf-8")))

@@ -16,10 +16,8 @@ from laufruhe.load_models.batch_engines import EngineArrays, EngineFamily
 from laufruhe.machine import OperatingPoint
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
+from problem_files import PROBLEMS, READY
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
-# a study file has no engine of its own
-READY = sorted(path for path in PROBLEMS.glob("*.toml") if "\n[engine]\n" in path.read_text(encoding="utf-8"))
 COUNT = 12
 
 
