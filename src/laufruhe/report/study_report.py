@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
 
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
@@ -13,9 +15,6 @@ from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.replication.judging import counted
 from laufruhe.studies.text import Rows, Text
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def file_names(study: StudyFile) -> list[str]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
@@ -16,9 +17,6 @@ from laufruhe.solvers import solve, state
 from laufruhe.solvers.result import Result
 from laufruhe.studies.part import Record, variable
 from laufruhe.studies.scenes import Point
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 AS_GIVEN, FAILED = "as given", "failed"
 _WORDS = {
@@ -102,8 +100,6 @@ def dataset(
     about
         Attributes.
     """
-    import xarray as xr
-
     mounts = list(dict.fromkeys(name for record in records for name in record["mean"]))
     units = {name: unit for record in records for name, unit in record["units"].items()}
     metrics = {record["metric"]: record["unit"] for record in records if record["metric"]}

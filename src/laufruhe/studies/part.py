@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
+import xarray as xr
 from pydantic import Field
 
 from laufruhe.files.fields import Table
@@ -12,9 +13,6 @@ from laufruhe.files.study_parts import CaseTable
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Record: TypeAlias = dict[str, Any]
 

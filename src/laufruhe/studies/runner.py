@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from laufruhe.studies.kept import KeptPoints
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.scenes import Scenes
 from laufruhe.studies.work import answers
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def run(

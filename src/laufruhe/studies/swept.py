@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import xarray as xr
 from pydantic import Field
 
 from laufruhe.files.file_models import QuantityName
@@ -18,9 +19,6 @@ from laufruhe.studies.part import Part, Record
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept_shown import by_point
 from laufruhe.studies.text import Text
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 class SweptPart(Part):

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from laufruhe.present.numbers import number as figures
 from laufruhe.present.numbers import percent
 from laufruhe.studies import picture as p
 from laufruhe.studies.text import NOTHING, Rows, Text, number
 from laufruhe.units import readable
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 MOST_ROWS, MOST_DOTS = 80, 40
 NEGLIGIBLE = 1e-9

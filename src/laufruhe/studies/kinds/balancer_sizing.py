@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+import xarray as xr
 
 from laufruhe.problem.measure import Measure, counted_rotors
 from laufruhe.problem.problem import Problem
@@ -19,9 +20,6 @@ from laufruhe.studies.shafts import refuse_open_phasing, shafts_of, with_shafts
 from laufruhe.studies.swept import SweptPart
 from laufruhe.studies.swept_shown import bars, by_point, over_sweep, swept_names
 from laufruhe.studies.text import Text
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 MOST_GROUPS = 6
 

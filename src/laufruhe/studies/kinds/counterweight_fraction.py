@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+import xarray as xr
 
 from laufruhe.files.study_paths import at
 from laufruhe.files.study_sweeps import Axis
@@ -25,9 +26,6 @@ from laufruhe.studies.swept_shown import (
     swept_axis,
     swept_names,
 )
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _FRACTION = "balance_fraction"
 

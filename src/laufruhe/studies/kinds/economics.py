@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+import xarray as xr
 from pydantic import Field, field_validator, model_validator
 
 from laufruhe.errors import ModelError, SolverError
@@ -26,9 +27,6 @@ from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.shafts import refuse_open_phasing, shafts_of, with_shafts
 from laufruhe.studies.text import NOTHING, Rows, Text, number, said
 from laufruhe.studies.worth import verdicts, worths
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 LINE = 0.052
 """Height of a line of text over that of its panel."""

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+import xarray as xr
 from pydantic import Field
 
 from laufruhe.errors import ModelError
@@ -28,9 +29,6 @@ from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Rows, Text
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 ORDERS, WHAT = (1, 2), ("force", "couple")
 SPEED = 100.0
@@ -129,8 +127,6 @@ class FreeForces(Part):
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
         """Layouts side by side; NaN where the literature has nothing."""
-        import xarray as xr
-
         along = ("case", "order")
         table = {
             name: variable(along, [[load[name] for load in record["loads"]] for record in records], words)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
+
+import xarray as xr
 
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import SweptPart
 from laufruhe.studies.swept_shown import bars, claimed, over_sweep, swept_names
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _SAME = 1e-9
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
@@ -30,9 +31,6 @@ from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import NOTHING, Rows, Text, number
 from laufruhe.units import readable
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Array = NDArray[np.float64]
 DesignName = Literal["as given", "as decided"]
@@ -150,8 +148,6 @@ class SpeedMap(Part):
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """A point for every case, design and speed, in that order; NaN on a resonance that nothing damps."""
-        import xarray as xr
-
         units = {name: unit for record in records for name, unit in record["measures"]}
         each = [
             _one(point.case.name, design, own, record)
@@ -255,8 +251,6 @@ def _limits(problem: Problem, measure: Measure, load: OperatingPoint, speeds: Ar
 
 def _one(case: str, design: str, own: Mapping[str, Any], record: Mapping[str, Any]) -> xr.Dataset:
     """One design of one case at every speed."""
-    import xarray as xr
-
     speeds = [float(f"{PER_RAD * speed:.12g}") for speed in record["speeds"]]
     count, names = len(speeds), [name for name, _ in record["measures"]]
     return xr.Dataset(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+import xarray as xr
 from pydantic import Field, model_validator
 
 from laufruhe.files import fields as f
@@ -19,9 +20,6 @@ from laufruhe.studies.part import Part, Record
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Rows, Text, number, said
 from laufruhe.studies.tolerance import CAUSES, Spread, Tolerances, compared, rise_of, spread, verdicts
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 LEAST = 0.1
 """Left end of the axis [kp]; what is smaller stands there with its value."""
