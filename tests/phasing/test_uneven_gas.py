@@ -70,7 +70,9 @@ def test_every_order_is_that_of_the_exact_model(tmp_path, name):
     for _ in range(3):
         at, exact = moved(moves, rng.uniform(-0.25, 0.25, moves.size))
         wrench = evaluate(exact).loads[0].wrench
-        smooth = {h: np.array(c, dtype=float) for h, c in model.wrench(exact.points[0], at).items()}
+        lines = model.wrench(exact.points[0], at)
+        parts = [np.array(part, dtype=float) for part in (lines.real, lines.imaginary)]
+        smooth = {float(h): np.stack([part[:, k] for part in parts], axis=1) for k, h in enumerate(lines.orders)}
         assert 0.0 in smooth
         assert max(abs(smooth[h]).max() for h in smooth if h not in (0.0, 1.0, 2.0)) > 10.0
         peak = np.abs(wrench.sample(480)).max(axis=0)

@@ -110,12 +110,9 @@ class MovedThrows:
         return [self._wrenches_at(point, moved) for point in self._problem.points]
 
     def _wrenches_at(self, point: OperatingPoint, moved: Array) -> SymbolicLoads:
-        found = sorted(self._model.wrench(point, self._at).items())
-        parts = [ca.DM(moved) @ ca.horzcat(*(wrench[:, side] for _, wrench in found)) for side in (0, 1)]
-        sizes = self._sizes(parts)
-        kept = [int(k) for k in _felt(sizes, np.array([h for h, _ in found]))]
-        orders = np.array([found[k][0] for k in kept])
-        return SymbolicLoads(orders, float(base_of(orders.tolist())), parts[0][:, kept], parts[1][:, kept])
+        found = self._model.wrench(point, self._at).mapped(moved)
+        kept = found.kept(_felt(self._sizes([found.real, found.imaginary]), found.orders))
+        return SymbolicLoads(kept.orders, float(base_of(kept.orders.tolist())), kept.real, kept.imaginary)
 
     def _sizes(self, parts: Sequence[Any]) -> Array:
         """Largest component of every order over designs drawn at random: a star that cancels shows nothing itself."""

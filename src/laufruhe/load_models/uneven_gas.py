@@ -11,9 +11,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
+from laufruhe.load_models.lines import Lines, turned
 from laufruhe.machine import GasModel, OperatingPoint, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.gas_loads import gas_coefficients
@@ -39,8 +39,8 @@ class GasMoments:
 
     def at(
         self, point: OperatingPoint, stars: Sequence[Any], gain: Callable[[float], float] | None = None
-    ) -> list[tuple[float, Any]]:
-        """Moment (re, im), shape (1, 2), of every order that is kept [N m].
+    ) -> list[Lines]:
+        """Moment of every cylinder, shape (1, n), the orders that are kept [N m].
 
         Parameters
         ----------
@@ -52,19 +52,13 @@ class GasMoments:
         gas = self._problem.fidelity.gas_of(point)
         if gas is None:
             return []
-        total: dict[float, Any] = {}
+        found = []
         for k, (part, star) in enumerate(zip(self._problem.engine.slider_cranks, stars, strict=True)):
             series = self._series(gas, k)
             if gain is not None:
                 series = _felt(series, gain, self._left_out)
-            orders, c = ca.DM(series.orders), series.coefficients
-            phases = orders * (star - math.tau * _turns(part))
-            cosine, sine = ca.cos(phases), ca.sin(phases)
-            real, imaginary = ca.DM(c.real.copy()), ca.DM(c.imag.copy())
-            moment = ca.horzcat(real * cosine - imaginary * sine, real * sine + imaginary * cosine)
-            for j, h in enumerate(series.orders):
-                total[float(h)] = total.get(float(h), 0.0) + moment[j, :]
-        return sorted(total.items())
+            found.append(turned(series.orders, series.coefficients, star - math.tau * _turns(part)))
+        return found
 
     def _series(self, gas: GasModel, k: int) -> Spectrum:
         """Of one cylinder, the orders that matter."""

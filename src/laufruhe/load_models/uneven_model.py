@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.load_models.lines import Lines, summed, turned
 from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
 from laufruhe.load_models.mount_symbols import waves
 from laufruhe.load_models.uneven_gas import LEFT_OUT, GasMoments
@@ -102,14 +103,14 @@ class UnevenModel:
         for point in chosen:
             share = point.weight / whole
             if measure.norm.is_euclidean:
-                for h, places in self._signal(measure, point, at):
-                    half = 1.0 if h == 0.0 else 0.5
-                    blocks += [c.T for c in places]
-                    weights.append(np.full(2 * len(places), share * half / len(places)))
+                found = self._signal(measure, point, at)
+                half = np.where(found[0].orders == 0.0, 1.0, 0.5) * share / len(found)
+                blocks += [part.T for place in found for part in (place.real, place.imaginary)]
+                weights += [half] * (2 * len(found))
             else:
-                found = self._vectors(measure, point, at)
-                blocks += found
-                weights.append(np.full(len(found) * found[0].shape[0], share / len(found) / found[0].shape[0]))
+                places = self._vectors(measure, point, at)
+                blocks += places
+                weights.append(np.full(len(places) * places[0].shape[0], share / len(places) / places[0].shape[0]))
         return ca.vertcat(*blocks), Grid(np.concatenate(weights), blocks[0].shape[0])
 
     def _vectors(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Any]:
@@ -118,28 +119,23 @@ class UnevenModel:
             # one map for all orders: the wrench alone is sampled
             values = _sampled(self._counted(quantity, point, at))
             return [values @ ca.DM(m.real).T for m in self._maps(quantity, 0.0, point)]
-        signal = self._signal(quantity, point, at)
-        return [_sampled([(h, parts[m]) for h, parts in signal]) for m in range(len(signal[0][1]))]
+        return [_sampled(place) for place in self._signal(quantity, point, at)]
 
-    def _signal(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[tuple[float, list[Any]]]:
-        """Per order, the vectors (re, im), shape (d, 2), of each mount or of the block."""
+    def _signal(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
+        """What a channel has of each mount, or of the block."""
         counted = self._counted(quantity, point, at)
         if isinstance(quantity.channel, LoadChannel) and quantity.channel.part is not None:
-            return [(h, [wrench[quantity.channel.part, :]]) for h, wrench in counted]
-        out = []
-        for h, wrench in counted:
-            turned = ca.horzcat(-wrench[:, 1], wrench[:, 0])
-            maps = self._maps(quantity, h, point)
-            out.append((h, [ca.DM(m.real) @ wrench + ca.DM(m.imag) @ turned for m in maps]))
-        return out
+            return [counted.mapped(np.eye(6)[quantity.channel.part])]
+        by_order = [self._maps(quantity, float(h), point) for h in counted.orders]
+        return [counted.mapped_each([maps[m] for maps in by_order]) for m in range(len(by_order[0]))]
 
-    def _counted(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[tuple[float, Any]]:
-        """Wrench coefficients of the orders that count."""
+    def _counted(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> Lines:
+        """Wrench of the orders that count."""
         # a block on soft mounts feels the first orders of its gas alone
         gain = self._gain(quantity, point) if quantity.on_mounts else None
-        found = sorted(self.wrench(point, at, gain).items())
-        counted = [(h, wrench) for h, wrench in found if quantity.counted([h])[0]]
-        return counted or [(1.0, ca.DM.zeros(6, 2))]
+        found = self.wrench(point, at, gain)
+        counted = np.flatnonzero(quantity.counted(found.orders))
+        return found.kept(counted) if len(counted) else Lines(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
 
     def _maps(self, quantity: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
         """Force per wrench of every mount that counts, its directions weighted."""
@@ -165,26 +161,18 @@ class UnevenModel:
             return None
         return lambda h: float(np.abs(self._map(quantity, h, point.speed)[:, :, 3]).max())
 
-    def wrench(
-        self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float] | None = None
-    ) -> dict[float, Any]:
-        """Wrench coefficients (re, im) by order, shape (6, 2); gas of the orders that a gain leaves to matter."""
-        total: dict[float, Any] = {}
+    def wrench(self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float] | None = None) -> Lines:
+        """Wrench by order; gas of the orders that a gain leaves to matter."""
         parts = self.problem.engine.slider_cranks
-        for k, part in enumerate(parts):
-            for h, wrench in self._cylinder(k, part, point.speed, at):
-                total[h] = total.get(h, 0.0) + wrench
+        found = [lines for k, part in enumerate(parts) for lines in self._cylinder(k, part, point.speed, at)]
+        roll = np.eye(6)[:, 3:4]
         stars = [self._star(k, part, at) for k, part in enumerate(parts)]
-        for h, moment in self._gas.at(point, stars, gain):
-            wrench = ca.vertcat(ca.DM.zeros(3, 2), moment, ca.DM.zeros(2, 2))
-            total[h] = total.get(h, 0.0) + wrench
+        found += [moment.mapped(roll) for moment in self._gas.at(point, stars, gain)]
         for rotor in self.problem.engine.rotors:
-            order = abs(rotor.shaft.ratio)
-            real, imaginary = (rotor_wrench(replace(rotor, unbalance=u), point.speed) for u in (1.0, 1.0j))
+            pair = [rotor_wrench(replace(rotor, unbalance=u), point.speed) for u in (1.0, 1.0j)]
             u = self._unbalance(rotor, at)
-            rows = _columns(real) @ u[0] + _columns(imaginary) @ u[1]
-            total[order] = total.get(order, 0.0) + rows
-        return total
+            found.append(_turning(pair, abs(rotor.shaft.ratio), u[0], u[1]))
+        return summed(found)
 
     def _place(self, k: int, part: SliderCrank, at: Symbols) -> tuple[Any, Any]:
         """Angle of a cylinder's own pin, and of its bank."""
@@ -198,25 +186,24 @@ class UnevenModel:
         angle, bank = self._place(k, part, at)
         return angle - bank
 
-    def _cylinder(self, k: int, part: SliderCrank, speed: float, at: Symbols) -> list[tuple[float, Any]]:
+    def _cylinder(self, k: int, part: SliderCrank, speed: float, at: Symbols) -> list[Lines]:
         angle, bank = self._place(k, part, at)
-        axial, across, roll = inertia_coefficients(part, speed, self.problem.fidelity)
-        star = angle - bank
-        size = np.abs(axial).max() + np.abs(across).max() + np.abs(roll).max() / part.crank_radius
-        zero = ca.DM.zeros(1, 2)
-        out = []
-        for h in range(1, len(axial)):
-            if max(abs(axial[h]), abs(across[h]), abs(roll[h]) / part.crank_radius) <= NEGLIGIBLE * size:
-                continue
-            along, side, moment = (_times(series[h], h * star) for series in (axial, across, roll))
-            lateral = along * ca.sin(bank) + side * ca.cos(bank)
-            vertical = along * ca.cos(bank) - side * ca.sin(bank)
-            out.append((float(h), ca.vertcat(zero, lateral, vertical, moment, -part.x * vertical, part.x * lateral)))
+        series = inertia_coefficients(part, speed, self.problem.fidelity)
+        sizes = np.array([np.abs(each) for each in series]) / np.array([[1.0], [1.0], [part.crank_radius]])
+        felt = sizes.max(axis=0) > NEGLIGIBLE * sizes.max(axis=1).sum()
+        orders = np.flatnonzero(felt & (np.arange(len(felt)) > 0)).astype(float)
+        along, side, moment = (turned(orders, each[orders.astype(int)], angle - bank) for each in series)
+        cosine, sine = ca.cos(bank), ca.sin(bank)
+        parts = []
+        for a, s, m in ((along.real, side.real, moment.real), (along.imaginary, side.imaginary, moment.imaginary)):
+            lateral, vertical = a * sine + s * cosine, a * cosine - s * sine
+            parts.append(ca.vertcat(ca.DM.zeros(1, len(orders)), lateral, vertical, m, -part.x * vertical,
+                                    part.x * lateral))  # fmt: skip
+        out = [Lines(orders, *parts)]
         if part.rotating_mass > 0.0:
             mass = part.rotating_mass * part.crank_radius
-            pair = (rotor_wrench(Rotor("pin", part.x, u * mass, part.shaft), speed) for u in (1.0, 1.0j))
-            real, imaginary = (_columns(wrench) for wrench in pair)
-            out.append((abs(part.shaft.ratio), real * ca.cos(angle) + imaginary * ca.sin(angle)))
+            pair = [rotor_wrench(Rotor("pin", part.x, u * mass, part.shaft), speed) for u in (1.0, 1.0j)]
+            out.append(_turning(pair, abs(part.shaft.ratio), ca.cos(angle), ca.sin(angle)))
         return out
 
     def _unbalance(self, rotor: Rotor, at: Symbols) -> Any:
@@ -248,25 +235,20 @@ def _throw_of(parts: Sequence[SliderCrank], layout: Layout, pin: int) -> float:
     return parts[k].throw - layout.pin_offsets[k]
 
 
-def _times(coefficient: complex, angle: Any) -> Any:
-    """c e^{i angle} as a row (re, im)."""
-    cosine, sine = ca.cos(angle), ca.sin(angle)
-    a, b = float(coefficient.real), float(coefficient.imag)
-    return ca.horzcat(a * cosine - b * sine, a * sine + b * cosine)
+def _turning(pair: Sequence[NDArray[np.complex128]], order: float, real: Any, imaginary: Any) -> Lines:
+    """Wrench of an unbalance (real, imaginary) from those of one and of i."""
+    by_real, by_imaginary = pair
+    first, second = (ca.DM(w.copy()) * real + ca.DM(v.copy()) * imaginary
+                     for w, v in ((by_real.real, by_imaginary.real), (by_real.imag, by_imaginary.imag)))  # fmt: skip
+    return Lines(np.array([order]), first, second)
 
 
-def _columns(wrench: NDArray[np.complex128]) -> Any:
-    return ca.DM(np.stack([wrench.real, wrench.imag], axis=1))
-
-
-def _sampled(signal: Sequence[tuple[float, Any]]) -> Any:
-    """Values of (order, coefficients of shape (d, 2)) at equal steps of their period, shape (samples, d)."""
-    orders = [h for h, _ in signal]
-    base = float(base_of(orders))
-    samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * max(orders) / base))
-    cosine, sine = waves(orders, base, samples)
-    real, imaginary = (ca.horzcat(*(c[:, side] for _, c in signal)) for side in (0, 1))
-    return (real @ cosine - imaginary @ sine).T
+def _sampled(lines: Lines) -> Any:
+    """Values at equal steps of the period, shape (samples, d)."""
+    base = float(base_of(lines.orders.tolist()))
+    samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * float(lines.orders.max()) / base))
+    cosine, sine = waves(lines.orders.tolist(), base, samples)
+    return (lines.real @ cosine - lines.imaginary @ sine).T
 
 
 def rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:

@@ -46,7 +46,7 @@ from laufruhe.solvers.nonlinear import NonlinearProgram
 
 Array = NDArray[np.float64]
 
-SOFTNESS = (1e-2, 1e-4, 1e-7)
+SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
 # bounds of a stiffness that are further apart leave a start no place between them
 WIDE = 100.0
 # orders that a complaint names
@@ -70,13 +70,16 @@ class SmoothProgram:
         Size of the objective; that of the design as given when left out.
     slack
         Share by which all limits are tightened.
+    softest
+        Share of the objective that norms are softened by in the last stage (N4).
     """
 
     def __init__(
         self, problem: Problem, margin: float = 0.0, moves: ThrowMoves | None = None, unit: float | None = None,
-        slack: float = 0.0,
+        slack: float = 0.0, softest: float = SOFTEST,
     ) -> None:  # fmt: skip
         self.problem, self._margin, self._slack, self.moves = problem, margin, slack, moves
+        self._softest = softest
         self.domains = domains_of(problem.unbalances)
         self._decisions = problem.mount_decisions
         self._count = len(self._decisions)
@@ -139,7 +142,7 @@ class SmoothProgram:
             scales=self._scales(lower, upper),
             objective_scale=self._unit,
             parameters=self._e,
-            stages=tuple((share,) for share in SOFTNESS),
+            stages=tuple((share,) for share in (*SOFTNESS, self._softest)),
             expand=True,
         )
 
@@ -203,7 +206,7 @@ class SmoothProgram:
         rows, grid = self._rows(measure)
         unit = limit.maximum * tight or self._unit
         held = self._held.named(limit.name)
-        value, most, slope = measure.norm.limited(held, grid, rows / unit, limit.maximum * tight / unit, SOFTNESS[-1])
+        value, most, slope = measure.norm.limited(held, grid, rows / unit, limit.maximum * tight / unit, self._softest)
         self._held.add(value, -np.inf, most, limit.name, slope / unit)
 
     def _hold_unbalances(self) -> None:

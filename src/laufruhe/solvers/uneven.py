@@ -42,6 +42,7 @@ ORDERS_WITH_GAS = 2
 NOTHING = 1e-12
 # share that keeps a design that stands on a limit from breaking it by a rounding
 SOFT_LIMIT = 1e-7
+SOFTEST = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 
 
@@ -110,7 +111,7 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> U
     moves = ThrowMoves(phasing, phasing.layout(start.bank_angle, start.split_pin), start, intervals)
     if not moves.size or _is_nothing(best):
         return best
-    smooth = SmoothProgram(problem, moves=moves, unit=_size(problem, best), slack=SOFT_LIMIT)
+    smooth = SmoothProgram(problem, moves=moves, unit=_size(problem, best), slack=SOFT_LIMIT, softest=SOFTEST)
     for optimum in solve_nonlinear(smooth.program, _points(smooth, best), workers=1, max_seconds=30.0):
         if not optimum.usable:
             continue

@@ -1,0 +1,69 @@
+"""Loads by order as expressions: real and imaginary parts of all orders side by side (C8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Orders of a signal.
+
+    Attributes
+    ----------
+    orders
+        Shape (n,).
+    real, imaginary
+        Expressions of shape (d, n).
+    """
+
+    orders: Array
+    real: Any
+    imaginary: Any
+
+    def kept(self, which: NDArray[np.intp]) -> Lines:
+        """Some of the orders."""
+        chosen = which.tolist()
+        return Lines(self.orders[which], self.real[:, chosen], self.imaginary[:, chosen])
+
+    def mapped(self, matrix: Array) -> Lines:
+        """All orders times a real matrix."""
+        m = ca.DM(matrix.copy())
+        return Lines(self.orders, m @ self.real, m @ self.imaginary)
+
+    def mapped_each(self, matrices: Sequence[NDArray[np.complex128]]) -> Lines:
+        """Each order times a complex matrix of its own."""
+        pairs = [(ca.DM(m.real.copy()), ca.DM(m.imag.copy())) for m in matrices]
+        columns = [(self.real[:, k], self.imaginary[:, k]) for k in range(len(pairs))]
+        real = [a @ x - b @ y for (a, b), (x, y) in zip(pairs, columns, strict=True)]
+        imaginary = [a @ y + b @ x for (a, b), (x, y) in zip(pairs, columns, strict=True)]
+        return Lines(self.orders, ca.horzcat(*real), ca.horzcat(*imaginary))
+
+
+def turned(orders: Array, coefficients: NDArray[np.complex128], angle: Any) -> Lines:
+    """c_h e^{i h angle} of every order, shape (1, n)."""
+    phases = ca.DM(orders).T * angle
+    cosine, sine = ca.cos(phases), ca.sin(phases)
+    a, b = ca.DM(coefficients.real.copy()).T, ca.DM(coefficients.imag.copy()).T
+    return Lines(orders, a * cosine - b * sine, a * sine + b * cosine)
+
+
+def summed(parts: Sequence[Lines]) -> Lines:
+    """Signals added up, order by order."""
+    orders = np.unique(np.concatenate([part.orders for part in parts]))
+    real, imaginary = 0.0, 0.0
+    for part in parts:
+        places = ca.DM.zeros(len(part.orders), len(orders))
+        for k, column in enumerate(np.searchsorted(orders, part.orders)):
+            places[k, int(column)] = 1.0
+        spread = ca.sparsify(places)
+        real, imaginary = real + part.real @ spread, imaginary + part.imaginary @ spread
+    return Lines(orders, real, imaginary)
