@@ -168,12 +168,11 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     plain = alone | (np.zeros(count, dtype=bool) if once is None else once)
     given, best = data["objective_given"].values, data["objective"].values
     most = max(np.nanmax(given, initial=0.0), np.nanmax(best, initial=0.0))
-    places, width = np.arange(count), 0.5 if single.all() else 0.36
-    whole = places[single]
-    marks = _bars(whole[plain[single]], best[single & plain], width, "before", most)
-    marks += _bars(whole[~plain[single]], best[single & ~plain], width, "after", most)
-    marks += _bars(places[~single] - 0.2, given[~single], 0.36, "before", most)
-    marks += _bars(places[~single] + 0.2, best[~single], 0.36, "after", most)
+    marks: list[p.Mark] = []
+    for k in range(count):
+        one = [(k + 0.0, best[k], "before" if plain[k] else "after")]
+        pair = [(k - 0.2, given[k], "before"), (k + 0.2, best[k], "after")]
+        marks += [_bar(*bar, 0.5 if single.all() else 0.36, most) for bar in (one if single[k] else pair)]
     ticks = [(float(k), str(label)) for k, label in enumerate(labels)]
     panel = p.Panel(
         marks,
@@ -188,10 +187,8 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     return p.Picture(data.attrs["title"], words, [panel], p.credit(data), size=size, legend=legend)
 
 
-def _bars(places: Any, values: Any, width: float, colour: str, most: float) -> list[p.Mark]:
-    """Bars and their values; what rounding leaves of a balanced engine is zero."""
-    there = np.isfinite(values)
-    shown = [figures(settled(value, most)) for value in values[there]]
-    found: list[p.Mark] = [p.Bars(places[there], values[there], width, colour, numbers=shown)] if shown else []
-    missing = "no design"
-    return found + [p.Words(x, 0.02 * most, missing, across="center", along="bottom") for x in places[~there]]
+def _bar(place: float, value: float, colour: str, width: float, most: float) -> p.Mark:
+    """A bar and its value; what rounding leaves of a balanced engine is zero."""
+    if not np.isfinite(value):
+        return p.Words(place, 0.02 * most, "no design", across="center", along="bottom")
+    return p.Bars([place], [value], width, colour, numbers=[figures(settled(value, most))])
