@@ -211,9 +211,8 @@ def selected(measure: Measure, signal: Spectrum, mount_names: Sequence[str]) -> 
         c = c[:, measure.places(mount_names), :]
     if measure.direction_weights is not None:
         c = c * np.array(measure.direction_weights)
-    if measure.orders is not None:
-        c = np.where(measure.counted(signal.orders)[:, None, None], c, 0.0)
-    return Spectrum(signal.base, c)
+    counted = Spectrum(signal.base, c)
+    return counted if measure.orders is None else counted.only(measure.orders)
 
 
 def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.norms import NORMS
+from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -220,7 +221,7 @@ def _groups(quantity: Measure, lines: Lines) -> list[Mask]:
     for p in np.unique(lines.points):
         own = lines.points == p
         orders: Sequence[float | None] = (None,) if quantity.orders is None else quantity.orders
-        out += [own if order is None else own & (np.abs(lines.orders - order) < 5e-4) for order in orders]
+        out += [own if order is None else own & orders_equal(lines.orders, order) for order in orders]
     return [group for group in out if group.any()]
 
 

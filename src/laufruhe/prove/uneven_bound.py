@@ -64,7 +64,7 @@ def steady_bound(problem: Problem) -> float:
     given, total = evaluate(problem), 0.0
     for term in problem.objective:
         quantity = term.measure
-        if quantity.is_mass or (quantity.orders is not None and 0.0 not in quantity.orders):
+        if quantity.is_mass or not quantity.counted([0.0])[0]:
             continue
         total += term.weight * given.value(replace(quantity, orders=(0.0,)))
     return total
