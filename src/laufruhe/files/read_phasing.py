@@ -205,6 +205,10 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
     if not phasing.continuous and both:
         rule = "is open beside bank_angle, and even firing binds only their sum"
         raise Refused("engine.split_pin_angle", None, rule, "fix one of the two, or let the firing be uneven")
+    for angle, bounds in (("bank_angle", phasing.bank), ("split_pin_angle", phasing.split)):
+        if phasing.throws is not None and bounds is not None and bounds[0] < bounds[1]:
+            rule = "is open beside throws that are given, and is decided with open ones only"
+            raise Refused(f"engine.{angle}", None, rule, 'write throws = "open", or fix the angle')
     throws, rest = divmod(count, kind.cylinders_per_throw)
     if rest:
         rule = f"is no multiple of the {kind.cylinders_per_throw} cylinders that share a throw"

@@ -1,0 +1,106 @@
+"""What is open and would not be decided, and orders that no load has, are refused by name: nothing is frozen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from files.test_reader import complaint_about
+from laufruhe.files.reader import load
+from problem_files import changed, written
+
+GEARED = """
+title = "Two singles on geared counter-rotating cranks"
+[engine]
+layout = "parts"
+cycle = "four-stroke"
+stroke = "80 mm"
+rod_ratio = 0.28
+reciprocating_mass = "0.4 kg"
+rotating_mass = "0.5 kg"
+shafts = [{ name = "L", position = ["100 mm", "0 mm"] }, { name = "R", position = ["-100 mm", "0 mm"], ratio = -1 }]
+slider_cranks = [{ shaft = "L", x = "0 mm" }, { shaft = "R", x = "0 mm", firing_angle = 360 }]
+[[operating_points]]
+speed = "6000 rpm"
+[[counterweights]]
+name = "web"
+balance_fraction = { between = [0, 1] }
+[objective]
+minimise = "rms shaking force"
+"""
+TWIN = """
+title = "Vee of two, its angles open"
+[engine]
+layout = "vee"
+cycle = "four-stroke"
+cylinders = 2
+bank_angle = { between = [40, 120] }
+stroke = "96.8 mm"
+rod_ratio = 0.28
+reciprocating_mass = "0.6 kg"
+cylinder_spacing = "90 mm"
+throws = [0]
+[phasing]
+intervals = { largest_deviation = "180 deg" }
+[[operating_points]]
+speed = "5000 rpm"
+[[counterweights]]
+name = "web"
+balance_fraction = { between = [0, 1] }
+[objective]
+minimise = "rms shaking force"
+orders = [1]
+"""
+SPLIT = changed(TWIN, "bank_angle = { between = [40, 120] }", "bank_angle = 60\nsplit_pin_angle = { between = [0, 9] }")
+
+
+@pytest.mark.parametrize("fraction", ["{ between = [0, 1] }", "{ between = [0.2, 0.8], start = 0.5 }"])
+def test_a_balance_fraction_without_throws(fraction: str, tmp_path: Path) -> None:
+    """Counterweights stand on the crankshaft, and here no throw does."""
+    line = complaint_about(written(tmp_path, changed(GEARED, "{ between = [0, 1] }", fraction)))
+    assert line == "web.balance_fraction: is open, and nothing of this engine follows it; fix or leave it out"
+
+
+def test_a_balance_fraction_of_massless_pistons(tmp_path: Path) -> None:
+    light = changed(TWIN, 'reciprocating_mass = "0.6 kg"', 'reciprocating_mass = "0 kg"')
+    text = changed(light, "bank_angle = { between = [40, 120] }", "bank_angle = 90")
+    assert complaint_about(written(tmp_path, text)).startswith("web.balance_fraction: is open, and nothing")
+
+
+@pytest.mark.parametrize(("text", "key"), [(TWIN, "bank_angle"), (SPLIT, "split_pin_angle")])
+def test_an_angle_beside_given_throws(text: str, key: str, tmp_path: Path) -> None:
+    """It would stay at its lower bound; open throws, with bounds or without, let it be decided."""
+    assert complaint_about(written(tmp_path, text)) == (
+        f"engine.{key}: is open beside throws that are given, and is decided with open ones only; "
+        'write throws = "open", or fix the angle'
+    )
+    for throws in ('"open"', "[{ between = [0, 90] }]"):
+        problem = load(written(tmp_path, changed(text, "throws = [0]", f"throws = {throws}")))
+        assert f"{key.removesuffix('_angle').replace('_', ' ')} angle" in problem.summary
+
+
+@pytest.mark.parametrize(
+    ("orders", "said"),
+    [
+        ("[1.0004, 2.0004]", "holds 1.0004, and the orders of this engine are multiples of 1/2; did you mean 1?"),
+        ("[0.5, 1.25]", "holds 1.25, and the orders of this engine are multiples of 1/2; did you mean 1?"),
+        ("[0.3333]", "holds 0.3333, and the orders of this engine are multiples of 1/2; did you mean 0.5?"),
+    ],
+)
+def test_orders_that_are_none(orders: str, said: str, tmp_path: Path) -> None:
+    text = changed(changed(TWIN, "throws = [0]", 'throws = "open"'), "orders = [1]", f"orders = {orders}")
+    assert complaint_about(written(tmp_path, text)) == f"objective.orders = {orders}: {said}"
+
+
+def test_orders_of_a_shaft_are_orders(tmp_path: Path) -> None:
+    """A shaft at two thirds of crank speed has thirds, written as exactly as anyone does."""
+    shaft = """
+[[balancer_shafts]]
+name = "slow"
+ratio = 0.666667
+position = ["0 mm", "0 mm"]
+unbalances = [{ unbalance = "0.01 kg m" }]
+"""
+    text = changed(changed(TWIN, "throws = [0]", 'throws = "open"'), "orders = [1]", "orders = [0.5, 0.6667, 1.333333]")
+    assert load(written(tmp_path, text + shaft)).objective[0].measure.orders == (0.5, 0.6667, 1.333333)
