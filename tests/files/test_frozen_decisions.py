@@ -83,9 +83,9 @@ def test_an_angle_beside_given_throws(text: str, key: str, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("orders", "said"),
     [
-        ("[1.0004, 2.0004]", "holds 1.0004, and the orders of this engine are multiples of 1/2; did you mean 1?"),
-        ("[0.5, 1.25]", "holds 1.25, and the orders of this engine are multiples of 1/2; did you mean 1?"),
-        ("[0.3333]", "holds 0.3333, and the orders of this engine are multiples of 1/2; did you mean 0.5?"),
+        ("[1.0004, 2.0004]", "holds 1.0004, and the orders of its cycle are multiples of 1/2; did you mean 1?"),
+        ("[0.5, 1.25]", "holds 1.25, and the orders of its cycle are multiples of 1/2; did you mean 1?"),
+        ("[2.00001]", "holds 2.00001, and the orders of its cycle are multiples of 1/2; did you mean 2?"),
     ],
 )
 def test_orders_that_are_none(orders: str, said: str, tmp_path: Path) -> None:
@@ -93,14 +93,8 @@ def test_orders_that_are_none(orders: str, said: str, tmp_path: Path) -> None:
     assert complaint_about(written(tmp_path, text)) == f"objective.orders = {orders}: {said}"
 
 
-def test_orders_of_a_shaft_are_orders(tmp_path: Path) -> None:
-    """A shaft at two thirds of crank speed has thirds, written as exactly as anyone does."""
-    shaft = """
-[[balancer_shafts]]
-name = "slow"
-ratio = 0.666667
-position = ["0 mm", "0 mm"]
-unbalances = [{ unbalance = "0.01 kg m" }]
-"""
-    text = changed(changed(TWIN, "throws = [0]", 'throws = "open"'), "orders = [1]", "orders = [0.5, 0.6667, 1.333333]")
-    assert load(written(tmp_path, text + shaft)).objective[0].measure.orders == (0.5, 0.6667, 1.333333)
+def test_orders_of_a_two_stroke_are_whole(tmp_path: Path) -> None:
+    text = changed(changed(TWIN, "throws = [0]", 'throws = "open"'), "orders = [1]", "orders = [1.5, 2]")
+    assert load(written(tmp_path, text)).objective[0].measure.orders == (1.5, 2.0)
+    line = complaint_about(written(tmp_path, changed(text, "four-stroke", "two-stroke")))
+    assert line.endswith("holds 1.5, and the orders of its cycle are multiples of 1; did you mean 2?")

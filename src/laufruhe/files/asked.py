@@ -11,7 +11,6 @@ from laufruhe.errors import ModelError
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.file_models import ConstraintTable, ProblemFile, QuantityTable
 from laufruhe.machine import Engine, OperatingPoint
-from laufruhe.numerics.spectrum import as_order, common_base
 from laufruhe.problem.channels import ON_PLACES, Channel, LoadChannel, MassChannel, MountChannel, Needs
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Term, counted_rotors, radius_of
 
@@ -20,8 +19,7 @@ _NEEDS = {
     Needs.ELASTIC: ("needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]'),
 }
 _KEYS = ("operating_points", "orders", "mounts", "direction_weights", "motions", "frequency", "of")
-# of an order as it is written: 0.6667 is 2/3
-_ROUNDING = 1e-4
+_ROUNDING = 1e-9
 _SIDES = ("min", "max", "outside")
 
 
@@ -77,13 +75,12 @@ class Scene:
             raise Refused(where, name, *_NEEDS[needs])
 
     def _orders(self, orders: list[float] | None, where: str) -> None:
-        """Refuse what no load of this engine can have: orders are multiples of that of its longest period (C6)."""
-        turning = [*(part.shaft for part in self.engine.cylinders), *(rotor.shaft for rotor in self.engine.rotors)]
-        base = common_base([self.engine.cycle.base_order, *(as_order(abs(shaft.ratio)) for shaft in turning)])
+        """Refuse what no load can have: all that turns returns within the cycle (C6)."""
+        base = self.engine.cycle.base_order
         for order in orders or ():
             nearby = float(round(order / base) * base)
             if abs(order - nearby) > _ROUNDING:
-                rule = f"holds {order:.10g}, and the orders of this engine are multiples of {base}"
+                rule = f"holds {order:.10g}, and the orders of its cycle are multiples of {base}"
                 raise Refused(where, orders, rule, f"did you mean {nearby:g}?")
 
     def _counts(self, measure: Measure, of: list[str] | None, at: str) -> None:

@@ -102,7 +102,8 @@ def _assembled(file: ProblemFile, path: Path) -> Problem:
     scene = Scene(engine, points)
     objective, decisions = objective_of(file, scene), (*collected.decisions, *found.decisions)
     for decision in decisions:
-        if not any(drive.gain for drive in (*decision.rotor_drives, *decision.mount_drives)):
+        gains: list[complex] = [drive.gain for drive in decision.rotor_drives]
+        if not any([*gains, *(drive.gain for drive in decision.mount_drives)]):
             raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")
     if decisions and not objective:
         raise Refused("objective", None, "is missing while numbers are open", "say what is to be minimised")
