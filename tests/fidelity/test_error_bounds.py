@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from fidelity.scenes import finer, random_problem
+from lanes import first_fast
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import error_bound, reference
 from laufruhe.physics.fidelity import Fidelity
@@ -37,7 +38,7 @@ def _errors(seed: int, gas: bool | None = None, truth_samples: int = 5760) -> tu
     return abs(value - truth) / value if value else 0.0, error_bound(own, found, reference(own)), own.fidelity
 
 
-@pytest.mark.parametrize("seed", range(QUICK))
+@pytest.mark.parametrize("seed", first_fast(range(QUICK), 30))
 def test_estimate_is_not_below_the_error(seed: int) -> None:
     # steps that are no multiple of the reference's, so that both can be wrong in their own way
     true, stated, fidelity = _errors(seed, truth_samples=7001)
@@ -73,7 +74,7 @@ def _excess(seed: int) -> tuple[float, bool]:
     return (abs(value - truth) / value if value else 0.0) - error_bound(own, found, best), has_gas
 
 
-@pytest.mark.parametrize("seed", range(AUTOMATIC))
+@pytest.mark.parametrize("seed", first_fast(range(AUTOMATIC), 6))
 def test_automatic_choice_keeps_its_word(seed: int) -> None:
     problem = random_problem(random.Random(5000 + seed))
     choice = choose(problem, 1e-2)

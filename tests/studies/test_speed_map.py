@@ -70,6 +70,7 @@ def test_values_are_those_of_the_exact_model(tmp_path: Path) -> None:
     assert found.item() == pytest.approx(result.objective.value, rel=2e-5)
 
 
+@pytest.mark.slow
 def test_orders_peak_where_they_meet_a_mode(tmp_path: Path) -> None:
     """Of a damped block: the highest peak of order 2 lies within two percent of half a natural frequency."""
     path = elastic(tmp_path)

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 from tests.studies.conftest import parts_of
 
+from lanes import first_fast
 from laufruhe.plots.picture import draw, save_picture
 from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.replication.judging import CONFIRMED, counted
@@ -60,7 +61,7 @@ OURS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", first_fast(FIGURES, 4))
 def test_statements(figure: Data, name: str) -> None:
     data = figure(name)
     np.testing.assert_allclose(data["ours"], OURS[name], rtol=1e-6, atol=1e-9)
@@ -69,12 +70,13 @@ def test_statements(figure: Data, name: str) -> None:
     assert data["statement"].values[~held].tolist() == NOT_CONFIRMED.get(name, [])
 
 
+@pytest.mark.slow
 def test_all_are_counted(figure: Data) -> None:
     assert list(OURS) == FIGURES
     assert counted([figure(name) for name in FIGURES]) == "42 of 48 statements are confirmed."
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", first_fast(FIGURES, 4))
 def test_picture_and_file(figure: Data, name: str, tmp_path: Path) -> None:
     """A dataset that was read again is drawn: it knows all that its picture says."""
     figure(name).to_netcdf(tmp_path / "f.nc")
