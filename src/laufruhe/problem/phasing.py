@@ -171,6 +171,23 @@ class PhasingOf(Generic[P]):
     time_limit: float = 600.0
     method: Method = Method.AUTO
 
+    def layout_of(self, candidate: Candidate) -> Layout:
+        """The layout of a design."""
+        return self.layout(candidate.bank_angle, candidate.split_pin)
+
+    def without(self, built: Sequence[int]) -> tuple[str, ...]:
+        """Optional shafts of the sets that are not built."""
+        return tuple(name for k, names in enumerate(self.shafts.optional) if k not in built for name in names)
+
+    def built(self, candidate: Candidate) -> tuple[str, ...]:
+        """Optional shafts that a design has."""
+        return tuple(name for names in self.shafts.optional for name in names if name not in candidate.left_out)
+
+    @property
+    def least_geometry(self) -> tuple[float | None, float | None]:
+        """Bank angle and split pin at their lower bounds [rad]: as given where they are not open."""
+        return (None if self.bank is None else self.bank[0]), (None if self.split is None else self.split[0])
+
     @property
     def even_interval(self) -> float:
         """Crank angle between firings when all are equal [rad]."""

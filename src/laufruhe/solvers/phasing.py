@@ -5,19 +5,20 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from laufruhe.errors import SolverError
-from laufruhe.machine.layouts import Layout
+from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import Reach, certified, gap_unit
-from laufruhe.solvers.conclusion import KEPT, no_star, with_star
-from laufruhe.solvers.phasing_result import final_result, names_of, no_design, solve_fixed
-from laufruhe.solvers.ranking import ORDERS_LISTED, PhasingResult, RankedOrder, ranked_orders, ranked_star
+from laufruhe.prove.certificate import FLOOR, Reach, certified, gap_unit
+from laufruhe.solvers.conclusion import no_star, with_star
+from laufruhe.solvers.ranking import ORDERS_LISTED, ranked_orders, ranked_star, ranking_result
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.star_answers import searched
+from laufruhe.solvers.star_answers import Answer, Decided, searched
+from laufruhe.solvers.star_cuts import owners_of, solve_design
+from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.star_families import families_of
 
 
@@ -66,26 +67,24 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
     answer = searched(problem, phasing, families)
     if not answer.designs:
         if answer.complete:
-            return no_design(problem, answer)
+            return _none(problem, answer)
         why = f"no feasible design was found in phasing.time_limit = {phasing.time_limit:g} s; raise it"
         return no_star(problem, why, Status.FAILED)
-    result = final_result(problem, phasing, answer)
+    result = _best_of(problem, phasing, answer)
     return _uneven(problem, phasing, result) if phasing.continuous else result
 
 
 def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     """Throws as given: the best of their firing orders, and of the sets of shafts."""
-    throws = phasing.throws or ()
-    bank, split = (b[0] if b is not None else None for b in (phasing.bank, phasing.split))
-    layout = phasing.layout(bank, split)
-    orders, count = ranked_orders(phasing, layout, throws, None)
+    star = Candidate(phasing.throws or (), None, *phasing.least_geometry)
+    orders = ranked_orders(phasing, star)
     if not orders:
-        return no_star(problem, _no_order(phasing, layout, throws))
+        return no_star(problem, _no_order(phasing, star))
     # the small ones first: a shaft that buys nothing is not built
     sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
-    told = orders if problem.feels_gas and not all(_is_even(order) for order in orders) else orders[:1]
-    designs = [(order, built) for built in sets for order in told]
-    solved, complete = _solved(problem, phasing, throws, designs)
+    told = orders if problem.feels_gas and not all(order.is_even for order in orders) else orders[:1]
+    designs = [replace(star, firing_order=o.order, left_out=phasing.without(built)) for built in sets for o in told]
+    solved, complete = _solved(problem, phasing, designs)
     if not solved:
         return no_star(problem, "no firing order and no set of shafts that may be built keeps the limits")
     initial = objective_value(problem, evaluate(problem))
@@ -94,59 +93,29 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
         if design.value < best.value - _share(problem) * gap_unit(best.value, initial):
             best = design
     bound = min(design.bound for design in solved) if complete else 0.0
-    names = names_of(phasing, best.built)
-    entry = ranked_star(phasing, layout, throws, None, best.value, bound, complete, names, (bank, split))
-    rest = tuple(order for order in orders if order != best.order)
-    entry = replace(entry, firing_orders=(best.order, *rest)[:ORDERS_LISTED], even=_is_even(best.order))
-    method = f"{len(told)} of {count} firing order(s), {len(sets)} set(s) of shafts looked at"
-    own = best.result.certificate
-    how, residual = (f"{own.method}; {method}", own.kkt_residual) if own else (method, 0.0)
+    entry = ranked_star(phasing, best.candidate, None, best.value, bound, complete)
+    own = next(order for order in orders if order.order == best.candidate.firing_order)
+    rest = tuple(order for order in orders if order != own)
+    entry = replace(entry, firing_orders=(own, *rest)[:ORDERS_LISTED], even=own.is_even)
+    method = f"{len(told)} of {len(orders)} firing order(s), {len(sets)} set(s) of shafts looked at"
+    proof = best.result.certificate
+    how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     certificate = certified(best.value, bound, initial, problem.tolerance, Reach.WHOLE, residual, how)
-    details = PhasingResult((entry,), layout.throw_positions, layout.banks, count * len(sets), len(solved), method)
+    details = ranking_result(phasing, best.candidate, [entry], len(orders) * len(sets), len(solved), method)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
-@dataclass(frozen=True, eq=False)
-class _Solved:
-    """A firing order and sets of shafts with everything else at its optimum."""
-
-    order: RankedOrder
-    built: tuple[int, ...]
-    candidate: Candidate
-    result: Result
-
-    @property
-    def value(self) -> float:
-        return _value(self.result)
-
-    @property
-    def bound(self) -> float:
-        """What no design of this order and these shafts goes under."""
-        return self.result.certificate.lower_bound if self.result.certificate else self.value
-
-
-def _solved(
-    problem: Problem,
-    phasing: Phasing,
-    throws: tuple[float, ...],
-    designs: Sequence[tuple[RankedOrder, tuple[int, ...]]],
-) -> tuple[list[_Solved], bool]:
+def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) -> tuple[list[StarDesign], bool]:
     """Those designs that keep the limits, and whether time was enough for all."""
     started = time.perf_counter()
-    bank, split = (b[0] if b is not None else None for b in (phasing.bank, phasing.split))
-    found: list[_Solved] = []
-    for order, built in designs:
+    found: list[StarDesign] = []
+    for candidate in designs:
         if found and time.perf_counter() - started > phasing.time_limit:
             return found, False
-        names = names_of(phasing, built)
-        left_out = tuple(n for group in phasing.shafts.optional for n in group if n not in names)
-        candidate = Candidate(throws, order.order, bank, split, left_out)
         result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem)))
-        # of a design without decisions nobody has looked at the limits
-        met = result.final.excess(result.problem.limits) <= KEPT
-        kept = met and result.status in (Status.OPTIMAL, Status.FEASIBLE)
-        if kept and result.objective is not None:
-            found.append(_Solved(order, built, candidate, result))
+        design = StarDesign(candidate, result)
+        if math.isfinite(design.value):
+            found.append(design)
     return found, True
 
 
@@ -155,18 +124,58 @@ def _share(problem: Problem) -> float:
     return 0.5 * problem.tolerance
 
 
-def _is_even(order: RankedOrder) -> bool:
-    return max(order.intervals) - min(order.intervals) <= 1e-9 * math.tau
+def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
+    """The best even design solved once more as a problem of its own, with what was proven of all designs (S17)."""
+    designs = [design for design in answer.designs if ranked_orders(phasing, design.candidate, design.steps)]
+    if not designs:
+        return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
+    best = designs[0]
+    order = ranked_orders(phasing, best.candidate, best.steps)[0].order
+    left_out = phasing.without(_needed(problem, phasing, best))
+    candidate = replace(best.candidate, firing_order=order, left_out=left_out)
+    result = solve_fixed(replace(phasing.realise(candidate), tolerance=problem.tolerance, phasing=None))
+    value = result.objective.value if result.objective else best.value
+    # a star's own tolerance, and that by which another has to be better
+    certificate = certified(
+        value, answer.bound, objective_value(problem, evaluate(problem)), 2.0 * problem.tolerance, Reach.WHOLE,
+        result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
+    )  # fmt: skip
+    shown = [replace(best, candidate=candidate), *designs[1:]]
+    ranking = [ranked_star(phasing, d.candidate, d.steps, d.value, d.bound, d.proven) for d in shown]
+    count = sum(family.size for family in families_of(phasing)[0])
+    details = ranking_result(phasing, candidate, ranking, count, answer.looked_at, answer.method)
+    return with_star(problem, phasing, result, candidate, certificate, details)
 
 
-def _value(result: Result) -> float:
-    return result.objective.value if result.objective is not None else math.inf
+def _needed(problem: Problem, phasing: Phasing, best: Decided) -> tuple[int, ...]:
+    """The sets of shafts without which the design would be worse: the others need not be built."""
+    kept = best.built
+    if not kept:
+        return kept
+    model = StarModel(phasing, best.family.space, best.family.geometry, best.family.fixed)
+    owners = owners_of(model)
+    floor = FLOOR * objective_value(problem, evaluate(problem))
+    for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
+        fewer = tuple(j for j in kept if j != k)
+        again = solve_design(model, best.steps, fewer, owners, problem.tolerance, floor)
+        if again is not None and again[0].value <= best.value + problem.tolerance * max(best.value, floor):
+            kept = fewer
+    return kept
 
 
-def _no_order(phasing: Phasing, layout: Layout, throws: Sequence[float]) -> str:
+def _none(problem: Problem, answer: Answer) -> Result:
+    """Stars exist, but none keeps the limits: the conflict of the first one names them."""
+    result = solve_fixed(replace(problem, phasing=None)) if problem.decisions else None
+    names = result.conflict if result is not None else tuple(limit.name for limit in problem.limits)
+    shown = " and ".join(f"'{name}'" for name in names) or "the bounds"
+    why = f"no star keeps {shown}, whatever else is decided ({answer.infeasible} design(s) tried)"
+    return no_star(problem, why, conflict=names)
+
+
+def _no_order(phasing: Phasing, star: Candidate) -> str:
     free = replace(phasing, intervals=replace(phasing.intervals, least=0.0, most=math.inf))
-    orders, _ = ranked_orders(free, layout, throws, None)
-    shown = [f"{math.degrees(angle):g}" for angle in throws]
+    orders = ranked_orders(free, star)
+    shown = [f"{math.degrees(angle):g}" for angle in star.throws]
     allowed = f"{math.degrees(phasing.intervals.least):g} to {math.degrees(phasing.intervals.most):g} deg"
     nearest = min(orders, key=lambda o: max(o.intervals) - min(o.intervals)) if orders else None
     tail = ""

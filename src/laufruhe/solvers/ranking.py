@@ -12,7 +12,7 @@ import numpy as np
 from laufruhe.machine import firing
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.turns import as_turn, star_sum
-from laufruhe.problem.phasing import OrderCriterion
+from laufruhe.problem.phasing import Candidate, OrderCriterion
 from laufruhe.problem.problem import Phasing
 
 ORDERS = (1, 2, 4)
@@ -42,6 +42,11 @@ class RankedOrder:
     longest_gap: float
     roll_content: float
     intervals: tuple[float, ...]
+
+    @property
+    def is_even(self) -> bool:
+        """Whether all intervals are equal."""
+        return max(self.intervals) - min(self.intervals) <= 1e-9 * math.tau
 
     def by(self, criterion: OrderCriterion) -> float:
         """What a criterion sees, small is good."""
@@ -153,17 +158,16 @@ class PhasingResult:
 
 
 def ranked_orders(
-    phasing: Phasing, layout: Layout, throws: Sequence[float], steps: Sequence[int] | None
-) -> tuple[tuple[RankedOrder, ...], int]:
-    """Firing orders of a star that keep the intervals, best first, and their number (S8).
+    phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None = None
+) -> tuple[RankedOrder, ...]:
+    """Firing orders of a star that keep the intervals, best first (S8).
 
     Parameters
     ----------
-    throws
-        Angles [rad].
     steps
-        Steps of an even star; None for throws at any angle.
+        Of an even star; None for throws at any angle.
     """
+    layout, throws = phasing.layout_of(candidate), candidate.throws
     orders: Iterable[tuple[int, ...]]
     if phasing.firing_order is not None:
         orders = [phasing.firing_order]
@@ -178,7 +182,7 @@ def ranked_orders(
         if phasing.intervals.holds(intervals, 1e-6):
             found.append(_judged(phasing, layout, order, turns, intervals))
     found.sort(key=lambda o: (*(o.by(criterion) for criterion in phasing.criteria), o.order))
-    return tuple(found), len(found)
+    return tuple(found)
 
 
 def _judged(
@@ -203,21 +207,20 @@ def free_balance(places: Sequence[float], throws: Sequence[float]) -> tuple[tupl
 
 
 def ranked_star(
-    phasing: Phasing,
-    layout: Layout,
-    throws: tuple[float, ...],
-    steps: Sequence[int] | None,
-    value: float,
-    bound: float,
-    proven: bool,
-    shafts: tuple[str, ...] = (),
-    geometry: tuple[float | None, float | None] = (None, None),
+    phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None, value: float, bound: float, proven: bool
 ) -> RankedStar:
     """One entry of a ranking."""
-    orders, count = ranked_orders(phasing, layout, throws, steps)
-    forces, couples = free_balance(layout.throw_positions, throws)
-    intervals = orders[0].intervals if orders else ()
-    even = bool(intervals) and max(intervals) - min(intervals) <= 1e-9 * math.tau
+    orders = ranked_orders(phasing, candidate, steps)
+    forces, couples = free_balance(phasing.layout_of(candidate).throw_positions, candidate.throws)
     return RankedStar(
-        throws, *geometry, shafts, value, bound, proven, forces, couples, ORDERS, orders[:ORDERS_LISTED], count, even
-    )
+        candidate.throws, candidate.bank_angle, candidate.split_pin, phasing.built(candidate), value, bound, proven,
+        forces, couples, ORDERS, orders[:ORDERS_LISTED], len(orders), bool(orders) and orders[0].is_even,
+    )  # fmt: skip
+
+
+def ranking_result(
+    phasing: Phasing, best: Candidate, ranking: Sequence[RankedStar], designs: int, looked_at: int, method: str
+) -> PhasingResult:
+    """What was decided, the best design first."""
+    layout = phasing.layout_of(best)
+    return PhasingResult(tuple(ranking), layout.throw_positions, layout.banks, designs, looked_at, method)

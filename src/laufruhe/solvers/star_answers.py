@@ -12,7 +12,7 @@ from laufruhe.errors import SolverError
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.phasing import Method
+from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import FLOOR
 from laufruhe.solvers.star_cuts import CutsFound, owners_of, search_designs, solve_design
@@ -32,6 +32,7 @@ class Decided:
     family: Family
     steps: tuple[int, ...]
     built: tuple[int, ...]
+    candidate: Candidate
     value: float
     bound: float
     proven: bool
@@ -63,16 +64,24 @@ def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> 
         few = phasing.method is Method.AUTO and space.size <= FEW_STARS
         if few or phasing.method is Method.ENUMERATION:
             found = enumerate_stars(space, own, phasing.best)
-            answers.append(_stars_answer(family, found, "every star looked at"))
+            answers.append(_stars_answer(phasing, family, found, "every star looked at"))
         else:
             found = search_stars(space, own, phasing.best, phasing.time_limit)
-            answers.append(_stars_answer(family, found, "branch and bound over partial stars"))
+            answers.append(_stars_answer(phasing, family, found, "branch and bound over partial stars"))
     return _joined(answers, phasing.best)
 
 
-def _stars_answer(family: Family, found: StarsFound, method: str) -> Answer:
+def _decided(
+    phasing: Phasing, family: Family, steps: tuple[int, ...], built: tuple[int, ...], value: float, bound: float,
+    proven: bool,
+) -> Decided:  # fmt: skip
+    candidate = family.candidate(phasing, steps, phasing.without(built))
+    return Decided(family, steps, built, candidate, value, bound, proven)
+
+
+def _stars_answer(phasing: Phasing, family: Family, found: StarsFound, method: str) -> Answer:
     designs = tuple(
-        Decided(family, tuple(int(p) for p in star), (), float(value), float(value), found.complete)
+        _decided(phasing, family, tuple(int(p) for p in star), (), float(value), float(value), found.complete)
         for star, value in zip(found.stars, found.values, strict=True)
     )
     return Answer(designs, found.lower_bound, found.complete, found.nodes, method)
@@ -89,7 +98,15 @@ def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         model = StarModel(phasing, family.space, family.geometry, family.fixed)
         found = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, floor)
         designs = tuple(
-            Decided(family, s.star, s.built, s.value, s.bound, s.value <= found.beyond * (1.0 + problem.tolerance))
+            _decided(
+                phasing,
+                family,
+                s.star,
+                s.built,
+                s.value,
+                s.bound,
+                s.value <= found.beyond * (1.0 + problem.tolerance),
+            )
             for s in found.solved
         )
         method = f"cone programs of {len(found.solved)} of {found.designs} designs, dual cuts for the others"
@@ -129,7 +146,7 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         bound = max(program.bound if exact else 0.0, cut.least(space))
         done = program.status == "optimal" and found.value - bound <= 2.0 * problem.tolerance * max(found.value, floor)
         method = f"mixed-integer cone program (SCIP: {program.status}) at {samples} angles, design solved again"
-        design = Decided(family, found.star, found.built, found.value, found.bound, done)
+        design = _decided(phasing, family, found.star, found.built, found.value, found.bound, done)
         answers.append(Answer((design,), bound, done, 1, method))
     return _joined(answers, phasing.best)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +28,10 @@ from laufruhe.prove.uneven_bound import steady_bound, uneven_bound
 from laufruhe.solvers.conclusion import FEASIBLE, no_star, with_star
 from laufruhe.solvers.mount_starts import columns_of, unbalances_of
 from laufruhe.solvers.nonlinear import solve_nonlinear
-from laufruhe.solvers.phasing_result import solve_fixed
-from laufruhe.solvers.ranking import PhasingResult, RankedStar, TradePoint, ranked_orders, ranked_star
-from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.ranking import TradePoint, ranked_orders, ranked_star, ranking_result
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth_program import TURN, SmoothProgram
+from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.star_families import families_of
 
 Array = NDArray[np.float64]
@@ -44,33 +44,6 @@ NOTHING = 1e-12
 SOFT_LIMIT = 1e-7
 SOFTEST = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Uneven:
-    """A local optimum, its unbalances solved once more as a convex problem.
-
-    Attributes
-    ----------
-    candidate
-        Throws, order, bank and split pin.
-    result
-        Of the problem with these throws fixed.
-    kkt_residual
-        Of the nonlinear program; zero for a star that was not moved.
-    moved
-        Whether it is better than the star it started from.
-    """
-
-    candidate: Candidate
-    result: Result
-    kkt_residual: float
-    moved: bool
-
-    @property
-    def value(self) -> float:
-        """Objective by the exact model [SI]."""
-        return self.result.objective.value if self.result.objective is not None else math.inf
 
 
 def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
@@ -100,7 +73,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     return _result(problem, phasing, even, found, trade)
 
 
-def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> Uneven | None:
+def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> StarDesign | None:
     """The local optimum that one star leads to; the star itself where nothing is better (S20)."""
     best = _evaluated(phasing, start, 0.0, moved=False)
     if best is not None and not intervals.holds(firing_intervals(phasing, start), 1e-7):
@@ -108,7 +81,7 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> U
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
     problem = replace(phasing.realise(start), phasing=None)
-    moves = ThrowMoves(phasing, phasing.layout(start.bank_angle, start.split_pin), start, intervals)
+    moves = ThrowMoves(phasing, phasing.layout_of(start), start, intervals)
     if not moves.size or _is_nothing(best):
         return best
     smooth = SmoothProgram(problem, moves=moves, unit=_size(problem, best), slack=SOFT_LIMIT, softest=SOFTEST)
@@ -124,21 +97,21 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> U
     return best
 
 
-def _is_nothing(best: Uneven | None) -> bool:
+def _is_nothing(best: StarDesign | None) -> bool:
     """Whether there is nothing to gain: no norm lies under zero."""
     if best is None or best.result.objective is None:
         return False
     return best.value <= NOTHING * best.result.objective.initial
 
 
-def _size(problem: Problem, best: Uneven | None) -> float:
+def _size(problem: Problem, best: StarDesign | None) -> float:
     """What the objective is measured in: its value in the design as given, never far below it."""
     if best is None or best.result.objective is None:
         return objective_value(problem, evaluate(problem)) or 1.0
     return gap_unit(best.value, best.result.objective.initial)
 
 
-def _points(smooth: SmoothProgram, best: Uneven | None) -> list[Array]:
+def _points(smooth: SmoothProgram, best: StarDesign | None) -> list[Array]:
     """The star, and two points beside it: one that is its own mirror image may be a saddle."""
     columns = np.zeros(smooth.columns)
     if best is not None and smooth.columns:
@@ -149,23 +122,21 @@ def _points(smooth: SmoothProgram, best: Uneven | None) -> list[Array]:
     return [smooth.start([], columns + n[len(turns) :], turns + n[: len(turns)]) for n in (0.0 * nudges[0], *nudges)]
 
 
-def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: bool) -> Uneven | None:
+def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: bool) -> StarDesign | None:
     """A design by the exact model, its unbalances at their proven optimum; None if it breaks a limit."""
     try:
-        result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
+        design = StarDesign(
+            candidate, solve_fixed(replace(phasing.realise(candidate), phasing=None)), None, residual, moved
+        )
     except ModelError:
         return None
-    if result.objective is None or result.status in (Status.INFEASIBLE, Status.FAILED):
-        return None
-    if result.final.excess(result.problem.limits) > FEASIBLE:
-        return None
-    return Uneven(candidate, result, residual, moved)
+    excess = design.result.final.excess(design.result.problem.limits)
+    return design if math.isfinite(design.value) and excess <= FEASIBLE else None
 
 
 def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...]:
     """Crank angles from firing to firing of a design [rad]."""
-    layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
-    turns = firing_turns(layout, candidate.throws, candidate.firing_order or ())
+    turns = firing_turns(phasing.layout_of(candidate), candidate.throws, candidate.firing_order or ())
     return intervals_of(phasing.cycle, turns)
 
 
@@ -178,9 +149,12 @@ def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> 
         Whether gas is felt: firing orders of one star then differ, and so does the star that
         turns the other way, which inertia alone cannot tell from it.
     """
+    optional = [name for names in phasing.shafts.optional for name in names]
     if even is not None and even.phasing is not None:
         candidates = [
-            Candidate(s.throws, firing.order, s.bank_angle, s.split_pin, _left_out(phasing, s.shafts))
+            Candidate(
+                s.throws, firing.order, s.bank_angle, s.split_pin, tuple(n for n in optional if n not in s.shafts)
+            )
             for s in even.phasing.ranking
             for firing in s.firing_orders[: ORDERS_WITH_GAS if with_gas else 1]
         ]
@@ -203,7 +177,7 @@ def _unranked(phasing: Phasing, bank: float | None, split: float | None) -> list
     free = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
     found = []
     for throws in stars:
-        orders, _ = ranked_orders(free, layout, throws, None)
+        orders = ranked_orders(free, Candidate(throws, None, bank, split))
         kept = [order for order in orders if min(order.intervals) > SOONEST]
         # the orders whose intervals are nearest to those allowed
         kept.sort(key=lambda order: _outside(phasing.intervals, order.intervals))
@@ -213,7 +187,7 @@ def _unranked(phasing: Phasing, bank: float | None, split: float | None) -> list
 
 def _turning_back(phasing: Phasing, candidate: Candidate) -> Candidate:
     """The star of a crank that turns the other way: banks change sides, firings follow each other backwards."""
-    layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
+    layout = phasing.layout_of(candidate)
     number = {(pin, bank): k + 1 for k, (pin, bank) in enumerate(zip(layout.pins, layout.banks, strict=True))}
     partners = [number[pin, -bank] for pin, bank in zip(layout.pins, layout.banks, strict=True)]
     order = [partners[k - 1] for k in reversed(candidate.firing_order or ())]
@@ -235,10 +209,6 @@ def _ends(bounds: tuple[float, float] | None) -> list[float | None]:
     return [bounds[0]] if bounds[0] == bounds[1] else [bounds[0], 0.5 * (bounds[0] + bounds[1]), bounds[1]]
 
 
-def _left_out(phasing: Phasing, shafts: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name for names in phasing.shafts.optional for name in names if name not in shafts)
-
-
 def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[float, str]:
     """What no design with these intervals goes under, and where that is from (S22, S24)."""
     objective = amplitude_objective(problem)
@@ -250,7 +220,7 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
 
 
 def _trade(
-    problem: Problem, phasing: Phasing, starts: Sequence[Candidate], found: Sequence[Uneven]
+    problem: Problem, phasing: Phasing, starts: Sequence[Candidate], found: Sequence[StarDesign]
 ) -> tuple[TradePoint, ...]:
     """The least objective found for less and less unevenness; never worse for more of it."""
     even = phasing.even_interval
@@ -281,35 +251,20 @@ def _trade(
 
 
 def _result(
-    problem: Problem, phasing: Phasing, even: Result | None, found: Sequence[Uneven], trade: tuple[TradePoint, ...]
+    problem: Problem, phasing: Phasing, even: Result | None, found: Sequence[StarDesign], trade: tuple[TradePoint, ...]
 ) -> Result:
     best = found[0]
-    layout = phasing.layout(best.candidate.bank_angle, best.candidate.split_pin)
     initial = objective_value(problem, even.initial if even is not None else evaluate(problem))
     bound, source = _bound(problem, phasing, phasing.intervals)
     method = f"IPOPT from {len(found)} start(s), firing orders kept; bound from {source}"
     # no norm lies under zero: who reaches it is done
-    certificate = certified(
-        best.value, bound, initial, problem.tolerance, Reach.ASIDE, best.kkt_residual, method
-    )  # fmt: skip
-    details = PhasingResult(
-        ranking=tuple(_entry(phasing, answer) for answer in found),
-        places=layout.throw_positions,
-        banks=layout.banks,
-        designs=even.phasing.designs if even is not None and even.phasing is not None else len(found),
-        looked_at=len(found),
-        method=method,
-        trade=trade,
-        even_value=even.objective.value if even is not None and even.objective is not None else None,
-    )
+    certificate = certified(best.value, bound, initial, problem.tolerance, Reach.ASIDE, best.kkt_residual, method)
+    ranking = [
+        ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)
+        for d in found
+    ]
+    designs = even.phasing.designs if even is not None and even.phasing is not None else len(found)
+    details = ranking_result(phasing, best.candidate, ranking, designs, len(found), method)
+    even_value = even.objective.value if even is not None and even.objective is not None else None
+    details = replace(details, trade=trade, even_value=even_value)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
-
-
-def _entry(phasing: Phasing, answer: Uneven) -> RankedStar:
-    c = answer.candidate
-    layout = phasing.layout(c.bank_angle, c.split_pin)
-    only = replace(phasing, firing_order=c.firing_order)
-    shafts = tuple(n for names in phasing.shafts.optional for n in names if n not in c.left_out)
-    return ranked_star(
-        only, layout, c.throws, None, answer.value, 0.0, False, shafts, (c.bank_angle, c.split_pin)
-    )  # fmt: skip
