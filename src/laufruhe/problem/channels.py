@@ -131,10 +131,13 @@ class MountChannel(Channel):
     ----------
     values
         Numbers of a design; the first is the one that is shown, all of them keep a limit.
+    of_loads
+        Whether they depend on what excites the block.
     """
 
     needs: Needs = Needs.ELASTIC
     values: Callable[[Asked, Answered], Sequence[float]] = field(kw_only=True)
+    of_loads: bool = False
 
 
 def _on_block(name: str, unit: str, part: slice, feels_gas: bool) -> LoadChannel:
@@ -196,7 +199,7 @@ COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTER
 BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
 ADDED_MASS = MassChannel("added mass", "kg", roles=(Role.COUNTERWEIGHT, Role.BALANCER))
 
-TRANSMISSIBILITY = MountChannel("transmissibility", "", ON_BLOCK, values=_transmissibility)
+TRANSMISSIBILITY = MountChannel("transmissibility", "", ON_BLOCK, values=_transmissibility, of_loads=True)
 SAG = MountChannel(
     "static sag", "m", sides=("min", "max"), values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting))
 )

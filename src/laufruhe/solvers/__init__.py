@@ -8,6 +8,7 @@ from enum import Enum, auto
 from functools import partial
 
 from laufruhe.errors import ModelError
+from laufruhe.problem.channels import MountChannel
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.accuracy import solve_within
@@ -95,16 +96,18 @@ def _stars_on_mounts(problem: Problem, say: Say) -> Result:
     return solve_star_mounts(problem, say)
 
 
-def _on_firm_loads(problem: Problem) -> bool:
-    return not problem.asks_mounts
+def _asks_loads(problem: Problem) -> bool:
+    """Whether nothing that is asked of the mounts depends on loads: it holds for every design, or for none."""
+    asked = [limit.measure.channel for limit in problem.mount_limits]
+    return not problem.mount_terms and not any(isinstance(c, MountChannel) and c.of_loads for c in asked)
 
 
 _U, _K, _M, _S = Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR
 METHODS: tuple[Method, ...] = (
     Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, lambda problem, _: state(problem)),
-    Method("second-order cones", frozenset({_U}), _on_firm_loads, Reach.WHOLE,
+    Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem, _: solve_within(problem, solve_unbalances)),
-    Method("stars, each with cones", frozenset({_S, _U}), _on_firm_loads, Reach.WHOLE, _stars),
+    Method("stars, each with cones", frozenset({_S, _U}), lambda p: not p.asks_mounts, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), lambda _: True, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), lambda _: True, Reach.ASIDE, _smooth),

@@ -168,7 +168,7 @@ def limit_values(
     for k, limit in enumerate(problem.limits):
         found = evaluation.standing(limit)
         active = bool(found.excess >= -ACTIVE)
-        price = prices[k] if active and prices else 0.0
+        price = prices[k] if active and k < len(prices) else 0.0
         price = price if price * abs(found.edge) > _FELT * value else 0.0
         out.append(LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side))
     return tuple(out)

@@ -74,11 +74,15 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     # most designs are given with what is open at zero, and that one is known
     initial = evaluate(problem) if any(problem.start) else model.bare
     modelled = time.perf_counter()
+    # what is asked of mounts that stay holds for every design, or for none
+    broken = tuple(limit.name for limit in problem.mount_limits if initial.standing(limit).excess > KEPT)
+    if broken:
+        return none_within(problem, initial, broken, {"model": modelled - started})
     optimum, samples = _refine(problem, model, objective_value(problem, initial), cones or _stated)
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
-        conflict = _conflict(_tightened(model.at(samples), 0.0), [limit.name for limit in problem.limits])
+        conflict = _conflict(_tightened(model.at(samples), 0.0), [limit.name for limit in problem.load_limits])
         return none_within(problem, initial, conflict, timing)
     hopeless = _hopeless(problem, optimum)
     if hopeless:
@@ -171,7 +175,7 @@ def _alone(norm: AffineNorm) -> float:
 
 def _hopeless(problem: Problem, optimum: _Optimum) -> tuple[str, ...]:
     """A limit that is broken and that nothing open acts on; none where there is no such."""
-    for limit, (maximum, norm) in zip(problem.limits, optimum.judge.limits, strict=True):
+    for limit, (maximum, norm) in zip(problem.load_limits, optimum.judge.limits, strict=True):
         if not norm.slope.any() and _alone(norm) > maximum * (1.0 + KEPT):
             return (limit.name,)
     return ()
@@ -227,7 +231,7 @@ def _indistinguishable(problem: Problem, affine: AffineProblem) -> Array:
         return np.zeros((affine.size, 0))
     loads = [norm for _, norm in affine.terms]
     loads += [
-        norm for limit, (_, norm) in zip(problem.limits, affine.limits, strict=True)
+        norm for limit, (_, norm) in zip(problem.load_limits, affine.limits, strict=True)
         if not limit.measure.is_mass
     ]  # fmt: skip
     # each decision in the size of what it loads: bounds may be far apart, and far from what is needed
