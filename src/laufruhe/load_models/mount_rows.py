@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -67,3 +67,19 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity
             blocks.append(rows)
             weights += [point.weight / whole / len(mounts) / samples] * samples
     return ca.vertcat(*blocks), Grid(np.array(weights), steps)
+
+
+def transmitted(points: Sequence[PointResponse], quantity: Measure) -> list[tuple[Any, Any]]:
+    """Squares of forces on elastic and on firm mounts, per point and order (E11)."""
+    pairs = []
+    counted = [quantity.orders] if quantity.orders is None else [(order,) for order in quantity.orders]
+    for point in points:
+        if quantity.points is not None and point.name not in quantity.points:
+            continue
+        for one in counted:
+            group = np.flatnonzero((point.orders > 0.0) & replace(quantity, orders=one).counted(point.orders)).tolist()
+            if group:
+                parts = point.response.force, point.response.firm
+                over, under = (sum(ca.sumsqr(part[:, group]) for part in halves) for halves in parts)
+                pairs.append((over, under))
+    return pairs

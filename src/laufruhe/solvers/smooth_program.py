@@ -26,7 +26,7 @@ from scipy.optimize import linear_sum_assignment
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.mount_loads import FixedThrows, Loads, MovedThrows
-from laufruhe.load_models.mount_rows import PointResponse, sampled_rows
+from laufruhe.load_models.mount_rows import PointResponse, sampled_rows, transmitted
 from laufruhe.load_models.mount_symbols import elimination, response, symbolic_mounts
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_model import UnevenModel, rides_of
@@ -237,7 +237,7 @@ class SmoothProgram:
             numbers = self.problem.numbers([self._d[k] for k in range(self._count)], self._decisions)
             rows = numbers.mounts or [list(mount.stiffness) for mount in self._mounting.mounts]
             return sum((k for row in rows for k in row[:3]), ca.MX(0.0))
-        pairs = self._transmitted(quantity)
+        pairs = transmitted(self._points, quantity)
         if not pairs:
             felt = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
             there = ", ".join(f"{order:g}" for order in felt[:MOST_NAMED]) or "none"
@@ -247,24 +247,6 @@ class SmoothProgram:
         for force, firm in pairs:
             self._held.add(force / firm - top * top, -np.inf, 0.0, quantity.name)
         return top
-
-    def _transmitted(self, quantity: Measure) -> list[tuple[Any, Any]]:
-        """Squares of forces on elastic and on firm mounts, per point and order (E11)."""
-        pairs = []
-        for point in self._points:
-            if quantity.points is not None and point.name not in quantity.points:
-                continue
-            counted = [quantity.orders] if quantity.orders is None else [(order,) for order in quantity.orders]
-            groups = [
-                np.flatnonzero((point.orders > 0.0) & replace(quantity, orders=one).counted(point.orders)).tolist()
-                for one in counted
-            ]
-            for group in groups:
-                if group:
-                    force, firm = point.response.force, point.response.firm
-                    over, under = (sum(ca.sumsqr(part[:, group]) for part in parts) for parts in (force, firm))
-                    pairs.append((over, under))
-        return pairs
 
     def _hold_modes(self) -> None:
         """The modes are modes (E21)."""
@@ -287,7 +269,7 @@ class SmoothProgram:
                 self._held.add(shapes[j, j] * momenta[j, j], max(limit.minimum, 0.0), np.inf, limit.name, 1.0)
         elif quantity.channel is channels.TRANSMISSIBILITY:
             most = limit.maximum
-            for force, firm in self._transmitted(quantity):
+            for force, firm in transmitted(self._points, quantity):
                 self._held.add(ca.sqrt(force / firm), -np.inf, most, limit.name, 1.0)
         else:
             unit = (limit.maximum if limit.maximum < math.inf else limit.minimum) or 1.0
