@@ -174,7 +174,7 @@ class TestPrices:
     def test_price_is_the_dual_norm(self, norm: Norm) -> None:
         """mu Z with Z in the unit sphere of the dual norm has the price mu (P5)."""
         rng = np.random.default_rng(3)
-        grid = Grid(np.array([0.2, 0.3, 0.5]), 1)
+        grid = Grid(np.array([0.2, 0.3, 0.5]), 3)
         v = rng.standard_normal((3, 2))
         z = norm.subgradient(grid, v)
         limit = AffineNorm(norm, v, np.zeros((3, 2, 1)), grid)
