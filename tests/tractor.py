@@ -8,9 +8,10 @@ from collections.abc import Sequence
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, OperatingPoint, Role, Rotor, Seiliger, Shaft
 from laufruhe.machine.layouts import Mechanism, build, inline
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.decision import Decision, RotorDrive, Sector
+from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Limit, Term
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Sector
 
 RADIUS, LAMBDA, MASS, SPACING = 0.06, 0.26, 1.25, 0.125
 SPEED = 2500 * math.pi / 30

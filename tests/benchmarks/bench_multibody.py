@@ -24,9 +24,10 @@ from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.problem import channels
-from laufruhe.problem.decision import Decision, RotorDrive, Sector
+from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Sector
 
 OUT = PAGES / "multibody.md"
 

@@ -16,10 +16,11 @@ from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.norms import NORMS, lengths
 from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel, MassChannel
-from laufruhe.problem.decision import Decision, Interval, RotorDrive, Sector
+from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Interval, Sector
 from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 
 # travel needs elastic mounts, and is tested with them

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from laufruhe.problem.decision import Decision, Domain, Interval, Sector, domains_of
+from laufruhe.problem.decision import Decision, Domain, domains_of
+from laufruhe.problem.sets import Interval, Sector
 
 Array = NDArray[np.float64]
 OFFSET = 3  # columns of others before this one

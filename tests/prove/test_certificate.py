@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.norms import NORMS, Grid, Norm
-from laufruhe.problem.decision import Decision, Domain, Interval, Sector, domains_of
+from laufruhe.problem.decision import Decision, Domain, domains_of
+from laufruhe.problem.sets import Interval, Sector
 from laufruhe.prove.certificate import Multipliers, best_bound, kkt_residual, lower_bound
 
 Array = NDArray[np.float64]

@@ -14,10 +14,11 @@ from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel
-from laufruhe.problem.decision import Decision, Sector
+from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Limit, Measure, Term
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Sector
 from laufruhe.prove.certificate import Proof, best_bound, kkt_residual
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.conic import ConicProgram

@@ -24,8 +24,8 @@ from laufruhe.physics.gas_loads import gas_torque
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 from laufruhe.problem import channels
-from laufruhe.problem.decision import Sector
 from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.sets import Sector
 from laufruhe.solvers import solve
 from many_digits import acceleration_orders
 

@@ -11,7 +11,7 @@ from laufruhe.errors import ModelError
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.file_models import ConstraintTable, ProblemFile, QuantityTable
 from laufruhe.machine import Engine, OperatingPoint
-from laufruhe.problem.channels import ON_PLACES, Channel, LoadChannel, MassChannel, MountChannel, Needs
+from laufruhe.problem.channels import ON_PLACES, Channel, Needs
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Term, counted_rotors, radius_of
 
 _NEEDS = {
@@ -102,11 +102,11 @@ def _stray(key: str, channel: Channel) -> str:
     """Why a key means nothing for a channel."""
     if key == "of":
         return "goes with masses only"
-    if isinstance(channel, MassChannel):
+    if channel.is_mass:
         return "means nothing for a mass"
-    if isinstance(channel, LoadChannel) and key in ON_PLACES:
+    if channel.is_load and key in ON_PLACES:
         return "goes with mount forces and travels only"
-    return f"means nothing for {channel}" if isinstance(channel, MountChannel) else f"means nothing for a {channel}"
+    return f"means nothing for {channel}" if channel.is_mounting else f"means nothing for a {channel}"
 
 
 def _known(names: list[str] | None, known: Sequence[str], where: str, what: str) -> None:
@@ -141,7 +141,7 @@ def objective_of(file: ProblemFile, scene: Scene) -> tuple[Term, ...]:
 def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Measure:
     found = scene.measure(name, table, where)
     if not found.channel.minimised:
-        others = [n for n, (channel, _) in MEASURES.items() if isinstance(channel, MountChannel) and channel.minimised]
+        others = [n for n, (channel, _) in MEASURES.items() if channel.is_mounting and channel.minimised]
         raise Refused(where, name, "is not minimised but limited", "use one of: " + ", ".join(others))
     return found
 
@@ -157,7 +157,7 @@ def limits_of(file: ProblemFile, scene: Scene) -> tuple[Limit, ...]:
 def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
     measure = scene.measure(table.limit, table, f"{where}.limit")
     sides, channel = measure.channel.sides, measure.channel
-    norm = not isinstance(channel, MountChannel)
+    norm = not channel.is_mounting
     for key in _SIDES:
         if getattr(table, key) is not None and key not in sides:
             rule = f"{channel}, which has a largest value only" if norm else table.limit

@@ -20,10 +20,10 @@ from laufruhe.problem.decision import (
     STIFFNESS,
     TURNED,
     Decision,
-    Interval,
     MountDrive,
     mount_of,
 )
+from laufruhe.problem.sets import Interval
 
 _AXES = ("x", "y", "z")
 _FIELDS = (

@@ -18,7 +18,8 @@ from laufruhe.files.fields import Name, Table
 from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.numerics.turns import as_turn, cis
-from laufruhe.problem.decision import Decision, Interval, RotorDrive, Sector, Set
+from laufruhe.problem.decision import Decision, RotorDrive
+from laufruhe.problem.sets import Interval, Sector, Set
 
 _HOW = {"equal": (1.0, False), "opposite": (-1.0, False), "mirrored": (1.0, True), "mirrored opposite": (-1.0, True)}
 

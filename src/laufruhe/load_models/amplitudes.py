@@ -15,7 +15,6 @@ from laufruhe.physics.crank_stars import Array, Stars, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.star_space import StarSpace
-from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Term
 from laufruhe.problem.problem import Problem
@@ -94,7 +93,7 @@ def amplitude_objective(problem: Problem) -> AmplitudeObjective | None:
 
 def _limits_idle(problem: Problem) -> bool:
     """Whether only forces are limited, and met: of even stars the counts on the steps fix them."""
-    forces = all(limit.measure.channel is channels.SHAKING_FORCE for limit in problem.limits)
+    forces = all(limit.measure.lever == 0 for limit in problem.limits)
     if not problem.limits or not forces or problem.phasing is None:
         return not problem.limits
     layout = problem.phasing.layout(*problem.phasing.geometries[0])
@@ -106,7 +105,7 @@ def _limits_idle(problem: Problem) -> bool:
 
 def _is_amplitude(term: Term) -> bool:
     q = term.measure
-    if q.channel not in (channels.SHAKING_FORCE, channels.ROCKING_COUPLE):
+    if q.lever is None:
         return False
     return q.norm.is_euclidean or (q.orders is not None and len(q.orders) == 1)
 
@@ -137,7 +136,7 @@ def _factors(term: Term, alone: Evaluation, orders: Sequence[int], x: float) -> 
         counts = counted is None or any(float(h) == order for order in counted)
         values.append(alone.value(replace(term.measure, orders=(float(h),))) if counts else 0.0)
     none = (0.0,) * len(orders)
-    if term.measure.channel is channels.SHAKING_FORCE:
+    if term.measure.lever == 0:
         return AmplitudeTerm(term.weight, tuple(values), none)
     return AmplitudeTerm(term.weight, none, tuple(v / x for v in values))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from laufruhe.machine import Engine, Role
 from laufruhe.numerics.spectrum import Spectrum
@@ -90,6 +90,9 @@ class Channel:
     needs: Needs = Needs.NOTHING
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
+    is_load: ClassVar[bool] = False
+    is_mass: ClassVar[bool] = False
+    is_mounting: ClassVar[bool] = False
 
     def __str__(self) -> str:
         return self.name
@@ -107,12 +110,16 @@ class LoadChannel(Channel):
         Components of the wrench where its one place is the block; None where its places are the mounts.
     feels_gas
         Whether the roll moment is in it: gas gives no force (eq. 1).
+    lever
+        Power of a throw's place that its load grows with; None where loads do not add up by places alone.
     """
 
     keys: tuple[str, ...] = ON_BLOCK
     signal: Callable[[PointLoads], Spectrum] = field(kw_only=True)
     part: slice | None = None
     feels_gas: bool = True
+    lever: int | None = None
+    is_load: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +128,7 @@ class MassChannel(Channel):
 
     keys: tuple[str, ...] = ("of",)
     roles: tuple[Role, ...] = field(kw_only=True)
+    is_mass: ClassVar[bool] = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,13 +146,14 @@ class MountChannel(Channel):
     needs: Needs = Needs.ELASTIC
     values: Callable[[Asked, Answered], Sequence[float]] = field(kw_only=True)
     of_loads: bool = False
+    is_mounting: ClassVar[bool] = True
 
 
-def _on_block(name: str, unit: str, part: slice, feels_gas: bool) -> LoadChannel:
+def _on_block(name: str, unit: str, part: slice, lever: int | None = None) -> LoadChannel:
     def signal(loads: PointLoads) -> Spectrum:
         return Spectrum(loads.wrench.base, loads.wrench.coefficients[:, None, part])
 
-    return LoadChannel(name, unit, signal=signal, part=part, feels_gas=feels_gas)
+    return LoadChannel(name, unit, signal=signal, part=part, feels_gas=lever is None, lever=lever)
 
 
 def _on_mounts(name: str, unit: str, needs: Needs, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
@@ -191,9 +200,9 @@ def motion_indices(measure: Asked) -> tuple[int, ...]:
 
 MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
-SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3), feels_gas=False)
-ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), feels_gas=False)
-ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4), feels_gas=True)
+SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3), lever=0)
+ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), lever=1)
+ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4))
 
 COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))
 BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))

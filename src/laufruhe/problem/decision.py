@@ -7,11 +7,9 @@ nearest point (P4).
 
 from __future__ import annotations
 
-import cmath
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Protocol, TypeAlias
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,118 +17,12 @@ from numpy.typing import NDArray
 from laufruhe.machine import Engine, Mount
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.rigid_body import turned_axes
+from laufruhe.problem.sets import Set, Value
 
 Array = NDArray[np.float64]
-Value: TypeAlias = complex | float
 
 STIFFNESS, LOSS, DAMPING, POSITION, TURNED = slice(0, 3), 3, slice(4, 7), slice(7, 10), slice(10, 13)
 NUMBERS_OF_MOUNT = 13
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A real number between bounds, along a direction in the plane across the crank (C4)."""
-
-    lower: float
-    upper: float
-    angle: float = 0.0
-    width: ClassVar[int] = 1
-    free_angle: ClassVar[bool] = False
-    edges: ClassVar[Array] = np.zeros((0, 2))
-
-    @property
-    def scale(self) -> float:
-        """Largest size."""
-        return max(abs(self.lower), abs(self.upper)) or 1.0
-
-    def scaled(self, factor: float) -> Interval:
-        """The same in a unit of another size."""
-        return replace(self, lower=self.lower * factor, upper=self.upper * factor)
-
-    @property
-    def angles(self) -> tuple[float, float]:
-        """Bounds of the angle [rad]: one and the same."""
-        return self.angle, self.angle
-
-    @property
-    def directions(self) -> tuple[complex, ...]:
-        """Complex value per unit of each column (C4)."""
-        return (cmath.exp(1j * self.angle),) if self.angle else (1.0 + 0.0j,)
-
-    def split(self, u: Value) -> tuple[float, float]:
-        """Size and angle [rad] of a value."""
-        return (u * self.directions[0].conjugate()).real, self.angle
-
-    def least(self, g: Array) -> float:
-        """min g . x over the set."""
-        return float(min(g[0] * self.lower, g[0] * self.upper))
-
-    def project(self, v: Array) -> Array:
-        """The nearest point of the set."""
-        return np.clip(v, self.lower, self.upper)
-
-
-@dataclass(frozen=True)
-class Sector:
-    """A complex number of a largest size, its angle between bounds: a disc where these are a whole turn apart (C4)."""
-
-    upper: float
-    angles: tuple[float, float] = (0.0, math.tau)
-    lower: ClassVar[float] = 0.0
-    width: ClassVar[int] = 2
-    directions: ClassVar[tuple[complex, ...]] = (1.0 + 0.0j, 1.0j)
-
-    @property
-    def scale(self) -> float:
-        """Largest size."""
-        return self.upper or 1.0
-
-    def scaled(self, factor: float) -> Sector:
-        """The same in a unit of another size."""
-        return replace(self, upper=self.upper * factor)
-
-    @property
-    def free_angle(self) -> bool:
-        """Whether every angle is allowed."""
-        return self.angles[1] - self.angles[0] >= math.tau * (1.0 - 1e-12)
-
-    @property
-    def edges(self) -> Array:
-        """Unit vectors along the two sides, shape (2, 2); none of a disc."""
-        if self.free_angle:
-            return np.zeros((0, 2))
-        low, high = self.angles
-        return np.array([[np.cos(low), np.sin(low)], [np.cos(high), np.sin(high)]])
-
-    def split(self, u: Value) -> tuple[float, float]:
-        """Size and angle [rad] of a value, the angle within the bounds' own turn."""
-        low = self.angles[0]
-        return abs(u), low + (cmath.phase(u) - low) % math.tau if u != 0 else low
-
-    def least(self, g: Array) -> float:
-        """min g . x over the set, in closed form: the negative support function of -g (P4)."""
-        if self._inside_cone(-g):
-            return -self.upper * float(np.hypot(*g))
-        return min(0.0, self.upper * float((self.edges @ g).min()))
-
-    def project(self, v: Array) -> Array:
-        """The nearest point of the set."""
-        if not self._inside_cone(v):
-            along = np.maximum(self.edges @ v, 0.0)
-            best = int(np.argmax(along))
-            v = along[best] * self.edges[best]
-        size = float(np.hypot(*v))
-        return v * (self.upper / size) if size > self.upper else v
-
-    def _inside_cone(self, v: Array) -> bool:
-        edges = self.edges
-        if not len(edges):
-            return True
-        (ax, ay), (bx, by) = edges
-        return bool(ax * v[1] - ay * v[0] >= 0.0 and bx * v[1] - by * v[0] <= 0.0)
-
-
-Set: TypeAlias = Interval | Sector
 
 
 @dataclass

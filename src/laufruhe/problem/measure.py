@@ -18,7 +18,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import OperatingPoint, Rotor
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, orders_equal
-from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel, MountChannel
+from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel
 
 Array = NDArray[np.float64]
 
@@ -78,17 +78,17 @@ class Measure:
     @property
     def is_load(self) -> bool:
         """Whether it is of a signal over the cycle."""
-        return isinstance(self.channel, LoadChannel)
+        return self.channel.is_load
 
     @property
     def is_mass(self) -> bool:
         """Whether it adds up masses."""
-        return isinstance(self.channel, MassChannel)
+        return self.channel.is_mass
 
     @property
     def is_mounting(self) -> bool:
         """Whether it is a number of a block on its mounts and no norm."""
-        return isinstance(self.channel, MountChannel)
+        return self.channel.is_mounting
 
     @property
     def on_mounts(self) -> bool:
@@ -99,6 +99,11 @@ class Measure:
     def feels_gas(self) -> bool:
         """Whether gas loads it."""
         return isinstance(self.channel, LoadChannel) and self.channel.feels_gas
+
+    @property
+    def lever(self) -> int | None:
+        """Power of a throw's place that its loads grow with; None where they do not add up by places alone."""
+        return self.channel.lever if isinstance(self.channel, LoadChannel) else None
 
     def counts_point(self, point: OperatingPoint) -> bool:
         """Whether an operating point counts."""
@@ -154,8 +159,8 @@ class Limit:
 MEAN_MOUNT_FORCE = Measure(MOUNT_FORCE)
 
 MEASURES: Mapping[str, tuple[Channel, Norm]] = {
-    **{f"{norm} {c}": (c, NORMS[norm]) for c in CHANNELS.values() if isinstance(c, LoadChannel) for norm in NORMS},
-    **{name: (channel, MEAN) for name, channel in CHANNELS.items() if not isinstance(channel, LoadChannel)},
+    **{f"{norm} {c}": (c, NORMS[norm]) for c in CHANNELS.values() if c.is_load for norm in NORMS},
+    **{name: (channel, MEAN) for name, channel in CHANNELS.items() if not channel.is_load},
 }
 """Every measure by the name that files and reports call it."""
 

@@ -9,9 +9,10 @@ from typing import Any, TypeAlias
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.problem.decision import Decision, Numbers, Value, moved_numbers
+from laufruhe.problem.decision import Decision, Numbers, moved_numbers
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.phasing import PhasingOf
+from laufruhe.problem.sets import Value
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.problem.decision import Decision, Value
+from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.ranking import PhasingResult

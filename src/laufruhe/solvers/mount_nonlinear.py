@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.problem import channels
-from laufruhe.problem.decision import Value, domains_of
+from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Reach, gap_unit
 from laufruhe.prove.subdivision import Divided, divided_bound, divides
 from laufruhe.prove.transmitted_bound import transmitted_bound

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.decision import Domain, Value, domains_of
+from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
 from laufruhe.problem.mount_resonance import evaluate_start, objective_size, off_resonance
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
 from laufruhe.solvers.nonlinear import spread_starts
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.unbalances import solve_unbalances
