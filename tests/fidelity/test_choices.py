@@ -21,7 +21,7 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import reference
 from laufruhe.fidelity.knobs import KNOBS
-from laufruhe.files.file_models import FidelityTable
+from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint, SliderCrank
 from laufruhe.machine.slider_crank import Motion

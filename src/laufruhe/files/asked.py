@@ -1,19 +1,25 @@
-"""What a problem file minimises and limits: its measures, checked against the engine that they speak of."""
+"""[objective] and [[constraints]] of a problem file: their tables, and the measures they make of an engine."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, Literal, TypeAlias, TypeVar
+
+from pydantic import Field
 
 from laufruhe import units
 from laufruhe.errors import ModelError
-from laufruhe.files.complaints import Refused, measured, nearest
-from laufruhe.files.file_models import ConstraintTable, ProblemFile, QuantityTable
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused, measured, nearest, one_of
+from laufruhe.files.fields import Name, Table
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.problem.channels import ON_PLACES, Channel, Needs
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Term, counted_rotors, radius_of
 
+T = TypeVar("T")
+QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": list(MEASURES)})]
 _NEEDS = {
     Needs.MOUNTS: ("needs mounts", "add [mounts], or ask for a shaking force"),
     Needs.ELASTIC: ("needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]'),
@@ -21,6 +27,46 @@ _NEEDS = {
 _KEYS = ("operating_points", "orders", "mounts", "direction_weights", "motions", "frequency", "of")
 _ROUNDING = 1e-9
 _SIDES = ("min", "max", "outside")
+
+
+class QuantityTable(Table):
+    """What part of a quantity counts."""
+
+    mounts: list[str] | None = None
+    operating_points: list[str] | None = None
+    orders: list[f.NonNegative] | None = None
+    direction_weights: f.Three[f.NonNegative] | None = None
+    motions: list[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = Field(
+        default=None, description="That are to have a mode of their own."
+    )
+    frequency: f.Frequency | None = Field(default=None, description="Wanted about the torque-roll axis.")
+
+
+class TermTable(QuantityTable):
+    """One part of a weighted objective."""
+
+    quantity: QuantityName
+    weight: f.Positive = 1.0
+
+
+class ObjectiveTable(QuantityTable):
+    """What is to be least: one quantity, or a weighted sum of terms."""
+
+    minimise: QuantityName | None = None
+    terms: list[TermTable] = Field(default_factory=list)
+
+
+class ConstraintTable(QuantityTable):
+    """A limit on a quantity."""
+
+    limit: QuantityName
+    max: f.Side | None = Field(default=None, description="With the unit of the quantity.", examples=["6 kg"])
+    min: f.Side | None = Field(default=None, description="Of natural frequencies, decoupling or sag.")
+    outside: f.Pair[f.Side] | None = Field(
+        default=None, description="A band that holds no natural frequency.", examples=[["12 Hz", "20 Hz"]]
+    )
+    name: Name | None = None
+    of: list[str] | None = Field(default=None, description="Counterweights or balancers whose mass counts.")
 
 
 @dataclass(frozen=True)
@@ -43,6 +89,20 @@ class Scene:
         channel, norm = MEASURES[name]
         at, of = where.rsplit(".", 1)[0], getattr(table, "of", None)
         self._meets(channel.needs, where, name)
+        self._check_keys(channel, table, at)
+        weights = table.direction_weights
+        found = Measure(
+            channel, norm, _tuple(table.mounts), _tuple(table.operating_points), _tuple(of), _tuple(table.orders),
+            None if weights is None else (weights[0], weights[1], weights[2]), _tuple(table.motions),
+            table.frequency or 0.0,
+        )  # fmt: skip
+        if found.is_mass:
+            self._counts(found, of, at)
+        return found
+
+    def _check_keys(self, channel: Channel, table: QuantityTable, at: str) -> None:
+        """Refuse keys that mean nothing for a channel, and names of what is not there."""
+        of = getattr(table, "of", None)
         for key in _KEYS:
             if getattr(table, key, None) is not None and key not in channel.keys:
                 raise Refused(f"{at}.{key}", of if key == "of" else None, _stray(key, channel), "leave it out")
@@ -53,21 +113,6 @@ class Scene:
             remedy = "say which natural frequency about the axis is wanted"
             raise Refused(f"{at}.frequency", None, "is missing", remedy)
         self._orders(table.orders, f"{at}.orders")
-        weights = table.direction_weights
-        found = Measure(
-            channel,
-            norm,
-            mounts=_tuple(table.mounts),
-            points=_tuple(table.operating_points),
-            rotors=_tuple(of),
-            orders=None if table.orders is None else tuple(table.orders),
-            direction_weights=None if weights is None else (weights[0], weights[1], weights[2]),
-            motions=None if table.motions is None else tuple(table.motions),
-            frequency=table.frequency or 0.0,
-        )
-        if found.is_mass:
-            self._counts(found, of, at)
-        return found
 
     def _meets(self, needs: Needs, where: str, name: str) -> None:
         lacking = {Needs.MOUNTS: not self.engine.mounts, Needs.ELASTIC: self.engine.block is None}
@@ -117,18 +162,15 @@ def _known(names: list[str] | None, known: Sequence[str], where: str, what: str)
             raise Refused(where, name, f"is no {what} here", nearest(name, list(known)) if known else "add it")
 
 
-def _tuple(names: Sequence[str] | None) -> tuple[str, ...] | None:
-    return None if names is None else tuple(names)
+def _tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
+    return None if entries is None else tuple(entries)
 
 
-def objective_of(file: ProblemFile, scene: Scene) -> tuple[Term, ...]:
+def objective_of(table: ObjectiveTable | None, scene: Scene) -> tuple[Term, ...]:
     """What is to be least, norms of loads before numbers of the mounts; the mean mount force where nothing is said."""
-    table = file.objective
     if table is None:
         return (Term(MEAN_MOUNT_FORCE),) if scene.engine.mounts else ()
-    if (table.minimise is None) == (not table.terms):
-        state = "is missing" if table.minimise is None else "is given twice, also as terms"
-        raise Refused("objective.minimise", table.minimise, state, "give minimise or [[objective.terms]], one of them")
+    one_of(table, "objective", "minimise", "terms", shown=table.minimise, named="[[objective.terms]]")
     if table.minimise is not None:
         return (Term(_minimised(table.minimise, table, "objective.minimise", scene)),)
     found = [
@@ -146,9 +188,9 @@ def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Mea
     return found
 
 
-def limits_of(file: ProblemFile, scene: Scene) -> tuple[Limit, ...]:
+def limits_of(tables: Sequence[ConstraintTable], scene: Scene) -> tuple[Limit, ...]:
     """What is forbidden, limits of loads and masses before those of the mounts."""
-    found = [_limit(table, f"constraints[{k + 1}]", scene) for k, table in enumerate(file.constraints)]
+    found = [_limit(table, f"constraints[{k + 1}]", scene) for k, table in enumerate(tables)]
     found.sort(key=lambda limit: limit.measure.is_mounting)
     _check_together([limit for limit in found if limit.measure.is_mounting])
     return tuple(found)

@@ -180,3 +180,25 @@ def blamed_on(where: str) -> Iterator[None]:
     except ModelError as error:
         found = Complaint.of(error, where, remedy="correct it")
         raise Refused(found.where, found.value or None, found.rule, found.remedy) from None
+
+
+def one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None, named: str = "") -> None:
+    """Refuse two keys of which one is wanted, where both or neither stand; `named` is the other as a remedy says it."""
+    given = [getattr(table, k) not in (None, []) for k in (key, other)]
+    if given[0] == given[1]:
+        state = f"is given twice, also as {other}" if given[0] else "is missing"
+        raise Refused(f"{where}.{key}", shown, state, f"give {key} or {named or other}, one of them")
+
+
+def none_of(table: BaseModel, keys: Sequence[str], where: str, rule: str, remedy: str) -> None:
+    """Refuse keys that mean nothing here, where they do not stand as if left out."""
+    for key in keys:
+        if getattr(table, key) != type(table).model_fields[key].default:
+            raise Refused(f"{where}.{key}", None, rule, remedy)
+
+
+def all_different(things: Sequence[Any], where: str, rule: str) -> None:
+    """Refuse two of the same."""
+    for k, thing in enumerate(things):
+        if thing in things[:k]:
+            raise Refused(f"{where}[{k + 1}]", thing, f"two {rule}", "move or rename one")

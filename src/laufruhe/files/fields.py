@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -16,6 +16,7 @@ from pydantic import (
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     WithJsonSchema,
+    create_model,
 )
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -26,6 +27,9 @@ LARGEST = 1e12
 # Ratios are taken as fractions with a denominator of at most a thousand.
 SLOWEST = 1e-3
 
+T = TypeVar("T")
+Given = TypeVar("Given", bound=BaseModel)
+
 
 @dataclass(frozen=True)
 class Open:
@@ -34,6 +38,21 @@ class Open:
     lower: float
     upper: float
     start: float
+
+    @classmethod
+    def of(cls, value: float | Open | None) -> Open:
+        """A number that may be open; one that is given stands at both bounds, and none is zero."""
+        return value if isinstance(value, Open) else cls(*(float(value or 0.0),) * 3)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest value."""
+        return self.lower, self.upper
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the bounds leave anything to decide."""
+        return self.lower < self.upper
 
 
 @dataclass(frozen=True)
@@ -46,12 +65,8 @@ class Number:
         SI unit; "" for a plain number.
     openable
         Whether `{ between = [low, high] }` may stand in place of the number.
-    least
-        Smallest value allowed [SI].
-    above
-        Value that must be exceeded [SI].
-    most
-        Largest value allowed [SI].
+    least, above, most
+        Smallest value, value to exceed, largest value [SI].
     plain
         Factor that turns a bare number into SI, where one is allowed (degrees).
     """
@@ -82,13 +97,10 @@ class Number:
         return {"anyOf": [number, between]}
 
     def _number_schema(self) -> dict[str, Any]:
-        text = {
-            "type": "string",
-            "description": units.dimension_name(self.unit),
-            "examples": [units.example(self.unit)],
-        }
         if not self.unit:
             return {"type": "number"}
+        told = {"description": units.dimension_name(self.unit), "examples": [units.example(self.unit)]}
+        text = {"type": "string", **told}
         return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
 
     def _read(self, given: Any) -> float | Open:
@@ -128,11 +140,9 @@ class Number:
     def _open(self, given: dict[str, Any]) -> Open:
         if not self.openable:
             raise refusal("cannot be left open; give a number")
-        unknown = set(given) - {"between", "start"}
-        if unknown:
-            raise refusal(
-                f"has an unknown key '{min(unknown)}'; write {{ between = [low, high] }}, start = ... is optional"
-            )
+        if unknown := set(given) - {"between", "start"}:
+            rule = f"has an unknown key '{min(unknown)}'"
+            raise refusal(f"{rule}; write {{ between = [low, high] }}, start = ... is optional")
         pair = given.get("between")
         if not isinstance(pair, list) or len(pair) != 2:
             raise refusal("needs two bounds; write { between = [low, high] }")
@@ -147,15 +157,7 @@ class Number:
 
 @dataclass(frozen=True)
 class OrOpen:
-    """A pydantic field that reads a list, or the word "open" in its place.
-
-    Attributes
-    ----------
-    inner
-        Type of the list.
-    example
-        As a user would write it.
-    """
+    """A pydantic field that reads a list of the type `inner`, or the word "open" in its place."""
 
     inner: Any
     example: str
@@ -200,7 +202,6 @@ PositiveLength: TypeAlias = Annotated[float, Number("m", above=0.0)]
 Mass: TypeAlias = Annotated[float, Number("kg", least=0.0)]
 PositiveMass: TypeAlias = Annotated[float, Number("kg", above=0.0)]
 Inertia: TypeAlias = Annotated[float, Number("kg m^2")]
-PositiveInertia: TypeAlias = Annotated[float, Number("kg m^2", above=0.0)]
 Pressure: TypeAlias = Annotated[float, Number("Pa")]
 PositivePressure: TypeAlias = Annotated[float, Number("Pa", above=0.0)]
 Angle: TypeAlias = Annotated[float, Number("rad", plain=_DEG)]
@@ -211,7 +212,7 @@ Time: TypeAlias = Annotated[float, Number("s", above=0.0)]
 Ratio: TypeAlias = Annotated[float, Number("", least=-100.0, most=100.0), AfterValidator(_turning)]
 NonNegative: TypeAlias = Annotated[float, Number("", least=0.0)]
 Positive: TypeAlias = Annotated[float, Number("", above=0.0)]
-Fraction: TypeAlias = Annotated[float | Open, Number("", least=-10.0, most=10.0, openable=True)]
+OpenFraction: TypeAlias = Annotated[float | Open, Number("", least=-10.0, most=10.0, openable=True)]
 NonNegativeLength: TypeAlias = Annotated[float, Number("m", least=0.0)]
 Unbalance: TypeAlias = Annotated[float, Number("kg m", least=0.0)]
 Force: TypeAlias = Annotated[float, Number("N", above=0.0)]
@@ -229,9 +230,17 @@ Side: TypeAlias = Annotated[
 ]
 Throws: TypeAlias = Annotated[list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]")]
 Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60)]
+CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
+Pair: TypeAlias = Annotated[list[T], Field(min_length=2, max_length=2)]
+Three: TypeAlias = Annotated[list[T], Field(min_length=3, max_length=3)]
 
 
 class Table(BaseModel):
     """A TOML table that knows its keys and takes no others."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+def with_keys(table: type[Given], keys: Mapping[str, Any]) -> type[Given]:
+    """A table with further keys: the type and the field of each."""
+    return create_model(table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **keys)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +12,18 @@ from pydantic import ValidationError
 
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.files.asked import Scene, limits_of, objective_of
-from laufruhe.files.assemble_engine import cycle_of, moving_parts, operating_points
-from laufruhe.files.assemble_mounts import mounts_of
 from laufruhe.files.complaints import Refused, complaints_of
-from laufruhe.files.file_models import ProblemFile
-from laufruhe.files.read_fidelity import at_fidelity
-from laufruhe.files.read_phasing import is_open, opened
+from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
+from laufruhe.files.fidelity import at_fidelity
+from laufruhe.files.gas import gas_of
+from laufruhe.files.mounts import mounts_of
+from laufruhe.files.operating_points import operating_points
+from laufruhe.files.phasing import is_open, opened
+from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.machine import Engine
 from laufruhe.machine.layouts import throw_rotors
+from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem, Search
 
 
@@ -50,9 +54,10 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, ProblemFile)) from None
     try:
-        if is_open(file):
-            return opened(file, lambda closed: _assembled(closed, path))
-        return _assembled(file, path)
+        if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
+            return _assembled(file, file.engine, path=path)
+        closed = partial(_assembled, file, path=path)
+        return opened(file.engine, file.balancer_shafts, file.phasing, closed)
     except Refused as refused:
         raise InputError(str(path), (refused.complaint,)) from None
     except ModelError as error:
@@ -90,21 +95,20 @@ def _unreadable(path: Path, rule: str, remedy: str) -> InputError:
     return InputError(str(path), (Complaint("file", "", rule, remedy),))
 
 
-def _assembled(file: ProblemFile, path: Path) -> Problem:
-    has_gas = file.gas is not None and any(point.gas for point in file.operating_points)
-    cylinders, throws = moving_parts(file.engine, has_gas)
+def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False, *, path: Path) -> Problem:
+    """The problem of a file whose [engine] has this table in its place."""
+    told = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
+    cylinders, throws = moving_parts(table, gas=file.gas is not None and any(point.gas for point in told))
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
     found = mounts_of(file.mounts, file.block)
-    engine = Engine(file.title, cycle_of(file.engine), cylinders, tuple(collected.rotors), found.mounts, found.block)
-    points = operating_points(file, path.parent)
-    scene = Scene(engine, points)
-    objective, decisions = objective_of(file, scene), (*collected.decisions, *found.decisions)
-    for decision in decisions:
-        gains: list[complex] = [drive.gain for drive in decision.rotor_drives]
-        if not any([*gains, *(drive.gain for drive in decision.mount_drives)]):
-            raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")
+    cycle = cycle_of(table)
+    engine = Engine(file.title, cycle, cylinders, tuple(collected.rotors), found.mounts, found.block)
+    points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke)
+    scene, decisions = Scene(engine, points), (*collected.decisions, *found.decisions)
+    objective = objective_of(file.objective, scene)
+    _check_decided(decisions)
     if decisions and not objective:
         raise Refused("objective", None, "is missing while numbers are open", "say what is to be minimised")
     problem = Problem(
@@ -114,11 +118,19 @@ def _assembled(file: ProblemFile, path: Path) -> Problem:
         points=points,
         decisions=decisions,
         objective=objective,
-        limits=limits_of(file, scene),
+        limits=limits_of(file.constraints, scene),
         source=file.source,
         assumptions=tuple(file.assumptions),
         tolerance=file.tolerance,
         mount_numbers=found.numbers,
-        search=Search(file.search.starts, file.search.seed, file.search.boxes),
+        search=Search(**file.search.model_dump()),
     )
     return at_fidelity(problem, file.fidelity)
+
+
+def _check_decided(decisions: Sequence[Decision]) -> None:
+    """Refuse what is open and moves nothing."""
+    for decision in decisions:
+        gains: list[complex] = [drive.gain for drive in decision.rotor_drives]
+        if not any([*gains, *(drive.gain for drive in decision.mount_drives)]):
+            raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")

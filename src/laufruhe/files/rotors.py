@@ -6,15 +6,14 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, nearest
-from laufruhe.files.engine_table import CylinderNumber
-from laufruhe.files.fields import Name, Table
+from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.numerics.turns import as_turn, cis
@@ -28,7 +27,7 @@ class CounterweightTable(Table):
     """A counterweight on the crankshaft, or one opposite every throw."""
 
     name: Name
-    balance_fraction: f.Fraction | None = Field(
+    balance_fraction: f.OpenFraction | None = Field(
         default=None, description="kappa: rotating mass and this share of the reciprocating mass, opposite each throw."
     )
     throws: list[CylinderNumber] | None = None
@@ -64,7 +63,7 @@ class BalancerShaftTable(Table):
 
     name: Name
     ratio: f.Ratio
-    position: Annotated[list[f.Length], Field(min_length=2, max_length=2)] = Field(description="y and z of its axis.")
+    position: f.Pair[f.Length] = Field(description="y and z of its axis.")
     unbalances: list[UnbalanceTable] = Field(min_length=1)
     optional: bool = Field(default=False, description="Whether it is built is decided too.")
     shaft_mass: f.Mass = Field(default=0.0, description="Of an optional shaft, its unbalances not included.")
@@ -146,7 +145,7 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
         raise Refused(f"{where}.{clash}", None, "does not go with balance_fraction", "leave one of them out")
     chosen = range(1, len(pins) + 1) if table.throws is None else table.throws
     given = table.balance_fraction
-    start = given.start if isinstance(given, f.Open) else float(given or 0.0)
+    start = given.start if isinstance(given, Open) else float(given or 0.0)
     drives = []
     for number in chosen:
         pin = _pin(pins, number, f"{where}.throws")
@@ -154,7 +153,7 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
         name = f"{table.name}.{number}"
         into.add(Rotor(name, pin.x, -pin.rotating + start * gain, radius=table.radius), f"{where}.name")
         drives.append(RotorDrive(name, gain))
-    if isinstance(given, f.Open) and given.lower < given.upper:
+    if isinstance(given, Open) and given.lower < given.upper:
         into.decisions.append(
             Decision(
                 f"{table.name}.balance_fraction",
@@ -230,7 +229,7 @@ def _place(
     """One rotor, and the decision about it if its size or angle is open."""
     size, angle = _size(table, where), table.angle
     direction = cis(as_turn(reference))
-    low, high, start_angle = (angle.lower, angle.upper, angle.start) if isinstance(angle, f.Open) else (angle,) * 3
+    low, high, start_angle = (angle.lower, angle.upper, angle.start) if isinstance(angle, Open) else (angle,) * 3
     _check_convex(size, low, high, where)
     high = low + math.tau if _is_whole_turn(low, high) else high
     start = size.start * _direction(start_angle)
@@ -287,6 +286,6 @@ def _size(table: CounterweightTable | UnbalanceTable, where: str) -> _Size:
     if key == "mass" and table.radius is None:
         raise Refused(f"{where}.radius", None, "is missing, and a mass needs one", "add it")
     value = given[key]
-    bounds = (value.lower, value.upper, value.start) if isinstance(value, f.Open) else (float(value or 0.0),) * 3
+    bounds = (value.lower, value.upper, value.start) if isinstance(value, Open) else (float(value or 0.0),) * 3
     gain = float(table.radius or 1.0) if key == "mass" else 1.0
     return _Size("kg" if key == "mass" else "kg m", *bounds, gain)

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from laufruhe.files import fields
 from laufruhe.files.complaints import Refused, nearest
-from laufruhe.files.file_models import ProblemFile
+from laufruhe.files.problem_file import ProblemFile
 
 
 def at(tables: dict[str, Any], where: str) -> Any:

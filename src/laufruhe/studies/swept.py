@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 from pydantic import Field
 
-from laufruhe.files.file_models import QuantityName
+from laufruhe.files.asked import QuantityName
 from laufruhe.files.study_parts import SweepTable
 from laufruhe.files.study_sweeps import Axis, axis_of
 from laufruhe.problem import channels

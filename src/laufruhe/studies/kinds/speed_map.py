@@ -14,9 +14,8 @@ from pydantic import Field, model_validator
 
 from laufruhe.errors import InputError
 from laufruhe.files import fields as f
-from laufruhe.files.asked import Scene
+from laufruhe.files.asked import QuantityName, QuantityTable, Scene
 from laufruhe.files.complaints import Refused, measured, nearest
-from laufruhe.files.file_models import QuantityName, QuantityTable
 from laufruhe.files.study_parts import CaseTable
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import order_amplitude

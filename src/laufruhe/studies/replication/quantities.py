@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from laufruhe.files.asked import Scene
-from laufruhe.files.file_models import QuantityTable
+from laufruhe.files.asked import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import cycle_measures, turning_parts
 from laufruhe.physics.modes import MOTIONS

@@ -1,16 +1,41 @@
-"""The [fidelity] table: choices by hand, or the cheapest that is good enough."""
+"""[fidelity] of a problem file: choices by hand, or the cheapest that is good enough."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, Field
 
 from laufruhe.fidelity.automatic import DEFAULT_TOLERANCE, automatic
 from laufruhe.fidelity.knobs import KNOBS
+from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
-from laufruhe.files.file_models import FidelityTable
+from laufruhe.files.fields import Table
 from laufruhe.physics.fidelity import EXACT, ChoiceError
 from laufruhe.problem.problem import Problem
+
+T = TypeVar("T", bound=BaseModel)
+
+
+def _with_knobs(table: type[T]) -> type[T]:
+    """A table with a key for every choice of fidelity that it does not name itself."""
+    keys: dict[str, Any] = {}
+    for knob in KNOBS:
+        if knob.key not in table.model_fields:
+            kind = Annotated[knob.kind, f.Number(knob.unit, above=0.0)] if knob.unit else knob.kind
+            keys[knob.key] = (kind | None, Field(default=None, **knob.told))
+    return f.with_keys(table, keys)
+
+
+@_with_knobs
+class FidelityTable(Table):
+    """Speed against accuracy."""
+
+    kinematics: Literal["exact", "two-order", "auto"] = Field(
+        default="exact", description="auto: the cheapest choice that keeps the objective within the tolerance."
+    )
+    tolerance: f.Positive | None = Field(default=None, description="Relative error of the objective, for auto.")
 
 
 def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:

@@ -1,0 +1,278 @@
+"""[engine] of a problem file: its common keys, those that layouts own, and the slider-cranks that it makes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+
+from pydantic import BaseModel, Field
+
+from laufruhe import units
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused, blamed_on, nearest, one_of
+from laufruhe.files.fields import CylinderNumber, Name, Open, Table
+from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
+from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
+from laufruhe.machine.slider_crank import radius_for_stroke
+
+T = TypeVar("T", bound=BaseModel)
+FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
+
+_CYCLES = {str(cycle): cycle for cycle in Cycle}
+_OWNED = tuple(dict.fromkeys(key for k in LAYOUTS.values() for key in (*(own.name for own in k.keys), *k.lists)))
+# what a slider-crank of a free list takes from [engine] unless it says otherwise
+_INHERITED = {"stroke", "bore", "offset", "reciprocating_mass", "rod_inertia_deficit"}
+
+
+class RodTable(Table):
+    """The connecting rod as a rigid body."""
+
+    mass: f.PositiveMass
+    centre_of_gravity: f.Length = Field(description="Distance from the crank pin, on the line of the pins.")
+    inertia: f.Inertia = Field(description="About the centre of gravity.")
+
+
+class ShaftTable(Table):
+    """A crankshaft of a free list of parts."""
+
+    name: Name
+    ratio: f.Ratio = 1.0
+    position: f.Pair[f.Length] = Field(description="y and z of its axis.")
+
+
+class SliderCrankTable(Table):
+    """One slider-crank of a free list of parts; what it leaves out it takes from [engine]."""
+
+    x: f.Length
+    bank_angle: f.Angle = Field(default=0.0, description="Of the cylinder axis, from upright towards the left.")
+    throw: f.Angle = 0.0
+    firing_angle: f.Angle | None = Field(default=None, description="Crank angle at which it fires.")
+    shaft: str = "crankshaft"
+    stroke: f.PositiveLength | None = None
+    bore: f.PositiveLength | None = None
+    rod_ratio: f.NonNegative | None = None
+    rod_length: f.PositiveLength | None = None
+    offset: f.Length | None = None
+    reciprocating_mass: f.Mass | None = None
+    rotating_mass: f.Mass | None = None
+    rod_inertia_deficit: f.Inertia | None = None
+
+
+_KINDS: dict[str, Any] = {
+    "length": f.Length,
+    "positive length": f.PositiveLength,
+    "non-negative length": f.NonNegativeLength,
+    "angle": f.Angle,
+    "open angle": f.OpenAngle,
+    "angles": list[f.Angle],
+    "mass": f.Mass,
+    "cylinder": CylinderNumber,
+    "sign": Literal[1, -1],
+    "rod": RodTable,
+}
+
+
+def _with_layout_keys(table: type[T]) -> type[T]:
+    """[engine] with the names of all layouts, and a key for every one that they own."""
+    names: Any = tuple(LAYOUTS)
+    fields: dict[str, Any] = {"layout": (Literal[names], ...)}
+    for key in (key for kind in LAYOUTS.values() for key in kind.keys):
+        kind = _KINDS[key.kind] if key.default is not None else _KINDS[key.kind] | None
+        fields[key.name] = (kind, Field(default=key.default, description=key.description or None))
+    return f.with_keys(table, fields)
+
+
+@_with_layout_keys
+class EngineTable(Table):
+    """What the engine is."""
+
+    layout: str
+    cycle: Literal["two-stroke", "four-stroke"]
+    cylinders: CylinderNumber | None = Field(default=None, description="Told by throws or firing order where left out.")
+    bore: f.PositiveLength | None = Field(default=None, description="Needed with gas.")
+    stroke: f.PositiveLength
+    rod_ratio: f.NonNegative | None = Field(
+        default=None, description="Crank radius over rod length; 0 is a Scotch yoke."
+    )
+    rod_length: f.PositiveLength | None = None
+    offset: f.Length = Field(default=0.0, description="Of the pin's path from the crank axis.")
+    reciprocating_mass: f.Mass = Field(description="Per cylinder, with the rod's share unless [engine.rod] is given.")
+    rotating_mass: f.Mass = Field(default=0.0, description="Per throw, at the crank radius.")
+    rod: RodTable | None = None
+    rod_inertia_deficit: f.Inertia = Field(default=0.0, description="True inertia less that of the two masses.")
+    throws: f.Throws | None = Field(default=None, description="At phi = 0; even firing where left out.")
+    firing_order: FiringOrder | None = None
+    shafts: list[ShaftTable] = Field(default_factory=list)
+    slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
+
+    @property
+    def given_throws(self) -> list[float] | None:
+        """Throws, where every one is a number."""
+        if self.throws is None or self.throws == "open":
+            return None
+        angles = [angle for angle in self.throws if isinstance(angle, float)]
+        return angles if len(angles) == len(self.throws) else None
+
+    @property
+    def given_order(self) -> list[int] | None:
+        """Firing order, where it is a list."""
+        return None if self.firing_order is None or self.firing_order == "open" else self.firing_order
+
+    def own(self, key: str) -> Any:
+        """What stands at a key that a layout owns."""
+        return getattr(self, key)
+
+    @property
+    def kind(self) -> LayoutKind:
+        """What its layout takes and builds."""
+        return LAYOUTS[self.layout]
+
+
+def cycle_of(table: EngineTable) -> Cycle:
+    """Two- or four-stroke."""
+    return _CYCLES[table.cycle]
+
+
+def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
+    """Slider-cranks of [engine], and the throws that they work on."""
+    kind = table.kind
+    for key in _OWNED:
+        if table.own(key) and not kind.takes(key):
+            raise Refused(f"engine.{key}", None, f"means nothing in layout '{table.layout}'", "leave it out")
+    bores = [part.bore for part in table.slider_cranks] or [None]
+    if gas and table.bore is None and None in bores:
+        raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
+    if kind.is_free:
+        parts = _free_parts(table)
+        return parts, tuple(Throw(p.x, p.throw, (k,)) for k, p in enumerate(parts) if p.shaft == CRANKSHAFT)
+    asked, layout = _asked(table, gas), layout_of(table)
+    throws = _throws(table, layout)
+    with blamed_on("engine.firing_order" if table.given_order else "engine"):
+        return kind.parts(asked, layout, throws)
+
+
+def layout_of(table: EngineTable) -> Layout:
+    """Places, banks and pins, without masses."""
+    with blamed_on("engine.cylinders"):
+        return table.kind.place(_asked(table))
+
+
+def _asked(table: EngineTable, gas: bool = False) -> Asked:
+    """What [engine] says to its layout."""
+    given = {key.name: table.own(key.name) for key in table.kind.keys}
+    own = {name: None if isinstance(value, Open) else value for name, value in given.items()}
+    rods = {name: value.model_dump() for name, value in own.items() if isinstance(value, RodTable)}
+    order = None if table.given_order is None else tuple(table.given_order)
+    count, (mechanism, rod) = _cylinders(table), _mechanism(table)
+    return Asked(cycle_of(table), count, mechanism, own | rods, order, table.reciprocating_mass, rod, gas)
+
+
+def _cylinders(table: EngineTable) -> int:
+    order, throws = table.given_order, table.given_throws
+    told = {
+        "cylinders": table.cylinders,
+        "firing_order": None if order is None else len(order),
+        "throws": None if throws is None else len(throws) * table.kind.cylinders_per_throw,
+    }
+    given = [(f"engine.{key}", count) for key, count in told.items() if count is not None]
+    if not given:
+        raise Refused("engine.cylinders", None, "is missing", "add it, or throws, or firing_order")
+    first, count = given[0]
+    for key, other in given:
+        if other != count:
+            raise Refused(key, None, f"makes {other} cylinder(s), but {first} makes {count}", "let them agree")
+    check_order(order, count)
+    return count
+
+
+def check_order(order: Sequence[int] | None, count: int) -> None:
+    """Refuse a firing order that does not name every cylinder once."""
+    if order is not None and sorted(order) != list(range(1, count + 1)):
+        rule = f"is no permutation of 1 to {count}"
+        raise Refused("engine.firing_order", list(order), rule, "name every cylinder once")
+
+
+def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
+    if table.given_throws is not None:
+        return tuple(table.given_throws)
+    if layout.throws is not None:
+        return layout.throws
+    if table.given_order is None:
+        if len(layout.throw_positions) == 1:
+            return (layout.banks[0] - layout.pin_offsets[0],)
+        raise Refused("engine.throws", None, "is missing", "add it, or firing_order for even firing")
+    with blamed_on("engine.firing_order"):
+        return even_throws(cycle_of(table), layout, table.given_order)
+
+
+def _mechanism(table: EngineTable) -> tuple[Mechanism, Rod | None]:
+    """Masses and lengths of one cylinder, and its rod where that is a rigid body."""
+    radius, rod_length = _radius_and_rod(table)
+    rod = _rod(table, rod_length)
+    if rod is not None and table.rod_inertia_deficit != 0.0:
+        raise Refused("engine.rod_inertia_deficit", None, "is given twice, here and by [engine.rod]", "keep one")
+    mechanism = Mechanism(
+        crank_radius=radius,
+        rod_length=rod_length,
+        reciprocating_mass=table.reciprocating_mass + (rod.reciprocating_mass if rod else 0.0),
+        rotating_mass=table.rotating_mass,
+        rod_rotating_mass=rod.rotating_mass if rod else 0.0,
+        rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit,
+        offset=table.offset,
+        bore=table.bore,
+    )
+    return mechanism, rod
+
+
+def _rod(table: EngineTable, length: float) -> Rod | None:
+    if table.rod is None:
+        return None
+    if math.isinf(length):
+        raise Refused("engine.rod", None, "means nothing in a Scotch yoke (rod_ratio = 0)", "leave it out")
+    with blamed_on("engine.rod"):
+        return rod_of("rod", table.rod.model_dump(), length, "crank pin")
+
+
+def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
+    """Crank radius and rod length [m] from stroke, offset and one of rod ratio and rod length."""
+    ratio, length = table.rod_ratio, table.rod_length
+    one_of(table, "engine", "rod_ratio", "rod_length", shown=ratio)
+    with blamed_on("engine.offset"):
+        radius = radius_for_stroke(table.stroke, table.offset, rod_length=length, rod_ratio=ratio or 0.0)
+    rod = length if length is not None else (radius / ratio if ratio else math.inf)
+    turning = (radius + abs(table.offset)) / rod
+    if turning >= 1.0:
+        key, value = ("rod_length", units.shown(rod, "m")) if length is not None else ("rod_ratio", f"{ratio:g}")
+        rule = f"does not let the crank turn, (crank radius + |offset|) / rod length = {turning:.4g} must be under 1"
+        raise Refused(f"engine.{key}", value, rule, "lengthen the rod")
+    return radius, rod
+
+
+def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
+    if not table.slider_cranks:
+        raise Refused("engine.slider_cranks", None, "is missing", "list at least one [[engine.slider_cranks]]")
+    shafts = {"crankshaft": CRANKSHAFT}
+    for k, shaft in enumerate(table.shafts):
+        if shaft.name in shafts:
+            rule = "is the name of another shaft"
+            raise Refused(f"engine.shafts[{k + 1}].name", shaft.name, rule, "give each its own name")
+        with blamed_on(f"engine.shafts[{k + 1}]"):
+            shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
+    return tuple(_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks))
+
+
+def _free_part(table: EngineTable, part: SliderCrankTable, k: int, shafts: dict[str, Shaft]) -> SliderCrank:
+    where = f"engine.slider_cranks[{k + 1}]"
+    if part.shaft not in shafts:
+        raise Refused(f"{where}.shaft", part.shaft, "is no shaft of this engine", nearest(part.shaft, list(shafts)))
+    own = part.model_dump(include=_INHERITED, exclude_none=True)
+    if part.rod_ratio is not None or part.rod_length is not None:
+        own |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}
+    shaft = shafts[part.shaft]
+    with blamed_on(where):
+        mechanism, _ = _mechanism(table.model_copy(update=own))
+        rotating = part.rotating_mass if part.rotating_mass is not None else table.rotating_mass
+        first = (part.bank_angle - part.throw) / shaft.ratio % (math.tau / abs(shaft.ratio))
+        fires = part.firing_angle if part.firing_angle is not None else first
+        return mechanism.cylinder(k + 1, part.x, part.throw, part.bank_angle, fires, rotating, shaft)

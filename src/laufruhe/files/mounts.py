@@ -1,0 +1,249 @@
+"""[mounts] and [block] of a problem file: their tables, the mounts and the block they make, and what is open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from pydantic import Field
+
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused, all_different, blamed_on, nearest, none_of
+from laufruhe.files.fields import Name, Open, Table
+from laufruhe.machine import Block, Mount
+from laufruhe.physics.elastic_mounts import elastic_mounting
+from laufruhe.physics.modes import free_motion
+from laufruhe.problem.decision import (
+    DAMPING,
+    LOSS,
+    NUMBERS_OF_MOUNT,
+    POSITION,
+    STIFFNESS,
+    TURNED,
+    Decision,
+    MountDrive,
+    mount_of,
+)
+from laufruhe.problem.sets import Interval
+
+_AXES = ("x", "y", "z")
+_FIELDS = {
+    key: (unit, range(NUMBERS_OF_MOUNT)[part])
+    for key, unit, part in (
+        ("stiffness", "N/m", STIFFNESS), ("loss_factor", "", slice(LOSS, LOSS + 1)), ("damping", "N s/m", DAMPING),
+        ("position", "m", POSITION), ("turned", "rad", TURNED),
+    )
+}  # fmt: skip
+# what mirroring in y = 0 does to each number of a mount
+_MIRRORED = [1.0] * 8 + [-1.0, 1.0, -1.0, 1.0, -1.0]
+_NOT_RIGID = ('goes with kind = "elastic"', "leave it out, or set the kind")
+_NOT_ELASTIC = ('goes with kind = "rigid"', "give stiffness instead")
+
+
+class BlockTable(Table):
+    """The rigid body that elastic mounts carry."""
+
+    mass: f.PositiveMass = Field(description="Everything that the mounts carry, moving parts included.")
+    centre_of_gravity: f.Three[f.Length] = Field(default=[0.0, 0.0, 0.0])
+    inertia: f.Three[f.Inertia] = Field(description="About x, y and z through the centre of gravity.")
+    inertia_products: f.Three[f.Inertia] = Field(
+        default=[0.0, 0.0, 0.0], description="Entries xy, xz, yz of the tensor: xy = - integral of x y dm."
+    )
+
+
+class StopTable(Table):
+    """A bump stop along each of the mount's own axes; it acts in run-ups."""
+
+    gap: f.PositiveLength
+    stiffness: f.Stiffness
+
+
+class MountTable(Table):
+    """One mount."""
+
+    name: Name | None = None
+    position: f.Three[f.OpenLength] | None = None
+    relative_stiffness: f.Three[f.NonNegative] | None = Field(
+        default=None, description="Along its own x, y, z; 0 carries nothing."
+    )
+    turned: f.Three[f.OpenAngle] | None = Field(
+        default=None, description="Turns about x, then y, then z that bring the axes of C2 to its own."
+    )
+    stiffness: f.Three[f.OpenStiffness] | None = Field(default=None, description="Along its own x, y, z.")
+    loss_factor: f.OpenLossFactor | None = Field(
+        default=None, description="Damping work over deformation work over 2 pi."
+    )
+    damping: f.Three[f.OpenDamping] | None = Field(default=None, description="Viscous, along its own x, y, z.")
+    like: Name | None = Field(default=None, description="Stiffness, loss and damping follow those of this mount.")
+    mirror_of: Name | None = Field(default=None, description="All follows this mount, mirrored in the plane y = 0.")
+    stop: StopTable | None = None
+
+
+class MountsTable(Table):
+    """How the engine is held."""
+
+    kind: Literal["rigid", "elastic"] = "rigid"
+    positions: list[f.Three[f.Length]] = Field(default_factory=list)
+    names: list[Name] | None = None
+    relative_stiffness: f.Three[f.NonNegative] = Field(
+        default=[0.0, 1.0, 1.0], description="Of every rigid mount that gives none."
+    )
+    stiffness: f.Three[f.Stiffness] | None = Field(default=None, description="Of every elastic mount that gives none.")
+    loss_factor: f.LossFactor = Field(default=0.0, description="Of every elastic mount that gives none.")
+    stop: StopTable | None = None
+    places: list[MountTable] = Field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class MountsFound:
+    """Mounts of a file, the block they carry, and what of them is open."""
+
+    mounts: tuple[Mount, ...] = ()
+    block: Block | None = None
+    numbers: tuple[tuple[float, ...], ...] = ()
+    decisions: tuple[Decision, ...] = ()
+
+
+def mounts_of(table: MountsTable | None, block: BlockTable | None) -> MountsFound:
+    """Rigid mounts, or elastic ones with the block on them."""
+    if table is None or table.kind == "rigid":
+        if block is not None:
+            raise Refused("block", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", or leave it out')
+        return MountsFound(_rigid(table)) if table else MountsFound()
+    if block is None:
+        raise Refused("block", None, "is missing, and elastic mounts carry it", "add [block] with mass and inertia")
+    return _elastic(table, _block(block))
+
+
+def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
+    if bool(table.positions) == bool(table.places):
+        state = "is missing" if not table.positions else "is given twice, as positions and as places"
+        raise Refused("mounts.positions", None, state, "give positions or [[mounts.places]], one of them")
+    places = list(table.places) or [MountTable.model_construct(position=list(p)) for p in table.positions]
+    names = table.names or [place.name or f"mount {k + 1}" for k, place in enumerate(places)]
+    if len(names) != len(places):
+        raise Refused("mounts.names", names, f"names {len(names)} of {len(places)} mounts", "name each once")
+    all_different(list(names), "mounts.names", "mounts have one name")
+    return places, list(names)
+
+
+def _rigid(table: MountsTable) -> tuple[Mount, ...]:
+    none_of(table, ("stiffness", "loss_factor", "stop"), "mounts", *_NOT_RIGID)
+    places, names = _places(table)
+    mounts = []
+    for k, (name, place) in enumerate(zip(names, places, strict=True)):
+        where = f"mounts.places[{k + 1}]"
+        none_of(place, ("stiffness", "loss_factor", "damping", "like", "mirror_of", "stop"), where, *_NOT_RIGID)
+        stiffness = place.relative_stiffness or table.relative_stiffness
+        if not any(stiffness):
+            own = f"places[{k + 1}]." if place.relative_stiffness else ""
+            raise Refused(f"mounts.{own}relative_stiffness", stiffness, "carries nothing", "give one a value")
+        numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0]
+        for key in ("position", "turned"):
+            values = _values(table, place, key, where, "add it, or mirror_of")
+            if any(isinstance(value, Open) for value in values):
+                raise Refused(f"{where}.{key}", None, "is open, and rigid mounts stay", 'fix it, or use kind "elastic"')
+            numbers += [Open.of(value).start for value in values]
+        mounts.append(mount_of(Mount(name, (0.0, 0.0, 0.0)), numbers))
+    all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place")
+    return tuple(mounts)
+
+
+def _values(table: MountsTable, place: MountTable, key: str, where: str, remedy: str) -> Sequence[float | Open]:
+    """What stands at a key of a mount, or of all of them."""
+    value = getattr(place, key)
+    if value is None and key in ("stiffness", "loss_factor"):
+        value = getattr(table, key)
+    if value is None and key in ("stiffness", "position"):
+        raise Refused(f"{where}.{key}", None, "is missing", remedy)
+    return [value] if key == "loss_factor" else value or [0.0, 0.0, 0.0]
+
+
+def _block(table: BlockTable) -> Block:
+    (a, b, c), (xy, xz, yz) = table.inertia, table.inertia_products
+    x, y, z = table.centre_of_gravity
+    with blamed_on("block"):
+        return Block(table.mass, ((a, xy, xz), (xy, b, yz), (xz, yz, c)), (x, y, z))
+
+
+def _elastic(table: MountsTable, block: Block) -> MountsFound:
+    none_of(table, ("relative_stiffness",), "mounts", *_NOT_ELASTIC)
+    places, names = _places(table)
+    read = _Numbers([], [])
+    for k, (name, place) in enumerate(zip(names, places, strict=True)):
+        where = f"mounts.places[{k + 1}]"
+        none_of(place, ("relative_stiffness",), where, *_NOT_ELASTIC)
+        leader, followed = _leader(place, names, k, where), _followed(place)
+        read.rows.append([0.0] * NUMBERS_OF_MOUNT)
+        if leader is not None:
+            read.follow(leader, followed, mirrored=place.mirror_of is not None)
+        for key in _FIELDS:
+            if key not in followed:
+                read.take(name, key, _values(table, place, key, where, "add it, or like, or mirror_of"))
+    stops = [place.stop or table.stop for place in places]
+    bare = [_stopped(Mount(name, (0.0, 0.0, 0.0)), stop) for name, stop in zip(names, stops, strict=True)]
+    mounts = tuple(mount_of(mount, row) for mount, row in zip(bare, read.rows, strict=True))
+    _check_held(block, mounts)
+    return MountsFound(mounts, block, tuple(map(tuple, read.rows)), tuple(read.decisions))
+
+
+def _stopped(mount: Mount, stop: StopTable | None) -> Mount:
+    return mount if stop is None else replace(mount, stop_gap=stop.gap, stop_stiffness=stop.stiffness)
+
+
+def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | None:
+    if place.like is not None and place.mirror_of is not None:
+        raise Refused(f"{where}.like", place.like, "is given beside mirror_of", "keep one")
+    leader = place.like or place.mirror_of
+    if leader is None:
+        return None
+    if leader not in names[:k]:
+        key = "like" if place.like else "mirror_of"
+        remedy = nearest(leader, names[:k]) if k else "define the other one first"
+        raise Refused(f"{where}.{key}", leader, "is no mount defined before this one", remedy)
+    none_of(place, _followed(place), where, f"follows '{leader}' already", "leave one out")
+    return names.index(leader)
+
+
+def _followed(place: MountTable) -> tuple[str, ...]:
+    if place.mirror_of is not None:
+        return tuple(_FIELDS)
+    return ("stiffness", "loss_factor", "damping") if place.like is not None else ()
+
+
+@dataclass
+class _Numbers:
+    """Rows of numbers of elastic mounts and decisions about them, as they are read."""
+
+    rows: list[list[float]]
+    decisions: list[Decision]
+
+    def take(self, name: str, key: str, values: Sequence[float | Open]) -> None:
+        """One key of the last mount."""
+        unit, numbers = _FIELDS[key]
+        for number, axis, value in zip(numbers, _AXES, map(Open.of, values), strict=False):
+            self.rows[-1][number] = value.start
+            if value.is_open:
+                label = f"{name}.{key}" if key == "loss_factor" else f"{name}.{key}.{axis}"
+                drive = MountDrive(len(self.rows) - 1, number, 1.0)
+                self.decisions.append(Decision(label, unit, Interval(*value.bounds), value.start, (drive,)))
+
+    def follow(self, leader: int, keys: Sequence[str], mirrored: bool) -> None:
+        """Keys of the last mount are those of another."""
+        last = len(self.rows) - 1
+        for number in (number for key in keys for number in _FIELDS[key][1]):
+            gain = _MIRRORED[number] if mirrored else 1.0
+            self.rows[last][number] = gain * self.rows[leader][number]
+            for d, decision in enumerate(self.decisions):
+                drives = [v for v in decision.mount_drives if v.mount == leader and v.number == number]
+                new = (MountDrive(last, number, gain * drive.gain) for drive in drives)
+                self.decisions[d] = replace(decision, drives=(*decision.drives, *new))
+
+
+def _check_held(block: Block, mounts: tuple[Mount, ...]) -> None:
+    with blamed_on("mounts"):
+        loose = free_motion(elastic_mounting(block, mounts).modes)
+    if loose:
+        remedy = "add a mount or a stiffness there; an open stiffness may be given a start"
+        raise Refused("mounts", None, f"leave the block free in {loose}", remedy)

@@ -1,0 +1,78 @@
+"""Operating points of a problem file: their table, and the speeds and loads that it makes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated
+
+from pydantic import Field
+
+from laufruhe import units
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused, all_different, one_of
+from laufruhe.files.fields import Name, Table
+from laufruhe.machine import Cycle, OperatingPoint, PressureTrace
+from laufruhe.machine.gas import GasModel
+from laufruhe.physics.seiliger_cycle import motored_cycle
+
+
+class OperatingPointTable(Table):
+    """A speed and a load."""
+
+    name: Name | None = None
+    speed: f.Speed | None = None
+    mean_piston_speed: f.PistonSpeed | None = None
+    imep: f.Pressure | None = Field(default=None, description="In place of that of [gas].")
+    motored: bool = Field(default=False, description="The charge is compressed and gets no heat.")
+    gas: bool = Field(default=True, description="false leaves the gas out altogether.")
+    up_to: f.Speed | None = Field(default=None, description="Last speed of a range that starts at speed.")
+    steps: Annotated[int, Field(ge=2, le=1000)] | None = Field(default=None, description="Speeds in the range.")
+    weight: f.Positive = 1.0
+
+
+def operating_points(
+    tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float
+) -> tuple[OperatingPoint, ...]:
+    """Speeds and loads of an engine whose gas, where a point says no other, is this."""
+    points = []
+    for k, table in enumerate(tables):
+        where = f"operating_points[{k + 1}]"
+        speeds = _speeds(table, stroke, where)
+        for speed in speeds:
+            at = units.shown(speed, "rad/s", 6)
+            name = (f"{table.name} {at}" if len(speeds) > 1 else table.name) if table.name else at
+            points.append(OperatingPoint(name, speed, _loaded(gas, table, cycle, where), table.weight / len(speeds)))
+    all_different([p.name for p in points], "operating_points", "operating points have one name")
+    return tuple(points)
+
+
+def _speeds(table: OperatingPointTable, stroke: float, where: str) -> tuple[float, ...]:
+    """One speed, or equal steps over a range that share the weight."""
+    one_of(table, where, "speed", "mean_piston_speed")
+    # c_m = 2 s n (Roetscher eq. 290)
+    first = math.pi * (table.mean_piston_speed or 0.0) / stroke if table.speed is None else table.speed
+    if table.up_to is None and table.steps is None:
+        return (first,)
+    if table.up_to is None or table.steps is None:
+        missing = "up_to" if table.up_to is None else "steps"
+        raise Refused(f"{where}.{missing}", None, "is missing", "give up_to and steps for a range, or neither")
+    if table.up_to <= first:
+        value = units.shown(table.up_to, "rad/s")
+        raise Refused(f"{where}.up_to", value, "does not lie above the first speed", "give a higher one")
+    return tuple(first + (table.up_to - first) * k / (table.steps - 1) for k in range(table.steps))
+
+
+def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, where: str) -> GasModel | None:
+    if table.motored and table.imep is not None:
+        rule = "is given to a motored engine, which burns nothing"
+        raise Refused(f"{where}.imep", None, rule, "leave imep or motored out")
+    if not table.gas:
+        return None
+    if not table.motored and table.imep is None:
+        return gas
+    if gas is None or isinstance(gas, PressureTrace):
+        key = "motored" if table.motored else "imep"
+        raise Refused(f"{where}.{key}", None, "needs [gas] with model seiliger or wiebe", "give that, or leave it out")
+    return motored_cycle(gas, cycle) if table.imep is None else replace(gas, imep=table.imep)

@@ -1,0 +1,310 @@
+"""[phasing] of a problem file: its table, and what it makes of open throws, firing orders, angles and shafts."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from laufruhe import units
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused
+from laufruhe.files.engine import EngineTable, check_order, cycle_of, layout_of
+from laufruhe.files.fields import Open, Table
+from laufruhe.files.rotors import BalancerShaftTable
+from laufruhe.machine import Cycle
+from laufruhe.machine.firing import (
+    MOST_ORDERS,
+    NoEvenStarError,
+    even_patterns,
+    firing_lattice,
+    firing_turns,
+    intervals_of,
+    lap_orders,
+)
+from laufruhe.machine.layouts import LAYOUTS, Layout, even_throws
+from laufruhe.problem.decision import without_rotors
+from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, Method, OrderCriterion, ShaftChoice, bounded_stars
+from laufruhe.problem.problem import Phasing, Problem
+
+Assemble = Callable[[EngineTable, bool], Problem]
+"""The problem with another [engine], and whether gas is left out of it."""
+_OPENABLE = ("throws", "firing_order", "bank_angle", "split_pin_angle")
+
+
+class IntervalsTable(Table):
+    """Bounds on the crank angle from each firing to the next."""
+
+    min: f.Angle | None = None
+    max: f.Angle | None = None
+    largest_deviation: f.Angle | None = Field(default=None, description="From equal intervals.")
+
+
+class PhasingTable(Table):
+    """How open throws, firing orders and shafts are decided."""
+
+    phases: Annotated[int, Field(ge=1, le=96)] | None = Field(
+        default=None, description="Equal steps of a turn that throws stand on; those of even firing where left out."
+    )
+    intervals: IntervalsTable | None = Field(default=None, description="Even firing where left out.")
+    best: Annotated[int, Field(ge=1, le=200)] = Field(default=10, description="How many stars are ranked.")
+    rank_orders_by: list[Literal["roll moment", "neighbours", "longest gap"]] = Field(
+        default=["neighbours", "longest gap"], min_length=1, description="Of firing orders; the first counts most."
+    )
+    most_shafts: Annotated[int, Field(ge=0, le=48)] | None = Field(
+        default=None, description="Optional balancer shafts that may be built."
+    )
+    most_shaft_mass: f.Mass | None = Field(default=None, description="Of the optional shafts that are built.")
+    time_limit: f.Time = Field(default=600.0, description="Of the search.")
+    method: Literal["auto", "search", "program", "enumeration"] = "auto"
+
+
+def is_open(engine: EngineTable, shafts: Sequence[BalancerShaftTable]) -> bool:
+    """Whether anything but unbalances and mounts is left open."""
+    return any(_has_open(engine.own(key)) for key in _OPENABLE) or any(shaft.optional for shaft in shafts)
+
+
+def opened(
+    engine: EngineTable, shafts: Sequence[BalancerShaftTable], table: PhasingTable | None, assemble: Assemble
+) -> Problem:
+    """The problem with the first design that its phasing allows, and the phasing.
+
+    Raises
+    ------
+    Refused
+        If the open parts contradict the file.
+    """
+    table = table or PhasingTable()
+    _check_openable(engine)
+    cycle, count, bounds = cycle_of(engine), _cylinders(engine), _throw_bounds(engine)
+    left, given = _without_choice(engine, count), engine.given_throws
+
+    def realise(candidate: Candidate) -> Problem:
+        return _without(assemble(_with(engine, count, candidate), candidate.without_gas), candidate.left_out)
+
+    phasing = Phasing(
+        cycle=cycle,
+        layout=lambda bank, split: layout_of(_closed(engine, count, bank, split)),
+        cylinders=count,
+        throws=left.throws if left else None if given is None else tuple(given),
+        throw_bounds=bounds,
+        firing_order=None if engine.given_order is None else tuple(engine.given_order),
+        bank=_bounds(engine.own("bank_angle")),
+        split=_bounds(engine.own("split_pin_angle")),
+        intervals=_intervals(table.intervals, cycle, count, bounds is not None, left.spread if left else 0.0),
+        realise=realise,
+        steps=table.phases,
+        shafts=_shaft_choice(shafts, table),
+        best=table.best,
+        criteria=tuple(OrderCriterion(name) for name in table.rank_orders_by),
+        time_limit=table.time_limit,
+        method=Method(table.method),
+    )
+    _check(phasing, engine)
+    problem = replace(phasing.realise(_first(phasing)), phasing=phasing)
+    _check_speed(problem, phasing)
+    return problem
+
+
+def _check_speed(problem: Problem, phasing: Phasing) -> None:
+    """The smooth program of uneven throws knows a crank that turns evenly (S19)."""
+    if phasing.continuous and problem.fidelity.is_uneven:
+        raise Refused(
+            "fidelity.crank_inertia", f"{problem.fidelity.crank_inertia:g} kg m^2",
+            "makes the crank's speed uneven, and throws that leave the even steps are decided at an even one",
+            "leave it out, or fix the throws",
+        )  # fmt: skip
+
+
+def _has_open(value: object) -> bool:
+    """Whether a key of [engine] is left open, or an entry of its list."""
+    return any(part == "open" or isinstance(part, Open) for part in (value if isinstance(value, list) else [value]))
+
+
+def _check_openable(engine: EngineTable) -> None:
+    """Whether the layout lets open what is open."""
+    for key in _OPENABLE:
+        if key not in engine.kind.openable and _has_open(engine.own(key)):
+            others = " or ".join(name for name, other in LAYOUTS.items() if key in other.openable)
+            raise Refused(f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", f"use layout {others}")
+
+
+def _cylinders(engine: EngineTable) -> int:
+    if engine.cylinders is not None:
+        return engine.cylinders
+    if engine.given_order is not None:
+        return len(engine.given_order)
+    if isinstance(engine.throws, list):
+        return len(engine.throws) * engine.kind.cylinders_per_throw
+    if engine.kind.is_free:
+        return len(engine.slider_cranks)
+    raise Refused("engine.cylinders", None, "is missing, and open throws do not tell it", "add it")
+
+
+def _without_choice(engine: EngineTable, count: int) -> Layout | None:
+    """The layout, if it leaves its throws no choice."""
+    if engine.kind.is_free or engine.kind.takes("throws"):
+        return None
+    return layout_of(_closed(engine, count, None, None))
+
+
+def _throw_bounds(engine: EngineTable) -> tuple[tuple[float, float], ...] | None:
+    if not isinstance(engine.throws, list) or engine.given_throws is not None:
+        return None
+    return tuple(Open.of(angle).bounds for angle in engine.throws)
+
+
+def _bounds(value: float | Open | None) -> tuple[float, float] | None:
+    return None if value is None else Open.of(value).bounds
+
+
+def _intervals(given: IntervalsTable | None, cycle: Cycle, count: int, bounded: bool, spread: float) -> Intervals:
+    even = cycle.angle / count
+    if given is None:
+        # throws with bounds of their own need no others
+        return Intervals(0.0, cycle.angle) if bounded else Intervals(even - spread, even + spread)
+    low = given.min if given.min is not None else 0.0
+    high = given.max if given.max is not None else cycle.angle
+    away = given.largest_deviation
+    if given.min is None and given.max is None and away is None:
+        raise Refused("phasing.intervals", None, "says nothing", "give min, max or largest_deviation")
+    if away is not None:
+        if away < 0.0:
+            where, shown = "phasing.intervals.largest_deviation", units.shown(away, "rad")
+            raise Refused(where, shown, "is negative", "give 0 for even firing")
+        low, high = max(low, even - away), min(high, even + away)
+    return Intervals(low, high)
+
+
+def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> ShaftChoice:
+    sets: list[list[BalancerShaftTable]] = []
+    optional = {shaft.name for shaft in tables if shaft.optional}
+    for k, shaft in enumerate(tables):
+        where = f"balancer_shafts[{k + 1}]"
+        leaders = {u.coupled.to.split(".")[0] for u in shaft.unbalances if u.coupled is not None} - {shaft.name}
+        if shaft.optional:
+            _check_sizes(shaft, where)
+        if any((leader in optional) != shaft.optional for leader in leaders):
+            rule = "follows a shaft that is not optional" if shaft.optional else "follows a shaft that is optional"
+            raise Refused(f"{where}.optional", None, rule, "make both optional")
+        if not shaft.optional:
+            continue
+        joined = [group for group in sets if any(other.name in leaders for other in group)]
+        merged = [other for group in joined for other in group] + [shaft]
+        sets = [group for group in sets if group not in joined] + [merged]
+    for key in ("most_shafts", "most_shaft_mass"):
+        if getattr(table, key) is not None and not sets:
+            raise Refused(
+                f"phasing.{key}", None, "limits optional shafts, and none is", "set optional = true on a shaft"
+            )
+    return ShaftChoice(
+        tuple(tuple(shaft.name for shaft in group) for group in sets),
+        tuple(sum(shaft.shaft_mass for shaft in group) for group in sets),
+        math.inf if table.most_shafts is None else float(table.most_shafts),
+        math.inf if table.most_shaft_mass is None else table.most_shaft_mass,
+    )
+
+
+def _check_sizes(shaft: BalancerShaftTable, where: str) -> None:
+    """An optional shaft that is not built needs sizes that may be anything."""
+    for j, unbalance in enumerate(shaft.unbalances):
+        size = unbalance.unbalance if unbalance.unbalance is not None else unbalance.mass
+        if unbalance.coupled is None and not isinstance(size, Open):
+            at = f"{where}.unbalances[{j + 1}]"
+            raise Refused(at, None, "is fixed on an optional shaft", "leave its size open, or make the shaft fixed")
+
+
+def _check(phasing: Phasing, engine: EngineTable) -> None:
+    """What no solver needs to be asked: keys that do not go together."""
+    kind, count = engine.kind, phasing.cylinders
+    for key in kind.keys:
+        if key.remedy and engine.own(key.name) is None:
+            raise Refused(f"engine.{key.name}", None, "is missing", key.remedy)
+    both = all(isinstance(engine.own(key), Open) for key in ("bank_angle", "split_pin_angle"))
+    if not phasing.continuous and both:
+        rule = "is open beside bank_angle, and even firing binds only their sum"
+        raise Refused("engine.split_pin_angle", None, rule, "fix one of the two, or let the firing be uneven")
+    for angle in ("bank_angle", "split_pin_angle"):
+        if phasing.throws is not None and Open.of(engine.own(angle)).is_open:
+            rule = "is open beside throws that are given, and is decided with open ones only"
+            raise Refused(f"engine.{angle}", None, rule, 'write throws = "open", or fix the angle')
+    throws, rest = divmod(count, kind.cylinders_per_throw)
+    if rest:
+        rule = f"is no multiple of the {kind.cylinders_per_throw} cylinders that share a throw"
+        raise Refused("engine.cylinders", count, rule, "give one that is")
+    if isinstance(engine.throws, list) and len(engine.throws) != throws:
+        raise Refused("engine.throws", None, f"has {len(engine.throws)} of {throws} throws", "let them agree")
+    check_order(phasing.firing_order, count)
+    if phasing.throw_bounds is not None and phasing.intervals.forbid_unevenness:
+        raise Refused(
+            "phasing.intervals", None, "allows even firing alone, and throws between bounds fire unevenly",
+            'allow more, leave it out, or write throws = "open"',
+        )  # fmt: skip
+    if phasing.intervals.least > phasing.intervals.most:
+        raise Refused("phasing.intervals.min", None, "is more than max", "swap or relax them")
+
+
+def _first(phasing: Phasing) -> Candidate:
+    """The design that stands for the problem as given: throws in the order of their cylinders."""
+    lowest = (phasing.bank and phasing.bank[0], phasing.split and phasing.split[0])
+    for geometry in phasing.geometries or (lowest,):
+        layout = phasing.layout(*geometry)
+        if phasing.throws is not None:
+            return Candidate(phasing.throws, phasing.firing_order, *geometry)
+        if phasing.throw_bounds is not None:
+            stars = bounded_stars(phasing, layout)
+            ordered = ((throws, _most_even(phasing, layout, throws)) for throws in stars)
+            throws, order = next((pair for pair in ordered if pair[1]), (stars[0], None))
+            return Candidate(throws, order, *geometry)
+        try:
+            pattern = even_patterns(phasing.cycle, layout)[0]
+        except NoEvenStarError:
+            continue
+        if phasing.firing_order is not None:
+            throws = even_throws(phasing.cycle, layout, phasing.firing_order)
+            return Candidate(throws, phasing.firing_order, *geometry)
+        steps = [step for step, times in enumerate(pattern) for _ in range(times)]
+        return phasing.star(steps, firing_lattice(phasing.cycle, phasing.cylinders).steps, geometry)
+    count = len(phasing.layout(*lowest).throw_positions)
+    return Candidate(tuple(math.tau * k / count for k in range(count)), None, *lowest)
+
+
+def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> tuple[int, ...] | None:
+    """The firing order given, or that of the most even intervals; None if these throws cannot fire so."""
+    given = phasing.firing_order
+    orders = lap_orders(phasing.cycle, layout, throws) if given is None else [given]
+    found = []
+    for order in itertools.islice(orders, MOST_ORDERS):
+        intervals = intervals_of(phasing.cycle, firing_turns(layout, throws, order))
+        if min(intervals) > SOONEST:
+            found.append((round(max(intervals) - min(intervals), 9), order))
+    return min(found)[1] if found else None
+
+
+def _closed(engine: EngineTable, count: int, bank: float | None, split: float | None) -> EngineTable:
+    update = {"cylinders": count, "throws": None, "firing_order": None}
+    return engine.model_copy(update={**update, "bank_angle": bank, "split_pin_angle": split})
+
+
+def _with(engine: EngineTable, count: int, candidate: Candidate) -> EngineTable:
+    """[engine] with a candidate's numbers in place of what is open."""
+    if not engine.kind.openable:
+        return engine
+    order = None if candidate.firing_order is None else list(candidate.firing_order)
+    throws = list(candidate.throws) if engine.kind.takes("throws") else None
+    closed = _closed(engine, count, candidate.bank_angle, candidate.split_pin)
+    return closed.model_copy(update={"throws": throws, "firing_order": order})
+
+
+def _without(problem: Problem, shafts: Sequence[str]) -> Problem:
+    """The problem without some shafts: their rotors and what decides on them."""
+    if not shafts:
+        return problem
+    gone = {rotor.name for rotor in problem.engine.rotors if rotor.shaft.name in shafts}
+    rotors = tuple(rotor for rotor in problem.engine.rotors if rotor.name not in gone)
+    engine = replace(problem.engine, rotors=rotors)
+    return replace(problem, engine=engine, decisions=without_rotors(problem.decisions, gone))

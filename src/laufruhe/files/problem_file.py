@@ -1,0 +1,63 @@
+"""A whole problem file, and the JSON schema of it that ships with the package for editors (docs/problem-files.md)."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+
+from pydantic import Field
+
+from laufruhe.files import fields as f
+from laufruhe.files.asked import ConstraintTable, ObjectiveTable
+from laufruhe.files.engine import EngineTable
+from laufruhe.files.fidelity import FidelityTable
+from laufruhe.files.fields import Table
+from laufruhe.files.gas import GasTable
+from laufruhe.files.mounts import BlockTable, MountsTable
+from laufruhe.files.operating_points import OperatingPointTable
+from laufruhe.files.phasing import PhasingTable
+from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
+
+SCHEMA = "laufruhe.schema.json"
+
+
+class SearchTable(Table):
+    """How many points a search starts from where the problem is not convex."""
+
+    starts: int = Field(default=16, ge=1, le=10_000)
+    seed: int = Field(default=0, ge=0)
+    boxes: int | None = Field(
+        default=None, ge=0, le=1_000_000, description="That bounds of stiffness may be divided into for a proof."
+    )
+
+
+class ProblemFile(Table):
+    """A whole problem file."""
+
+    title: str = Field(min_length=1)
+    source: str = ""
+    assumptions: list[str] = Field(default_factory=list)
+    tolerance: f.Positive = Field(default=1e-4, description="Relative gap at which an optimum counts as proven.")
+    engine: EngineTable
+    phasing: PhasingTable | None = None
+    operating_points: list[OperatingPointTable] = Field(min_length=1)
+    gas: GasTable | None = None
+    mounts: MountsTable | None = None
+    block: BlockTable | None = None
+    counterweights: list[CounterweightTable] = Field(default_factory=list)
+    balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
+    objective: ObjectiveTable | None = None
+    constraints: list[ConstraintTable] = Field(default_factory=list)
+    fidelity: FidelityTable = Field(default_factory=FidelityTable)
+    search: SearchTable = Field(default_factory=SearchTable)
+
+
+def schema() -> str:
+    """The schema as the models have it now."""
+    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **ProblemFile.model_json_schema()}
+    return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
+
+
+def shipped_schema() -> str:
+    """The schema in the package."""
+    return (files("laufruhe.files") / SCHEMA).read_text(encoding="utf-8")
