@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 
@@ -158,13 +159,20 @@ def even_orders(cycle: Cycle, layout: Layout, steps: Sequence[int]) -> Iterator[
             yield tuple(order)
 
 
+@lru_cache(maxsize=64)
+def _dead_centres(layout: Layout, throws: tuple[float, ...]) -> tuple[float, ...]:
+    """Of every cylinder as a part of a turn; asked for with every order of one star."""
+    return tuple(float(layout.dead_centre(throws, k) % 1) for k in range(len(layout.positions)))
+
+
 def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) -> tuple[float, ...]:
     """Turn of the crank at which each cylinder of the order fires, ascending from 0."""
+    turns = _dead_centres(layout, tuple(throws))
     start, out = None, []
     previous = -SAME_TURN
     for number in order:
         k = number - 1
-        turn = float(layout.dead_centre(throws, k) % 1)
+        turn = turns[k]
         turn = turn - 1.0 if turn > 1.0 - SAME_TURN else turn
         while turn < previous - SAME_TURN:
             turn += 1.0
@@ -181,7 +189,7 @@ def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterato
     before it: firings that wait for a later one, or come two at once, have no order.
     """
     cylinders = range(len(layout.positions))
-    turns = [float(layout.dead_centre(throws, k) % 1) for k in cylinders]
+    turns = _dead_centres(layout, tuple(throws))
     relative = [(t - turns[0]) % 1.0 for t in turns]
     relative = [0.0 if t > 1.0 - SAME_TURN else t for t in relative]
     laps = itertools.product(range(cycle.turns), repeat=len(relative) - 1)

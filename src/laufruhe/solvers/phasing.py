@@ -126,13 +126,13 @@ def _share(problem: Problem) -> float:
 
 def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     """The best even design solved once more as a problem of its own, with what was proven of all designs (S17)."""
-    designs = [design for design in answer.designs if ranked_orders(phasing, design.candidate, design.steps)]
-    if not designs:
+    entries = [ranked_star(phasing, d.candidate, d.steps, d.value, d.bound, d.proven) for d in answer.designs]
+    fired = [(design, entry) for design, entry in zip(answer.designs, entries, strict=True) if entry.firing_orders]
+    if not fired:
         return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
-    best = designs[0]
-    order = ranked_orders(phasing, best.candidate, best.steps)[0].order
+    best, first = fired[0]
     left_out = phasing.without(_needed(problem, phasing, best))
-    candidate = replace(best.candidate, firing_order=order, left_out=left_out)
+    candidate = replace(best.candidate, firing_order=first.firing_orders[0].order, left_out=left_out)
     result = solve_fixed(replace(phasing.realise(candidate), tolerance=problem.tolerance, phasing=None))
     value = result.objective.value if result.objective else best.value
     # a star's own tolerance, and that by which another has to be better
@@ -140,8 +140,7 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         value, answer.bound, objective_value(problem, evaluate(problem)), 2.0 * problem.tolerance, Reach.WHOLE,
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
     )  # fmt: skip
-    shown = [replace(best, candidate=candidate), *designs[1:]]
-    ranking = [ranked_star(phasing, d.candidate, d.steps, d.value, d.bound, d.proven) for d in shown]
+    ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in fired[1:])]
     count = sum(family.size for family in families_of(phasing)[0])
     details = ranking_result(phasing, candidate, ranking, count, answer.looked_at, answer.method)
     return with_star(problem, phasing, result, candidate, certificate, details)
