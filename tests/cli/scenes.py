@@ -143,7 +143,7 @@ position = ["-300 mm", "0 mm", "-100 mm"]
 relative_stiffness = [1, 2, 3]
 [[counterweights]]
 name = "webs"
-balance_fraction = { between = [0, 1], start = 0.5 }
+balance_factor = { between = [0, 1], start = 0.5 }
 radius = "40 mm"
 [[balancer_shafts]]
 name = "front"

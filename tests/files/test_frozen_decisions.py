@@ -25,7 +25,7 @@ slider_cranks = [{ shaft = "L", x = "0 mm" }, { shaft = "R", x = "0 mm", firing_
 speed = "6000 rpm"
 [[counterweights]]
 name = "web"
-balance_fraction = { between = [0, 1] }
+balance_factor = { between = [0, 1] }
 [objective]
 minimise = "rms shaking force"
 """
@@ -47,7 +47,7 @@ intervals = { largest_deviation = "180 deg" }
 speed = "5000 rpm"
 [[counterweights]]
 name = "web"
-balance_fraction = { between = [0, 1] }
+balance_factor = { between = [0, 1] }
 [objective]
 minimise = "rms shaking force"
 orders = [1]
@@ -56,16 +56,16 @@ SPLIT = changed(TWIN, "bank_angle = { between = [40, 120] }", "bank_angle = 60\n
 
 
 @pytest.mark.parametrize("fraction", ["{ between = [0, 1] }", "{ between = [0.2, 0.8], start = 0.5 }"])
-def test_a_balance_fraction_without_throws(fraction: str, tmp_path: Path) -> None:
+def test_a_balance_factor_without_throws(fraction: str, tmp_path: Path) -> None:
     """Counterweights stand on the crankshaft, and here no throw does."""
     line = complaint_about(written(tmp_path, changed(GEARED, "{ between = [0, 1] }", fraction)))
-    assert line == "web.balance_fraction: is open, and nothing of this engine follows it; fix or leave it out"
+    assert line == "web.balance_factor: is open, and nothing of this engine follows it; fix or leave it out"
 
 
-def test_a_balance_fraction_of_massless_pistons(tmp_path: Path) -> None:
+def test_a_balance_factor_of_massless_pistons(tmp_path: Path) -> None:
     light = changed(TWIN, 'reciprocating_mass = "0.6 kg"', 'reciprocating_mass = "0 kg"')
     text = changed(light, "bank_angle = { between = [40, 120] }", "bank_angle = 90")
-    assert complaint_about(written(tmp_path, text)).startswith("web.balance_fraction: is open, and nothing")
+    assert complaint_about(written(tmp_path, text)).startswith("web.balance_factor: is open, and nothing")
 
 
 @pytest.mark.parametrize(("text", "key"), [(TWIN, "bank_angle"), (SPLIT, "split_pin_angle")])

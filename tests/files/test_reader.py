@@ -192,10 +192,10 @@ BAD = [
         "counterweights[1].unbalance: is given twice, also as mass; give unbalance or mass"),
     bad("no size", "mass = { between = [\"0 kg\", \"3 kg\"] }\n", "",
         "counterweights[1].unbalance: is missing; give"),
-    bad("fraction and size", '["0 kg", "3 kg"] }', "[\"0 kg\", \"3 kg\"] }\nbalance_fraction = 0.5",
-        "counterweights[1].opposite_throw: does not go with balance_fraction; leave one of them out"),
+    bad("fraction and size", '["0 kg", "3 kg"] }', "[\"0 kg\", \"3 kg\"] }\nbalance_factor = 0.5",
+        "counterweights[1].opposite_throw: does not go with balance_factor; leave one of them out"),
     bad("throws of a single weight", "opposite_throw = 1", "opposite_throw = 1\nthrows = [1]",
-        "counterweights[1].throws: goes with balance_fraction"),
+        "counterweights[1].throws: goes with balance_factor"),
     bad("no convex sector", "[0, 360]", "[0, 270]",
         'counterweights[1].angle = "0 to 270 deg": leaves out a sector of less than half a turn; open '
         "it by at most 180 deg, or wholly"),

@@ -34,7 +34,7 @@ throws = "open"
 speed = "1500 rpm"
 [[counterweights]]
 name = "web"
-balance_fraction = { between = [0, 1] }
+balance_factor = { between = [0, 1] }
 """
 HEAVY_END = ('["0 mm", "0 mm", "120 mm"]', '["60 mm", "0 mm", "120 mm"]')
 FORCE = '[objective]\nminimise = "mean mount force"\n[[constraints]]\nlimit = "static sag"\nmax = "4 mm"\n'
@@ -88,7 +88,7 @@ def test_stars_left_out_leave_no_bound(tmp_path):
 def test_where_no_star_matters_the_proof_of_the_mounts_holds(tmp_path):
     """Sag and natural frequencies know no throws: every star has the same proven optimum."""
     engine = changed(ENGINE, ('"open"', '"open"'), ('[[counterweights]]\nname = "web"\n', ""),
-                     ("balance_fraction = { between = [0, 1] }\n", ""))  # fmt: skip
+                     ("balance_factor = { between = [0, 1] }\n", ""))  # fmt: skip
     result = solve(problem_of(tmp_path, engine, BLOCK, MOUNTS, SAG))
     assert result.status is Status.OPTIMAL
     assert result.certificate.kind is Proof.GLOBAL
@@ -135,7 +135,7 @@ def test_no_star_near_an_uneven_one_is_better(uneven):
             float(np.clip(values[d.name] * (1 + size * generator.normal()), d.lower, d.upper))
             for d in own.mount_decisions
         ]
-        fraction = float(np.clip(values["web.balance_fraction"] + size * generator.normal(), 0.0, 1.0))
+        fraction = float(np.clip(values["web.balance_factor"] + size * generator.normal(), 0.0, 1.0))
         near = evaluate(own, own.design([fraction, *mounts]), 96)
         if not phasing.intervals.holds(near.engine.firing_intervals, 1e-9):
             continue

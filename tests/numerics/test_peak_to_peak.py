@@ -28,7 +28,7 @@ throws = [0]
 speed = "3000 rpm"
 [[counterweights]]
 name = "web"
-balance_fraction = { between = [0, 1] }
+balance_factor = { between = [0, 1] }
 [objective]
 minimise = "peak to peak shaking force"
 """

@@ -22,8 +22,8 @@ CASES = {
     "rms": engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE.replace("mean", "rms"),
     "maximum": engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE.replace("mean", "maximum"),
     "couple, mean": engines.WEIGHTS + engines.COUPLE.replace("rms", "mean"),
-    "balance fraction": engines.MOUNTS
-    + '[[counterweights]]\nname = "all"\nbalance_fraction = { between = [-0.2, 0.8] }\n'
+    "balance factor": engines.MOUNTS
+    + '[[counterweights]]\nname = "all"\nbalance_factor = { between = [-0.2, 0.8] }\n'
     + engines.MOUNT_FORCE,
     "limited": engines.MOUNTS
     + engines.WEIGHTS.replace("angle", 'radius = "80 mm"\nangle')
@@ -75,7 +75,7 @@ def _turn(decision):
     return (gain / abs(gain)).conjugate()
 
 
-@pytest.mark.parametrize("name", ["mean", "maximum", "balance fraction", "limited"])
+@pytest.mark.parametrize("name", ["mean", "maximum", "balance factor", "limited"])
 def test_a_cut_is_the_certificate_of_every_star(tmp_path, name):
     problem = engines.problem(tmp_path, 4, rest=CASES[name])
     model, stars = model_of(problem)

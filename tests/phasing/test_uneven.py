@@ -101,7 +101,7 @@ MODELS = {
     "mean": (engines.MOUNTS + engines.MOUNT_FORCE, 1e-4),
     "fraction": (
         engines.MOUNTS
-        + '[[counterweights]]\nname = "all"\nbalance_fraction = 0.3\n'
+        + '[[counterweights]]\nname = "all"\nbalance_factor = 0.3\n'
         + engines.MOUNT_FORCE.replace("mean", "rms"),
         1e-6,
     ),

@@ -1,9 +1,10 @@
-"""Decisions act on the rotors as the file says: couplings, counterweights, balance fractions (eq. 13)."""
+"""Decisions act on the rotors as the file says: couplings, counterweights, balance factors (eq. 13)."""
 
 from __future__ import annotations
 
 import cmath
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +12,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from laufruhe.files.reader import load
 from laufruhe.machine import Role
 from laufruhe.physics.shaking_loads import rotating_loads, rotor_loads
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
-from problem_files import loaded, open_unbalance, shaft
+from problem_files import changed, loaded, open_unbalance, shaft, written
 
+PROBLEMS = Path(__file__).parents[2] / "problems"
 ENGINE = """
 title = "Vee"
 [engine]
@@ -140,12 +143,12 @@ THROWS = (45.0, 135.0)
 
 class TestCounterweights:
     @given(st.floats(-1.0, 2.0))
-    def test_balance_fraction(self, folder: Path, fraction: float) -> None:
+    def test_balance_factor(self, folder: Path, fraction: float) -> None:
         """Eq. (13): opposite each throw its rotating mass, rods included, and the share of its reciprocating mass."""
-        text = '[[counterweights]]\nname = "web"\nbalance_fraction = { between = [-1, 2], start = 0.25 }\n'
+        text = '[[counterweights]]\nname = "web"\nbalance_factor = { between = [-1, 2], start = 0.25 }\n'
         problem = problem_of(folder, text)
         (decision,) = problem.decisions
-        assert (decision.name, decision.unit, decision.lower, decision.upper) == ("web.balance_fraction", "", -1.0, 2.0)
+        assert (decision.name, decision.unit, decision.lower, decision.upper) == ("web.balance_factor", "", -1.0, 2.0)
         for value in (fraction, decision.start):
             found = unbalances(problem, value)
             for k, throw in enumerate(THROWS):
@@ -155,7 +158,7 @@ class TestCounterweights:
 
     @pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
     def test_a_fixed_fraction_is_no_decision(self, folder: Path, fraction: float) -> None:
-        text = f'[[counterweights]]\nname = "web"\nbalance_fraction = {fraction}\nthrows = [2]\n'
+        text = f'[[counterweights]]\nname = "web"\nbalance_factor = {fraction}\nthrows = [2]\n'
         problem = problem_of(folder, text)
         assert problem.decisions == ()
         found = unbalances(problem)
@@ -165,7 +168,7 @@ class TestCounterweights:
 
     def test_rotating_masses_balanced(self, folder: Path) -> None:
         """With a fraction of zero the engine shakes with its pistons alone."""
-        balanced = problem_of(folder, '[[counterweights]]\nname = "web"\nbalance_fraction = 0\n')
+        balanced = problem_of(folder, '[[counterweights]]\nname = "web"\nbalance_factor = 0\n')
         left = rotating_loads(balanced.engine, 100.0).coefficients
         assert abs(left[:, :3]).max() <= 1e-12
 
@@ -242,3 +245,12 @@ def test_loads_change_by_those_of_the_rotors_decided(folder: Path, value: comple
     for order in (1, 2, 4):
         change = with_it.wrench.at(order) - without.wrench.at(order)
         np.testing.assert_allclose(change, alone.at(order), rtol=0.0, atol=1e-10 * np.abs(with_it.wrench.at(2)).max())
+
+
+def test_the_earlier_name_of_the_balance_factor_is_read_as_before(tmp_path: Path) -> None:
+    text = (PROBLEMS / "tractor-single.toml").read_text(encoding="utf-8")
+    earlier = load(written(tmp_path, changed(text, "balance_factor", "balance_fraction")))
+    own = load(PROBLEMS / "tractor-single.toml")
+    assert [decision.name for decision in earlier.decisions] == ["web.balance_fraction"]
+    assert [replace(d, name="") for d in earlier.decisions] == [replace(d, name="") for d in own.decisions]
+    assert earlier.engine.rotors == own.engine.rotors

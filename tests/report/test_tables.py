@@ -41,8 +41,8 @@ def test_the_angle_of_nothing_is_a_dash() -> None:
 def test_a_bound_is_marked() -> None:
     result = scenes.solved(scenes.PARTS)
     rows = {row[0]: row for row in tables_of(result)[0].rows}
-    assert rows["webs.balance_fraction"][4] == "upper"
-    assert rows["webs.balance_fraction"][5].endswith(" N")
+    assert rows["webs.balance_factor"][4] == "upper"
+    assert rows["webs.balance_factor"][5].endswith(" N")
 
 
 def test_every_operating_point_has_its_mounts() -> None:

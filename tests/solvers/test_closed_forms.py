@@ -109,7 +109,7 @@ def test_moment_pair() -> None:
 
 
 def test_half_balance_of_a_single() -> None:
-    """Fig. 10: with equal weight on both directions the best balance fraction of a single is one half."""
+    """Fig. 10: with equal weight on both directions the best balance factor of a single is one half."""
     rotor = web("web", 0.0)
     result = solve(
         problem(engine([0], [rotor]), ["web"], objective=[Term(Measure(channels.SHAKING_FORCE, NORMS["rms"]))])

@@ -127,7 +127,7 @@ def _part(**more: Any) -> Replication:
         "name": "p", "kind": "replication", "title": "t", "numbers": {"kappa": 0, "cm": 10},
         "problems": {"web": {"like": "tractor-single.toml", "gas": {"imep": "5 kp/cm^2"},
                              "operating_points": [{"mean_piston_speed": "{cm} m/s"}],
-                             "counterweights": [{"name": "web", "balance_fraction": "{kappa}"}]}},
+                             "counterweights": [{"name": "web", "balance_factor": "{kappa}"}]}},
         "quantities": {"mean": "mean mount force", "each": "mean force by mount"}, **more,
     })  # fmt: skip
 

@@ -37,7 +37,7 @@ from laufruhe.studies.reader import load_study
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPEED = "operating_points.1.mean_piston_speed"
-FRACTION = "counterweights.web.balance_fraction"
+FRACTION = "counterweights.web.balance_factor"
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from laufruhe.studies.reader import load_study
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPEED = "operating_points.1.mean_piston_speed"
-FRACTION = "counterweights.web.balance_fraction"
+FRACTION = "counterweights.web.balance_factor"
 
 
 def study(
@@ -102,7 +102,7 @@ BAD = [
     (study(sweep=swept("engine.rod_ration", "values = [0.2, 0.3]")), "did you mean 'rod_ratio'?"),
     (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "is no quantity of this scene"),
     (study(sweep=swept("engine.rod_ratio", "values = [0.2, 1.2]")), "rod_ratio"),
-    (study(problem="tractor-four-lanchester"), "leaves no balance fraction open"),
+    (study(problem="tractor-four-lanchester"), "leaves no balance factor open"),
     (study("balancer sizing"), "nothing to size"),
     (study("layout comparison", problem="nowhere"), "does not exist"),
     (study("layout comparison", problem="tractor-study"), "makes this a study file"),

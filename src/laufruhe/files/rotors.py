@@ -23,13 +23,18 @@ from laufruhe.problem.sets import Interval, Sector, Set
 _HOW = {"equal": (1.0, False), "opposite": (-1.0, False), "mirrored": (1.0, True), "mirrored opposite": (-1.0, True)}
 
 
+FACTORS = ("balance_factor", "balance_fraction")
+"""Names of the balance factor (C9), the earlier one last."""
+
+
 class CounterweightTable(Table):
     """A counterweight on the crankshaft, or one opposite every throw."""
 
     name: Name
-    balance_fraction: f.OpenFraction | None = Field(
+    balance_factor: f.OpenFraction | None = Field(
         default=None, description="kappa: rotating mass and this share of the reciprocating mass, opposite each throw."
     )
+    balance_fraction: f.OpenFraction | None = Field(default=None, description="An earlier name of balance_factor.")
     throws: list[CylinderNumber] | None = None
     x: f.Length | None = None
     opposite_throw: CylinderNumber | None = Field(default=None, description="Angle and place are counted from it.")
@@ -37,6 +42,11 @@ class CounterweightTable(Table):
     mass: f.OpenMass | None = None
     radius: f.PositiveLength | None = None
     angle: f.OpenAngle = 0.0
+
+    @property
+    def factor_key(self) -> str | None:
+        """The name under which a balance factor is given; None without one."""
+        return next((key for key in FACTORS if getattr(self, key) is not None), None)
 
 
 class CoupledTable(Table):
@@ -115,7 +125,7 @@ def counterweights(
     pins = [_pin_of(throw, cylinders) for throw in throws]
     for k, table in enumerate(tables):
         where = f"counterweights[{k + 1}]"
-        if table.balance_fraction is not None:
+        if table.factor_key is not None:
             _opposite_throws(table, pins, where, into)
         else:
             _single_counterweight(table, pins, where, into)
@@ -139,12 +149,15 @@ def _pin_of(throw: Throw, cylinders: Sequence[SliderCrank]) -> _Pin:
 
 
 def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
-    single = {key: getattr(table, key) for key in ("x", "opposite_throw", "unbalance", "mass")}
-    clash = next((key for key, value in single.items() if value is not None), None)
+    key = table.factor_key or FACTORS[0]
+    single = {
+        name: getattr(table, name) for name in ("x", "opposite_throw", "unbalance", "mass", *FACTORS) if name != key
+    }
+    clash = next((name for name, value in single.items() if value is not None), None)
     if clash is not None:
-        raise Refused(f"{where}.{clash}", None, "does not go with balance_fraction", "leave one of them out")
+        raise Refused(f"{where}.{clash}", None, f"does not go with {key}", "leave one of them out")
     chosen = range(1, len(pins) + 1) if table.throws is None else table.throws
-    given = table.balance_fraction
+    given = getattr(table, key)
     start = given.start if isinstance(given, Open) else float(given or 0.0)
     drives = []
     for number in chosen:
@@ -156,7 +169,7 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
     if isinstance(given, Open) and given.lower < given.upper:
         into.decisions.append(
             Decision(
-                f"{table.name}.balance_fraction",
+                f"{table.name}.{key}",
                 "",
                 Interval(given.lower, given.upper),
                 complex(start),
@@ -174,7 +187,7 @@ def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
 def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
     reference, x = 0.0, table.x
     if table.throws is not None:
-        raise Refused(f"{where}.throws", None, "goes with balance_fraction only", "use opposite_throw")
+        raise Refused(f"{where}.throws", None, "goes with balance_factor only", "use opposite_throw")
     if table.opposite_throw is not None:
         pin = _pin(pins, table.opposite_throw, f"{where}.opposite_throw")
         reference, x = pin.angle + math.pi, pin.x if x is None else x

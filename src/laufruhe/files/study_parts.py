@@ -14,9 +14,7 @@ Value: TypeAlias = bool | int | float | str
 class SweepTable(Table):
     """One quantity of the scene and the values that it takes: listed, or spaced between two ends."""
 
-    quantity: str = Field(
-        description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_fraction."
-    )
+    quantity: str = Field(description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     values: list[Value] | None = None
     first: int | float | str | None = Field(default=None, alias="from")
     last: int | float | str | None = Field(default=None, alias="to")

@@ -12,7 +12,7 @@ from laufruhe.files.problem_file import ProblemFile
 
 
 def at(tables: dict[str, Any], where: str) -> Any:
-    """What stands at a path such as counterweights.web.balance_fraction.
+    """What stands at a path such as counterweights.web.balance_factor.
 
     Raises
     ------

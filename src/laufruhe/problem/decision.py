@@ -110,7 +110,7 @@ class Decision:
     name
         As in the problem file.
     unit
-        SI unit; "" for a balance fraction.
+        SI unit; "" for a balance factor.
     set
         Where it lies.
     start

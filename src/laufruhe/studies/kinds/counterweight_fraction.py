@@ -1,4 +1,4 @@
-"""A metric over the balance fraction at every speed, and the fraction proven best (Hasselgruber 1964, Fig. 10)."""
+"""A metric over the balance factor at every speed, and the fraction proven best (Hasselgruber 1964, Fig. 10)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from laufruhe.files.rotors import FACTORS
 from laufruhe.files.study_paths import at
 from laufruhe.files.study_sweeps import Axis
 from laufruhe.studies import picture as p
@@ -27,11 +28,9 @@ from laufruhe.studies.swept_shown import (
     swept_names,
 )
 
-_FRACTION = "balance_fraction"
-
 
 class CounterweightFraction(SweptPart):
-    """A metric over the balance fraction, its proven optimum marked."""
+    """A metric over the balance factor, its proven optimum marked."""
 
     kind: Literal["counterweight fraction"]
 
@@ -42,9 +41,9 @@ class CounterweightFraction(SweptPart):
         fraction = self._swept_fraction()
         if fraction is None:
             for case, problem in zip(self.cases, problems, strict=True):
-                if not any(decision.name.endswith(_FRACTION) for decision in problem.decisions):
-                    rule = "leaves no balance fraction open and the part sweeps none"
-                    raise scenes.refused(case, "counterweights", rule, "sweep counterweights.NAME.balance_fraction")
+                if not any(decision.name.endswith(FACTORS) for decision in problem.decisions):
+                    rule = "leaves no balance factor open and the part sweeps none"
+                    raise scenes.refused(case, "counterweights", rule, "sweep counterweights.NAME.balance_factor")
             return [Point(case, changes, self.metric) for case in self.cases for changes in self.combinations()]
         points = []
         for case in self.cases:
@@ -55,7 +54,7 @@ class CounterweightFraction(SweptPart):
         return points
 
     def _swept_fraction(self) -> Axis | None:
-        return next((axis for axis in self.axes() if axis.quantity.endswith(_FRACTION)), None)
+        return next((axis for axis in self.axes() if axis.quantity.endswith(FACTORS)), None)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """As of every sweep, with the rows marked whose fraction was left open."""
@@ -71,7 +70,7 @@ class CounterweightFraction(SweptPart):
         others = [axis for axis in self.axes() if axis.quantity != path]
         extra = {
             **coordinates(others, points),
-            path: ("point", values, {"units": "1", "long_name": "balance fraction", "swept": 1}),
+            path: ("point", values, {"units": "1", "long_name": "balance factor", "swept": 1}),
             "optimum": ("point", optimum, {"long_name": "whether the fraction was left open, and decided"}),
         }
         return dataset(points, records, extra, self.about())
@@ -83,7 +82,7 @@ class CounterweightFraction(SweptPart):
         if "optimum" not in data.coords:
             return _best_fraction(data)
         names = swept_names(data)
-        along = next(name for name in names if name.endswith(_FRACTION))
+        along = next(name for name in names if name.endswith(FACTORS))
         best, marks, legend = data["optimum"].values, [], []
         x, y = data[along].values, data["objective"].values
         for label, chosen, colour in groups(data, [name for name in names if name != along]):
@@ -94,7 +93,7 @@ class CounterweightFraction(SweptPart):
                 p.Line(x[chosen & best], y[chosen & best], colour, width=0.0, marker="o"),
             ]
             legend.append(p.Line(colour=colour, marker="o", label=label))
-        panel = p.Panel(marks, p.Axis("balance fraction"), metric_axis(data))
+        panel = p.Panel(marks, p.Axis("balance factor"), metric_axis(data))
         words = f"Dot: {claimed(data)}, the fraction left open."
         return p.Picture(data.attrs["title"], words, [panel], p.credit(data), legend=legend)
 
@@ -108,7 +107,7 @@ def _left_open(point: Point, fraction: Axis, scenes: Scenes) -> dict[str, Any]:
 
 def _decided(record: Mapping[str, Any], quantity: str) -> float:
     """The fraction decided for the counterweight of this path, which may count it instead of naming it."""
-    decided = {name: value for name, value in record["decided"].items() if name.endswith(_FRACTION)}
+    decided = {name: value for name, value in record["decided"].items() if name.endswith(FACTORS)}
     only = next(iter(decided.values())) if len(decided) == 1 else math.nan
     return float(decided.get(quantity.split(".", 1)[-1], only))
 
@@ -116,9 +115,9 @@ def _decided(record: Mapping[str, Any], quantity: str) -> float:
 def _best_fraction(data: xr.Dataset) -> p.Picture:
     names = swept_names(data)
     if not names:
-        return bars(data, data["case"].values, "The balance fraction is decided.")
+        return bars(data, data["case"].values, "The balance factor is decided.")
     axis, place = swept_axis(data, names[-1]), spread(data, names[-1])
-    fractions = [k for k, name in enumerate(data["decision"].values) if str(name).endswith(_FRACTION)]
+    fractions = [k for k, name in enumerate(data["decision"].values) if str(name).endswith(FACTORS)]
     lower = [
         p.Line(place[chosen], data["decided"].values[chosen, k], colour)
         for _, chosen, colour in groups(data, names[:-1])
@@ -126,5 +125,5 @@ def _best_fraction(data: xr.Dataset) -> p.Picture:
     ]
     upper = p.Panel(lines(data, names), swept_axis(data, names[-1], named=False), metric_axis(data))
     words = f"Every point: {claimed(data)}."
-    panels = [upper, p.Panel(lower, axis, p.Axis("best balance fraction"))]
+    panels = [upper, p.Panel(lower, axis, p.Axis("best balance factor"))]
     return p.Picture(data.attrs["title"], words, panels, p.credit(data), size=(p.WIDE, 2.4))
