@@ -19,9 +19,9 @@ from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import rotor_wrench
-from laufruhe.problem.channels import LoadChannel, mounting_in
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
-from laufruhe.problem.measure import Measure, Term, selected
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -39,11 +39,9 @@ def reference(problem: Problem, engine: Engine | None = None, samples: int = REF
 
 
 def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
-    """What a load is at every operating point, (n, places, d), on a common lowest order; of all else nothing."""
-    channel = measure.channel
-    found = evaluation.signals(channel) if isinstance(channel, LoadChannel) else []
-    cycle = evaluation.engine.cycle
-    return [selected(measure, signal, evaluation.mount_names) for signal in over(cycle.base_order, found)]
+    """What counts of a load at every operating point, (n, places, d), on a common lowest order."""
+    found = [measure.signal(loads, evaluation.mount_names) for loads in evaluation.loads]
+    return over(evaluation.engine.cycle.base_order, found)
 
 
 def relative(bound: float, value: float) -> float:

@@ -22,9 +22,9 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import rotor_loads, unit_star_load
-from laufruhe.problem.channels import LoadChannel
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Measure, load_rows
+from laufruhe.problem.measure import Measure
 
 Array = NDArray[np.float64]
 
@@ -75,6 +75,8 @@ class EngineFamily:
     """
 
     def __init__(self, template: Engine, measure: Measure, fidelity: Fidelity, gas: GasModel | None = None) -> None:
+        if not measure.is_load:
+            raise ModelError(f"a family measures loads, not {measure.name}")
         self.template, self.fidelity = template, fidelity
         self._first, self._point = _alike(template), OperatingPoint("all", 1.0, gas)
         self._gas = fidelity.gas_of(self._point)
@@ -160,20 +162,16 @@ class EngineFamily:
         return np.concatenate([force[1:], roll[1:], rod[1:]])
 
     def _batched(self, measure: Measure, shapes: list[Spectrum]) -> BatchNorm:
-        if not isinstance(measure.channel, LoadChannel):
-            raise ModelError(f"a family measures loads, not {measure.name}")
-        engine, rows = self.template, []
+        engine, found = self.template, []
         maps = rigid_mounting(engine.mounts).maps if engine.mounts else np.zeros((0, 3, 6))
-        names = [mount.name for mount in engine.mounts]
-        for shape in shapes:
-            wrench = shape.rebased(engine.cycle.base_order)
+        for wrench in shapes:
             forces = Spectrum(wrench.base, np.einsum("mij,nj->nmi", maps, wrench.coefficients))
-            signal = measure.channel.signal(PointLoads(self._point, wrench, forces))
-            rows.append(load_rows(measure, [self._point], [signal], names, self.fidelity.samples))
-        stacked = np.stack([row.vectors for row in rows])
+            loads = PointLoads(self._point, wrench, forces)
+            found.append(Evaluation(engine, self.fidelity, (loads,), self.fidelity.samples).rows(measure))
+        stacked = np.stack([rows.vectors for rows in found])
         driven = np.any(stacked != 0.0, axis=(0, 1))
         driven[:1] |= not driven.any()
-        return BatchNorm(measure.norm, np.ascontiguousarray(stacked[:, :, driven].transpose(2, 0, 1)), rows[0].grid)
+        return BatchNorm(measure.norm, np.ascontiguousarray(stacked[:, :, driven].transpose(2, 0, 1)), found[0].grid)
 
 
 def _alike(engine: Engine) -> SliderCrank:

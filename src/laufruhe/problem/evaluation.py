@@ -61,12 +61,12 @@ class Evaluation:
 
     def rows(self, measure: Measure, samples: int | None = None) -> Rows:
         """Rows whose norm a measure is, over the whole cycle."""
-        if not isinstance(measure.channel, LoadChannel):
+        if not measure.is_load:
             return mass_rows(measure, self.engine.rotors)
         return load_rows(
             measure,
             [loads.point for loads in self.loads],
-            over(self.engine.cycle.base_order, self.signals(measure.channel)),
+            over(self.engine.cycle.base_order, self.signals(measure.load)),
             self.mount_names,
             samples or self.samples,
         )

@@ -19,6 +19,7 @@ from laufruhe.machine import OperatingPoint, Rotor
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, orders_equal
 from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel
+from laufruhe.problem.loads import PointLoads
 
 Array = NDArray[np.float64]
 
@@ -91,19 +92,26 @@ class Measure:
         return self.channel.is_mounting
 
     @property
+    def load(self) -> LoadChannel:
+        """The channel of a load."""
+        if not isinstance(self.channel, LoadChannel):
+            raise TypeError(f"{self.name} is no load")
+        return self.channel
+
+    @property
     def on_mounts(self) -> bool:
         """Whether it is of a signal at the mounts."""
-        return isinstance(self.channel, LoadChannel) and self.channel.part is None
+        return self.is_load and self.load.part is None
 
     @property
     def feels_gas(self) -> bool:
         """Whether gas loads it."""
-        return isinstance(self.channel, LoadChannel) and self.channel.feels_gas
+        return self.is_load and self.load.feels_gas
 
     @property
     def lever(self) -> int | None:
         """Power of a throw's place that its loads grow with; None where they do not add up by places alone."""
-        return self.channel.lever if isinstance(self.channel, LoadChannel) else None
+        return self.load.lever if self.is_load else None
 
     def counts_point(self, point: OperatingPoint) -> bool:
         """Whether an operating point counts."""
@@ -119,6 +127,10 @@ class Measure:
         if self.orders is None:
             return np.ones(np.shape(orders), dtype=bool)
         return orders_equal(orders, self.orders)
+
+    def signal(self, loads: PointLoads, mount_names: Sequence[str]) -> Spectrum:
+        """What counts of a load at an operating point, shape (n, places, d)."""
+        return selected(self, self.load.signal(loads), mount_names)
 
     def places(self, mount_names: Sequence[str]) -> list[int]:
         """Of the mounts that count."""

@@ -36,7 +36,7 @@ def as_page(found: Trade, picture: str | None, command: str) -> str:
     sections = [
         f"# Speed against accuracy: {escaped(problem.title)}",
         f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
-        f"(SI). Double precision against 50 digits, from the kinematics of every cylinder to the "
+        f"(SI). Double precision against 50 digits, from the kinematics of every cylinder to the vectors of the "
         f"{' and '.join(part.covered)}: relative error {max(part.error, 1e-17):.0e}.",
         f"**Take** {advice(found)}",
         f"![Time against error of every fidelity; colour is regret]({picture})"

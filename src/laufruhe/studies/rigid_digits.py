@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 import mpmath
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from laufruhe.machine import Engine, GasModel, Mount, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import NORMS
-from laufruhe.numerics.spectrum import spectrum_of
+from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.numerics.turns import Turn, as_turn
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_torque
@@ -27,8 +28,8 @@ from laufruhe.physics.mechanism import cylinder_wrench
 from laufruhe.physics.rigid_body import point_motion
 from laufruhe.physics.wrench import plane_wrench
 from laufruhe.problem import channels
-from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
@@ -84,7 +85,7 @@ def rigid_part(problem: Problem) -> RigidPart:
 def _is_covered(measure: Measure, engine: Engine) -> bool:
     if not measure.is_load or measure.orders is not None:
         return False
-    return not measure.on_mounts or (measure.channel is channels.MOUNT_FORCE and engine.block is None)
+    return engine.block is None or not measure.on_mounts
 
 
 def wrench_in_digits(engine: Engine, point: OperatingPoint) -> Digits:
@@ -153,11 +154,15 @@ def mount_maps_in_digits(mounts: Sequence[Mount]) -> list[Digits]:
 
 def _vectors(measure: Measure, problem: Problem, wrenches: Sequence[Digits]) -> Digits:
     """The vectors whose norm a measure is, in the order of `load_rows` (P1)."""
-    shares = measure.shares(problem.points)
-    used = [wrench for wrench, share in zip(wrenches, shares, strict=True) if share > 0.0]
-    channel, engine = measure.channel, problem.engine
-    if isinstance(channel, LoadChannel) and channel.part is not None:
-        return np.concatenate([wrench[:, channel.part] for wrench in used])
-    maps, factors = mount_maps_in_digits(engine.mounts), np.array(measure.direction_weights or (1.0, 1.0, 1.0))
-    places = measure.places([mount.name for mount in engine.mounts])
-    return np.concatenate([wrench @ maps[m].T * factors for wrench in used for m in places])
+    mounts, blocks = problem.engine.mounts, []
+    maps = mount_maps_in_digits(mounts) if measure.on_mounts else []
+    for point, share, wrench in zip(problem.points, measure.shares(problem.points), wrenches, strict=True):
+        if share > 0.0:
+            # steps stand in the place of orders: a channel takes of each what it takes of the other
+            steps: Any = wrench
+            forces: Any = np.array([wrench @ one.T for one in maps])
+            on_mounts = Spectrum(Fraction(1), forces.swapaxes(0, 1)) if maps else None
+            loads = PointLoads(point, Spectrum(Fraction(1), steps), on_mounts)
+            values = measure.signal(loads, [mount.name for mount in mounts]).coefficients
+            blocks.append(values.swapaxes(0, 1).reshape(-1, values.shape[-1]))
+    return np.concatenate(blocks)
