@@ -36,10 +36,10 @@ class QuantityTable(Table):
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     direction_weights: f.Three[f.NonNegative] | None = None
-    motions: list[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = Field(
-        default=None, description="That are to have a mode of their own."
+    motions: list[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = f.told(
+        "That are to have a mode of their own."
     )
-    frequency: f.Frequency | None = Field(default=None, description="Wanted about the torque-roll axis.")
+    frequency: f.Frequency | None = f.told("Wanted about the torque-roll axis.")
 
 
 class TermTable(QuantityTable):
@@ -61,12 +61,12 @@ class ConstraintTable(QuantityTable):
 
     limit: QuantityName
     max: f.Side | None = Field(default=None, description="With the unit of the quantity.", examples=["6 kg"])
-    min: f.Side | None = Field(default=None, description="Of natural frequencies, decoupling or sag.")
+    min: f.Side | None = f.told("Of natural frequencies, decoupling or sag.")
     outside: f.Pair[f.Side] | None = Field(
         default=None, description="A band that holds no natural frequency.", examples=[["12 Hz", "20 Hz"]]
     )
     name: Name | None = None
-    of: list[str] | None = Field(default=None, description="Counterweights or balancers whose mass counts.")
+    of: list[str] | None = f.told("Counterweights or balancers whose mass counts.")
 
 
 @dataclass(frozen=True)

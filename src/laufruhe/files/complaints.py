@@ -6,19 +6,16 @@ import difflib
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Any, TypeAlias, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from laufruhe import units
 from laufruhe.errors import Complaint, LaufruheError, ModelError
 
+Loc: TypeAlias = tuple[str | int, ...]
 _CLOSE = 0.6
-# tables of several sorts, and the key that says of which
-_TAGS = {"gas": "model", "parts": "kind"}
 _RULES = {
-    "missing": "is missing",
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",
     "string_type": "must be text in quotes",
@@ -33,16 +30,37 @@ _RULES = {
 def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Complaint, ...]:
     """One complaint for every key that is wrong, in the order of the file."""
     found: dict[str, Complaint] = {}
-    details = [(_without_tags(detail["loc"]), detail) for detail in error.errors(include_url=False)]
-    unknown = [loc for loc, detail in details if detail["type"] == "extra_forbidden"]
-    for loc, detail in details:
+    details = [(*_walk(detail["loc"], model), detail) for detail in error.errors(include_url=False)]
+    unknown = [loc for loc, _, detail in details if detail["type"] == "extra_forbidden"]
+    for loc, tables, detail in details:
         if detail["type"] == "missing" and _is_misspelt(loc, unknown):
             continue
-        found.setdefault(key_path(loc), _complaint(detail, loc, model))
+        found.setdefault(key_path(loc), _complaint(detail, loc, tables))
     return tuple(found.values())
 
 
-def _is_misspelt(loc: tuple[str | int, ...], unknown: Sequence[tuple[str | int, ...]]) -> bool:
+def _walk(loc: Loc, model: type[BaseModel]) -> tuple[Loc, list[type[BaseModel]]]:
+    """A path without what pydantic adds for tables of several sorts (gas.seiliger.imep), and the tables at its end."""
+    path: list[str | int] = []
+    here = [model]
+    for part in loc:
+        fields = [table.model_fields[part] for table in here if part in table.model_fields]
+        if len(here) > 1 and isinstance(part, str):
+            here = [table for table in here if any(part in get_args(f.annotation) for f in table.model_fields.values())]
+            continue
+        path.append(part)
+        if isinstance(part, str) and fields:
+            here = [table for field in fields for table in _tables_in(field.annotation)]
+    return tuple(path), here
+
+
+def _tables_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [table for part in get_args(annotation) for table in _tables_in(part)]
+
+
+def _is_misspelt(loc: Loc, unknown: Sequence[Loc]) -> bool:
     """Whether a missing key is there in another spelling: what is wrong is said once."""
     words = [str(other[-1]) for other in unknown if other[:-1] == loc[:-1]]
     return bool(difflib.get_close_matches(str(loc[-1]), words, n=1, cutoff=_CLOSE))
@@ -74,72 +92,27 @@ def nearest(word: str, words: Sequence[str]) -> str:
     return f"did you mean '{shown}'?" if close else "use one of: " + ", ".join(sorted(words))
 
 
-def _complaint(detail: Any, loc: tuple[str | int, ...], model: type[BaseModel]) -> Complaint:
+def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]]) -> Complaint:
     kind, where = detail["type"], key_path(loc)
     if kind == "extra_forbidden":
-        table = _model_at(detail["loc"][:-1], model)
-        return Complaint(where, short(detail["input"]), "is not a key here", nearest(str(loc[-1]), _keys(table)))
+        keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
+        return Complaint(where, short(detail["input"]), "is not a key here", nearest(str(loc[-1]), keys))
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")
     if kind.startswith("union_tag_"):
-        where = f"{where}.{detail['ctx']['discriminator'].strip(chr(39))}"
+        key = detail["ctx"]["discriminator"].strip("'")
+        where = f"{where}.{key}"
     if kind == "union_tag_not_found":
-        return Complaint(where, "", "is missing", "use one of: " + ", ".join(_tags(detail["loc"], model)))
+        tags = [tag for table in tables for tag in get_args(table.model_fields[key].annotation)]
+        return Complaint(where, "", "is missing", "use one of: " + ", ".join(tags))
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = str(detail["ctx"].get("expected") or detail["ctx"].get("expected_tags"))
         value = detail["ctx"].get("tag", detail["input"])
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
         return Complaint(where, short(value), "is not allowed", nearest(str(value), words))
-    rule, _, remedy = _RULES.get(kind, _lowered(detail["msg"])).partition("; ")
+    message = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "must")
+    rule, _, remedy = _RULES.get(kind, message).partition("; ")
     return Complaint(where, short(detail["input"]), rule, remedy or "correct it")
-
-
-def _lowered(message: str) -> str:
-    return (message[:1].lower() + message[1:]).replace("input should", "must")
-
-
-def _keys(model: type[BaseModel] | None) -> list[str]:
-    return [f.alias or name for name, f in model.model_fields.items()] if model else []
-
-
-def _model_at(loc: Sequence[str | int], model: type[BaseModel]) -> type[BaseModel] | None:
-    here: list[type[BaseModel]] = [model]
-    for part in loc:
-        if isinstance(part, int):
-            continue
-        fields = [m.model_fields[part] for m in here if part in m.model_fields]
-        tagged = [m for m in here if any(str(part) in get_args(f.annotation) for f in m.model_fields.values())]
-        here = [m for f in fields for m in _models_in(f.annotation)] if fields else tagged or here
-    return here[0] if here else None
-
-
-def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    if get_origin(annotation) in (list, Union, UnionType) or get_args(annotation):
-        return [m for part in get_args(annotation) for m in _models_in(part)]
-    return []
-
-
-def _tags(loc: Sequence[str | int], model: type[BaseModel]) -> list[str]:
-    """What may stand where a table says of which sort it is."""
-    *above, name = [part for part in loc if not isinstance(part, int)]
-    table = _model_at(above, model)
-    field = table.model_fields[str(name)] if table else None
-    choices = _models_in(field.annotation) if field else []
-    return [str(tag) for one in choices for tag in get_args(one.model_fields[_TAGS[str(name)]].annotation)]
-
-
-def _without_tags(loc: tuple[str | int, ...]) -> tuple[str | int, ...]:
-    """Drops what pydantic adds to a path for tagged tables: gas.seiliger.imep is gas.imep."""
-    named = [k for k, part in enumerate(loc) if part in _TAGS]
-    return tuple(part for k, part in enumerate(loc) if not any(_is_tag(loc, at, k) for at in named))
-
-
-def _is_tag(loc: tuple[str | int, ...], table: int, k: int) -> bool:
-    """Whether part k follows a tagged table's name, or its place in a list of them."""
-    in_list = table + 1 < len(loc) and isinstance(loc[table + 1], int)
-    return k == table + (2 if in_list else 1) and k < len(loc) and isinstance(loc[k], str)
 
 
 class Refused(LaufruheError):

@@ -45,9 +45,9 @@ class SliderCrankTable(Table):
     """One slider-crank of a free list of parts; what it leaves out it takes from [engine]."""
 
     x: f.Length
-    bank_angle: f.Angle = Field(default=0.0, description="Of the cylinder axis, from upright towards the left.")
+    bank_angle: f.Angle = f.told("Of the cylinder axis, from upright towards the left.", 0.0)
     throw: f.Angle = 0.0
-    firing_angle: f.Angle | None = Field(default=None, description="Crank angle at which it fires.")
+    firing_angle: f.Angle | None = f.told("Crank angle at which it fires.")
     shaft: str = "crankshaft"
     stroke: f.PositiveLength | None = None
     bore: f.PositiveLength | None = None
@@ -89,19 +89,17 @@ class EngineTable(Table):
 
     layout: str
     cycle: Literal["two-stroke", "four-stroke"]
-    cylinders: CylinderNumber | None = Field(default=None, description="Told by throws or firing order where left out.")
-    bore: f.PositiveLength | None = Field(default=None, description="Needed with gas.")
+    cylinders: CylinderNumber | None = f.told("Told by throws or firing order where left out.")
+    bore: f.PositiveLength | None = f.told("Needed with gas.")
     stroke: f.PositiveLength
-    rod_ratio: f.NonNegative | None = Field(
-        default=None, description="Crank radius over rod length; 0 is a Scotch yoke."
-    )
+    rod_ratio: f.NonNegative | None = f.told("Crank radius over rod length; 0 is a Scotch yoke.")
     rod_length: f.PositiveLength | None = None
-    offset: f.Length = Field(default=0.0, description="Of the pin's path from the crank axis.")
+    offset: f.Length = f.told("Of the pin's path from the crank axis.", 0.0)
     reciprocating_mass: f.Mass = Field(description="Per cylinder, with the rod's share unless [engine.rod] is given.")
-    rotating_mass: f.Mass = Field(default=0.0, description="Per throw, at the crank radius.")
+    rotating_mass: f.Mass = f.told("Per throw, at the crank radius.", 0.0)
     rod: RodTable | None = None
-    rod_inertia_deficit: f.Inertia = Field(default=0.0, description="True inertia less that of the two masses.")
-    throws: f.Throws | None = Field(default=None, description="At phi = 0; even firing where left out.")
+    rod_inertia_deficit: f.Inertia = f.told("True inertia less that of the two masses.", 0.0)
+    throws: f.Throws | None = f.told("At phi = 0; even firing where left out.")
     firing_order: FiringOrder | None = None
     shafts: list[ShaftTable] = Field(default_factory=list)
     slider_cranks: list[SliderCrankTable] = Field(default_factory=list)

@@ -32,10 +32,10 @@ def _with_knobs(table: type[T]) -> type[T]:
 class FidelityTable(Table):
     """Speed against accuracy."""
 
-    kinematics: Literal["exact", "two-order", "auto"] = Field(
-        default="exact", description="auto: the cheapest choice that keeps the objective within the tolerance."
+    kinematics: Literal["exact", "two-order", "auto"] = f.told(
+        "auto: the cheapest choice that keeps the objective within the tolerance.", "exact"
     )
-    tolerance: f.Positive | None = Field(default=None, description="Relative error of the objective, for auto.")
+    tolerance: f.Positive | None = f.told("Relative error of the objective, for auto.")
 
 
 def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:

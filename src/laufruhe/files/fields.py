@@ -241,6 +241,11 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
+def told(text: str, default: Any = None) -> Any:
+    """A field that may be left out, and what an editor says of it."""
+    return Field(default=default, description=text)
+
+
 def with_keys(table: type[Given], keys: Mapping[str, Any]) -> type[Given]:
     """A table with further keys: the type and the field of each."""
     return create_model(table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **keys)

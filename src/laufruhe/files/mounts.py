@@ -47,8 +47,8 @@ class BlockTable(Table):
     mass: f.PositiveMass = Field(description="Everything that the mounts carry, moving parts included.")
     centre_of_gravity: f.Three[f.Length] = Field(default=[0.0, 0.0, 0.0])
     inertia: f.Three[f.Inertia] = Field(description="About x, y and z through the centre of gravity.")
-    inertia_products: f.Three[f.Inertia] = Field(
-        default=[0.0, 0.0, 0.0], description="Entries xy, xz, yz of the tensor: xy = - integral of x y dm."
+    inertia_products: f.Three[f.Inertia] = f.told(
+        "Entries xy, xz, yz of the tensor: xy = - integral of x y dm.", [0.0, 0.0, 0.0]
     )
 
 
@@ -64,19 +64,13 @@ class MountTable(Table):
 
     name: Name | None = None
     position: f.Three[f.OpenLength] | None = None
-    relative_stiffness: f.Three[f.NonNegative] | None = Field(
-        default=None, description="Along its own x, y, z; 0 carries nothing."
-    )
-    turned: f.Three[f.OpenAngle] | None = Field(
-        default=None, description="Turns about x, then y, then z that bring the axes of C2 to its own."
-    )
-    stiffness: f.Three[f.OpenStiffness] | None = Field(default=None, description="Along its own x, y, z.")
-    loss_factor: f.OpenLossFactor | None = Field(
-        default=None, description="Damping work over deformation work over 2 pi."
-    )
-    damping: f.Three[f.OpenDamping] | None = Field(default=None, description="Viscous, along its own x, y, z.")
-    like: Name | None = Field(default=None, description="Stiffness, loss and damping follow those of this mount.")
-    mirror_of: Name | None = Field(default=None, description="All follows this mount, mirrored in the plane y = 0.")
+    relative_stiffness: f.Three[f.NonNegative] | None = f.told("Along its own x, y, z; 0 carries nothing.")
+    turned: f.Three[f.OpenAngle] | None = f.told("Turns about x, then y, then z that bring the axes of C2 to its own.")
+    stiffness: f.Three[f.OpenStiffness] | None = f.told("Along its own x, y, z.")
+    loss_factor: f.OpenLossFactor | None = f.told("Damping work over deformation work over 2 pi.")
+    damping: f.Three[f.OpenDamping] | None = f.told("Viscous, along its own x, y, z.")
+    like: Name | None = f.told("Stiffness, loss and damping follow those of this mount.")
+    mirror_of: Name | None = f.told("All follows this mount, mirrored in the plane y = 0.")
     stop: StopTable | None = None
 
 
@@ -86,11 +80,9 @@ class MountsTable(Table):
     kind: Literal["rigid", "elastic"] = "rigid"
     positions: list[f.Three[f.Length]] = Field(default_factory=list)
     names: list[Name] | None = None
-    relative_stiffness: f.Three[f.NonNegative] = Field(
-        default=[0.0, 1.0, 1.0], description="Of every rigid mount that gives none."
-    )
-    stiffness: f.Three[f.Stiffness] | None = Field(default=None, description="Of every elastic mount that gives none.")
-    loss_factor: f.LossFactor = Field(default=0.0, description="Of every elastic mount that gives none.")
+    relative_stiffness: f.Three[f.NonNegative] = f.told("Of every rigid mount that gives none.", [0.0, 1.0, 1.0])
+    stiffness: f.Three[f.Stiffness] | None = f.told("Of every elastic mount that gives none.")
+    loss_factor: f.LossFactor = f.told("Of every elastic mount that gives none.", 0.0)
     stop: StopTable | None = None
     places: list[MountTable] = Field(default_factory=list)
 

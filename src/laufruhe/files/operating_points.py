@@ -24,11 +24,11 @@ class OperatingPointTable(Table):
     name: Name | None = None
     speed: f.Speed | None = None
     mean_piston_speed: f.PistonSpeed | None = None
-    imep: f.Pressure | None = Field(default=None, description="In place of that of [gas].")
-    motored: bool = Field(default=False, description="The charge is compressed and gets no heat.")
-    gas: bool = Field(default=True, description="false leaves the gas out altogether.")
-    up_to: f.Speed | None = Field(default=None, description="Last speed of a range that starts at speed.")
-    steps: Annotated[int, Field(ge=2, le=1000)] | None = Field(default=None, description="Speeds in the range.")
+    imep: f.Pressure | None = f.told("In place of that of [gas].")
+    motored: bool = f.told("The charge is compressed and gets no heat.", False)
+    gas: bool = f.told("false leaves the gas out altogether.", True)
+    up_to: f.Speed | None = f.told("Last speed of a range that starts at speed.")
+    steps: Annotated[int, Field(ge=2, le=1000)] | None = f.told("Speeds in the range.")
     weight: f.Positive = 1.0
 
 

@@ -41,25 +41,23 @@ class IntervalsTable(Table):
 
     min: f.Angle | None = None
     max: f.Angle | None = None
-    largest_deviation: f.Angle | None = Field(default=None, description="From equal intervals.")
+    largest_deviation: f.Angle | None = f.told("From equal intervals.")
 
 
 class PhasingTable(Table):
     """How open throws, firing orders and shafts are decided."""
 
-    phases: Annotated[int, Field(ge=1, le=96)] | None = Field(
-        default=None, description="Equal steps of a turn that throws stand on; those of even firing where left out."
+    phases: Annotated[int, Field(ge=1, le=96)] | None = f.told(
+        "Equal steps of a turn that throws stand on; those of even firing where left out."
     )
-    intervals: IntervalsTable | None = Field(default=None, description="Even firing where left out.")
-    best: Annotated[int, Field(ge=1, le=200)] = Field(default=10, description="How many stars are ranked.")
+    intervals: IntervalsTable | None = f.told("Even firing where left out.")
+    best: Annotated[int, Field(ge=1, le=200)] = f.told("How many stars are ranked.", 10)
     rank_orders_by: list[Literal["roll moment", "neighbours", "longest gap"]] = Field(
         default=["neighbours", "longest gap"], min_length=1, description="Of firing orders; the first counts most."
     )
-    most_shafts: Annotated[int, Field(ge=0, le=48)] | None = Field(
-        default=None, description="Optional balancer shafts that may be built."
-    )
-    most_shaft_mass: f.Mass | None = Field(default=None, description="Of the optional shafts that are built.")
-    time_limit: f.Time = Field(default=600.0, description="Of the search.")
+    most_shafts: Annotated[int, Field(ge=0, le=48)] | None = f.told("Optional balancer shafts that may be built.")
+    most_shaft_mass: f.Mass | None = f.told("Of the optional shafts that are built.")
+    time_limit: f.Time = f.told("Of the search.", 600.0)
     method: Literal["auto", "search", "program", "enumeration"] = "auto"
 
 

@@ -37,7 +37,7 @@ class ProblemFile(Table):
     title: str = Field(min_length=1)
     source: str = ""
     assumptions: list[str] = Field(default_factory=list)
-    tolerance: f.Positive = Field(default=1e-4, description="Relative gap at which an optimum counts as proven.")
+    tolerance: f.Positive = f.told("Relative gap at which an optimum counts as proven.", 1e-4)
     engine: EngineTable
     phasing: PhasingTable | None = None
     operating_points: list[OperatingPointTable] = Field(min_length=1)

@@ -6,13 +6,13 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, blamed_on, nearest
+from laufruhe.files.complaints import Refused, blamed_on, nearest, none_of, one_of
 from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.layouts import Throw
@@ -21,6 +21,7 @@ from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.sets import Interval, Sector, Set
 
 _HOW = {"equal": (1.0, False), "opposite": (-1.0, False), "mirrored": (1.0, True), "mirrored opposite": (-1.0, True)}
+_UNITS = {"unbalance": "kg m", "mass": "kg"}
 
 
 FACTORS = ("balance_factor", "balance_fraction")
@@ -31,13 +32,13 @@ class CounterweightTable(Table):
     """A counterweight on the crankshaft, or one opposite every throw."""
 
     name: Name
-    balance_factor: f.OpenFraction | None = Field(
-        default=None, description="kappa: rotating mass and this share of the reciprocating mass, opposite each throw."
+    balance_factor: f.OpenFraction | None = f.told(
+        "kappa: rotating mass and this share of the reciprocating mass, opposite each throw."
     )
-    balance_fraction: f.OpenFraction | None = Field(default=None, description="An earlier name of balance_factor.")
+    balance_fraction: f.OpenFraction | None = f.told("An earlier name of balance_factor.")
     throws: list[CylinderNumber] | None = None
     x: f.Length | None = None
-    opposite_throw: CylinderNumber | None = Field(default=None, description="Angle and place are counted from it.")
+    opposite_throw: CylinderNumber | None = f.told("Angle and place are counted from it.")
     unbalance: f.OpenUnbalance | None = None
     mass: f.OpenMass | None = None
     radius: f.PositiveLength | None = None
@@ -68,6 +69,9 @@ class UnbalanceTable(Table):
     coupled: CoupledTable | None = None
 
 
+SizedTable: TypeAlias = CounterweightTable | UnbalanceTable
+
+
 class BalancerShaftTable(Table):
     """A balancer shaft."""
 
@@ -75,8 +79,8 @@ class BalancerShaftTable(Table):
     ratio: f.Ratio
     position: f.Pair[f.Length] = Field(description="y and z of its axis.")
     unbalances: list[UnbalanceTable] = Field(min_length=1)
-    optional: bool = Field(default=False, description="Whether it is built is decided too.")
-    shaft_mass: f.Mass = Field(default=0.0, description="Of an optional shaft, its unbalances not included.")
+    optional: bool = f.told("Whether it is built is decided too.", False)
+    shaft_mass: f.Mass = f.told("Of an optional shaft, its unbalances not included.", 0.0)
 
 
 @dataclass
@@ -101,21 +105,6 @@ class RotorList:
                     new = RotorDrive(rotor, gain * followed, drive.mirrored != mirrored)
                     self.decisions[k] = replace(decision, drives=(*decision.drives, new))
                     break
-
-
-@dataclass(frozen=True)
-class _Size:
-    """The size of an unbalance as given or left open, in its own unit."""
-
-    unit: str
-    lower: float
-    upper: float
-    start: float
-    gain: float
-
-    @property
-    def open(self) -> bool:
-        return self.lower < self.upper
 
 
 def counterweights(
@@ -150,32 +139,18 @@ def _pin_of(throw: Throw, cylinders: Sequence[SliderCrank]) -> _Pin:
 
 def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
     key = table.factor_key or FACTORS[0]
-    single = {
-        name: getattr(table, name) for name in ("x", "opposite_throw", "unbalance", "mass", *FACTORS) if name != key
-    }
-    clash = next((name for name, value in single.items() if value is not None), None)
-    if clash is not None:
-        raise Refused(f"{where}.{clash}", None, f"does not go with {key}", "leave one of them out")
-    chosen = range(1, len(pins) + 1) if table.throws is None else table.throws
-    given = getattr(table, key)
-    start = given.start if isinstance(given, Open) else float(given or 0.0)
-    drives = []
-    for number in chosen:
+    others = [name for name in ("x", "opposite_throw", "unbalance", "mass", *FACTORS) if name != key]
+    none_of(table, others, where, f"does not go with {key}", "leave one of them out")
+    fraction, drives = Open.of(getattr(table, key)), []
+    for number in range(1, len(pins) + 1) if table.throws is None else table.throws:
         pin = _pin(pins, number, f"{where}.throws")
         gain = -pin.reciprocating * cis(as_turn(pin.angle))
         name = f"{table.name}.{number}"
-        into.add(Rotor(name, pin.x, -pin.rotating + start * gain, radius=table.radius), f"{where}.name")
+        into.add(Rotor(name, pin.x, -pin.rotating + fraction.start * gain, radius=table.radius), f"{where}.name")
         drives.append(RotorDrive(name, gain))
-    if isinstance(given, Open) and given.lower < given.upper:
-        into.decisions.append(
-            Decision(
-                f"{table.name}.{key}",
-                "",
-                Interval(given.lower, given.upper),
-                complex(start),
-                tuple(drives),
-            )
-        )
+    if fraction.is_open:
+        name, start = f"{table.name}.{key}", complex(fraction.start)
+        into.decisions.append(Decision(name, "", Interval(*fraction.bounds), start, tuple(drives)))
 
 
 def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
@@ -186,14 +161,13 @@ def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
 
 def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
     reference, x = 0.0, table.x
-    if table.throws is not None:
-        raise Refused(f"{where}.throws", None, "goes with balance_factor only", "use opposite_throw")
+    none_of(table, ("throws",), where, "goes with balance_factor only", "use opposite_throw")
     if table.opposite_throw is not None:
         pin = _pin(pins, table.opposite_throw, f"{where}.opposite_throw")
         reference, x = pin.angle + math.pi, pin.x if x is None else x
     if x is None:
         raise Refused(f"{where}.x", None, "is missing", "give its place, or opposite_throw")
-    _place(table.name, x, CRANKSHAFT, Role.COUNTERWEIGHT, table, reference, where, into)
+    _place(Rotor(table.name, x, 0j, radius=table.radius), table, reference, where, into)
 
 
 def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> None:
@@ -212,7 +186,8 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
             if unbalance.coupled is not None:
                 _follow(name, unbalance, unbalance.coupled, shaft, at, into)
             else:
-                _place(name, unbalance.x, shaft, Role.BALANCER, unbalance, 0.0, at, into)
+                rotor = Rotor(name, unbalance.x, 0j, shaft, Role.BALANCER, unbalance.radius)
+                _place(rotor, unbalance, 0.0, at, into)
 
 
 def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaft, where: str, into: RotorList) -> None:
@@ -229,32 +204,32 @@ def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaf
     into.drive(name, coupled.to, sign, mirrored)
 
 
-def _place(
-    name: str,
-    x: float,
-    shaft: Shaft,
-    role: Role,
-    table: CounterweightTable | UnbalanceTable,
-    reference: float,
-    where: str,
-    into: RotorList,
-) -> None:
-    """One rotor, and the decision about it if its size or angle is open."""
-    size, angle = _size(table, where), table.angle
-    direction = cis(as_turn(reference))
-    low, high, start_angle = (angle.lower, angle.upper, angle.start) if isinstance(angle, Open) else (angle,) * 3
-    _check_convex(size, low, high, where)
-    high = low + math.tau if _is_whole_turn(low, high) else high
-    start = size.start * _direction(start_angle)
-    into.add(Rotor(name, x, size.gain * direction * start, shaft, role, table.radius), f"{where}.name")
-    if size.open:
-        drive = RotorDrive(name, size.gain * direction)
-        noun = "mass" if size.unit == "kg" else "unbalance"
-        into.decisions.append(Decision(f"{name}.{noun}", size.unit, _set(size, low, high), start, (drive,)))
+def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: RotorList) -> None:
+    """One rotor with its size and angle, and the decision about it if one of them is open."""
+    key, size, gain = _size(table, where)
+    angle, direction = Open.of(table.angle), gain * cis(as_turn(reference))
+    _check_convex(key, size, angle, where)
+    start = size.start * _direction(angle.start)
+    into.add(replace(rotor, unbalance=direction * start), f"{where}.name")
+    if size.is_open:
+        drive = RotorDrive(rotor.name, direction)
+        into.decisions.append(Decision(f"{rotor.name}.{key}", _UNITS[key], _set(size, angle), start, (drive,)))
 
 
-def _set(size: _Size, low: float, high: float) -> Set:
-    return Interval(size.lower, size.upper, low) if low == high else Sector(size.upper, (low, high))
+def _size(table: SizedTable, where: str) -> tuple[str, Open, float]:
+    """The key of a size, its value, and what one of it makes [kg m]."""
+    one_of(table, where, "unbalance", "mass")
+    if table.mass is None:
+        return "unbalance", Open.of(table.unbalance), 1.0
+    if table.radius is None:
+        raise Refused(f"{where}.radius", None, "is missing, and a mass needs one", "add it")
+    return "mass", Open.of(table.mass), table.radius
+
+
+def _set(size: Open, angle: Open) -> Set:
+    if not angle.is_open:
+        return Interval(*size.bounds, angle.lower)
+    return Sector(size.upper, (angle.lower, angle.lower + math.tau if _is_whole_turn(angle) else angle.upper))
 
 
 def _direction(angle: float) -> complex:
@@ -262,43 +237,23 @@ def _direction(angle: float) -> complex:
     return cis(turn) if not isinstance(turn, float) else cmath.exp(1j * angle)
 
 
-def _is_whole_turn(low: float, high: float) -> bool:
-    return high - low >= math.tau * (1.0 - 1e-9)
+def _is_whole_turn(angle: Open) -> bool:
+    return angle.upper - angle.lower >= math.tau * (1.0 - 1e-9)
 
 
-def _check_convex(size: _Size, low: float, high: float, where: str) -> None:
-    if low == high:
+def _check_convex(key: str, size: Open, angle: Open, where: str) -> None:
+    if not angle.is_open:
         return
-    if not size.open:
-        raise Refused(
-            f"{where}.angle", None, "is open while the size is fixed", "leave the size open too, or fix the angle"
-        )
+    if not size.is_open:
+        rule, remedy = "is open while the size is fixed", "leave the size open too, or fix the angle"
+        raise Refused(f"{where}.angle", None, rule, remedy)
     if size.lower > 0.0:
-        raise Refused(
-            f"{where}.{'mass' if size.unit == 'kg' else 'unbalance'}",
-            units.shown(size.lower, size.unit),
-            "is a least size above zero while the angle is open",
-            "let the size start at zero, or fix the angle",
-        )
-    if high - low > math.pi * (1.0 + 1e-9) and not _is_whole_turn(low, high):
-        raise Refused(
-            f"{where}.angle",
+        least, rule = units.shown(size.lower, _UNITS[key]), "is a least size above zero while the angle is open"
+        raise Refused(f"{where}.{key}", least, rule, "let the size start at zero, or fix the angle")
+    low, high = angle.bounds
+    if high - low > math.pi * (1.0 + 1e-9) and not _is_whole_turn(angle):
+        shown, rule = (
             f"{math.degrees(low):g} to {math.degrees(high):g} deg",
             "leaves out a sector of less than half a turn",
-            "open it by at most 180 deg, or wholly",
         )
-
-
-def _size(table: CounterweightTable | UnbalanceTable, where: str) -> _Size:
-    given = {"unbalance": table.unbalance, "mass": table.mass}
-    named = [key for key, value in given.items() if value is not None]
-    if len(named) != 1:
-        state = "is missing" if not named else "is given twice, also as mass"
-        raise Refused(f"{where}.unbalance", None, state, "give unbalance or mass, one of them")
-    key = named[0]
-    if key == "mass" and table.radius is None:
-        raise Refused(f"{where}.radius", None, "is missing, and a mass needs one", "add it")
-    value = given[key]
-    bounds = (value.lower, value.upper, value.start) if isinstance(value, Open) else (float(value or 0.0),) * 3
-    gain = float(table.radius or 1.0) if key == "mass" else 1.0
-    return _Size("kg" if key == "mass" else "kg m", *bounds, gain)
+        raise Refused(f"{where}.angle", shown, rule, "open it by at most 180 deg, or wholly")
