@@ -42,7 +42,7 @@ test: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) $(TESTS)
 
 test-fast: $(STAMP)
-	$(BIN)/python -m pytest $(LANES) -m "not slow" $(TESTS)
+	$(BIN)/python -m pytest $(LANES) -m "not slow" --hypothesis-profile=fast $(TESTS)
 
 # Scripts that write under results/benchmarks/.
 bench: $(STAMP)

@@ -83,7 +83,7 @@ def _held(path: Path) -> Problem:
     return replace(held, limits=(), objective=objective)
 
 
-@pytest.mark.parametrize("path", ELASTIC, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", first_fast(ELASTIC, 3), ids=lambda path: path.stem)
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-3])
 def test_automatic_on_ready_engines(path: Path, tolerance: float) -> None:
     _keeps_its_word(replace(_held(path), decisions=()), tolerance)
