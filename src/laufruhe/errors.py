@@ -14,15 +14,7 @@ class ModelError(LaufruheError, ValueError):
 
 
 class KeyedError(ModelError):
-    """A machine that cannot exist, and the key of [engine] that is to blame.
-
-    Parameters
-    ----------
-    text
-        A rule, and a remedy after '; '.
-    value
-        What stands at the key, as a user would write it.
-    """
+    """A machine that cannot exist, the key of [engine] to blame, and what stands there; a rule, a remedy after '; '."""
 
     def __init__(self, key: str, text: str, value: str = "") -> None:
         self.key, self.text, self.value = key, text, value
@@ -49,9 +41,10 @@ class Complaint:
     @classmethod
     def of(cls, error: Exception, where: str, value: str = "", remedy: str = "") -> Complaint:
         """Of an error whose text is a rule, and a remedy after '; '; `remedy` where it names none."""
+        text = str(error)
         if isinstance(error, KeyedError):
-            where, value = f"engine.{error.key}", error.value
-        rule, _, own = (error.text if isinstance(error, KeyedError) else str(error)).partition("; ")
+            where, value, text = f"engine.{error.key}", error.value, error.text
+        rule, _, own = text.partition("; ")
         return cls(where, value, rule, own or remedy)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import suppress
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
 # kp/cm2 as it is typed for kp/cm^2; H2O keeps its figure
 _POWER = re.compile(r"(?<=[a-z])([23])\b")
+# full names that speak of an angle
+_TURNING = re.compile("radian|degree|turn|revolution|arcminute|arcsecond|grad")
 _DEFINITIONS = (
     "@alias kilogram_force = kp = kilopond",
     "newton_metre = newton * meter = Nm",
@@ -42,6 +45,7 @@ def _factor(unit: str, wanted: str) -> float:
     if wanted == "Hz" and "Hz" not in unit:
         # radians have no dimension, so rpm would be taken for a frequency 2 pi too high
         raise UnitError(f"'{unit}' is no frequency in Hz; {advice(wanted)}")
+    other = UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}")
     try:
         parsed = registry.parse_units(unit)
         one = registry.Quantity(1.0, parsed)
@@ -51,19 +55,14 @@ def _factor(unit: str, wanted: str) -> float:
     except Exception as error:
         # the registry and the tokenizer below it raise a dozen kinds for what is no unit
         if type(error).__name__ == "DimensionalityError":
-            raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}") from None
+            raise other from None
         raise UnitError(f"unit '{unit}' is not known; {advice(wanted)}") from None
-    if _turns(str(parsed)) != (wanted in ("rad", "rad/s")):
+    if (_TURNING.search(str(parsed)) is not None) != (wanted in ("rad", "rad/s")):
         # a radian has no dimension, so 50 Hz would pass for 50 rad/s and 15 deg for a ratio
-        raise UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}")
+        raise other
     if not math.isclose(doubled, 2.0 * ratio):
         raise UnitError(f"'{unit}' has a zero of its own; {advice(wanted)}")
     return ratio
-
-
-def _turns(unit: str) -> bool:
-    """Whether a unit's full name speaks of an angle."""
-    return re.search(r"radian|degree|turn|revolution|arcminute|arcsecond|grad", unit) is not None
 
 
 _EXAMPLES = {
@@ -101,13 +100,7 @@ def advice(unit: str) -> str:
 
 
 def parse(text: str, unit: str) -> float:
-    """SI value of a text such as '120 mm' in the dimension of `unit`.
-
-    Raises
-    ------
-    UnitError
-        If the text is no number, has no unit, or a unit of another dimension.
-    """
+    """SI value of a text such as '120 mm' in the dimension of `unit`; `UnitError` where it has none."""
     match = _QUANTITY.match(text)
     if match is None:
         raise UnitError(f"is not a number with a unit; {advice(unit)}")
@@ -133,11 +126,9 @@ def unit_of(text: str) -> str:
 def dimension_of(text: str) -> str | None:
     """SI unit of what a text such as '12 Hz' measures; None where it is no number with a unit known here."""
     for unit in _EXAMPLES:
-        try:
+        with suppress(UnitError):
             parse(text, unit)
-        except UnitError:
-            continue
-        return unit
+            return unit
     return None
 
 

@@ -19,6 +19,7 @@ from laufruhe.problem.channels import ON_PLACES, Channel, Needs
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Term, counted_rotors, radius_of
 
 T = TypeVar("T")
+Motion = Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]
 QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": list(MEASURES)})]
 _NEEDS = {
     Needs.MOUNTS: ("needs mounts", "add [mounts], or ask for a shaking force"),
@@ -36,9 +37,7 @@ class QuantityTable(Table):
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     direction_weights: f.Three[f.NonNegative] | None = None
-    motions: list[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = f.told(
-        "That are to have a mode of their own."
-    )
+    motions: list[Motion] | None = f.told("That are to have a mode of their own.")
     frequency: f.Frequency | None = f.told("Wanted about the torque-roll axis.")
 
 
@@ -77,13 +76,7 @@ class Scene:
     points: tuple[OperatingPoint, ...]
 
     def measure(self, name: str, table: QuantityTable, where: str) -> Measure:
-        """The measure that a name and its keys mean.
-
-        Raises
-        ------
-        Refused
-            If it means nothing for this engine.
-        """
+        """The measure that a name and its keys mean for this engine."""
         if name not in MEASURES:
             raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
         channel, norm = MEASURES[name]
@@ -209,13 +202,8 @@ def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
     low, high = (_side(getattr(table, key), measure, f"{where}.{key}") for key in ("min", "max"))
     if not norm and "max" not in sides and low is not None and low > 1.0:
         raise Refused(f"{where}.min", table.min, "is more than the whole energy", "give a share under 1")
-    return Limit(
-        table.name or measure.name,
-        measure,
-        math.inf if high is None else high,
-        -math.inf if low is None else low,
-        _band(table, measure, where),
-    )
+    largest, least = math.inf if high is None else high, -math.inf if low is None else low
+    return Limit(table.name or measure.name, measure, largest, least, _band(table, measure, where))
 
 
 def _side(text: str | None, measure: Measure, where: str) -> float | None:
@@ -223,20 +211,15 @@ def _side(text: str | None, measure: Measure, where: str) -> float | None:
         return None
     value = measured(text, measure.unit, where)
     if value < 0.0:
-        raise Refused(
-            where, text, "is negative" if measure.is_mounting else "is negative, and no norm is",
-            "give a value of zero or more",
-        )  # fmt: skip
+        rule = "is negative" if measure.is_mounting else "is negative, and no norm is"
+        raise Refused(where, text, rule, "give a value of zero or more")
     return value
 
 
 def _band(table: ConstraintTable, measure: Measure, where: str) -> tuple[float, float] | None:
     if table.outside is None:
         return None
-    low, high = (measured(text, measure.unit, f"{where}.outside") for text in table.outside)
-    for text, value in zip(table.outside, (low, high), strict=True):
-        if value < 0.0:
-            raise Refused(f"{where}.outside", text, "is negative", "give a value of zero or more")
+    low, high = (_side(text, measure, f"{where}.outside") or 0.0 for text in table.outside)
     if not low < high:
         raise Refused(f"{where}.outside", table.outside, "is no band", "write the smaller one first")
     return low, high

@@ -1,4 +1,4 @@
-"""From what a validator found to one line that a user can act on."""
+"""From what a validator found to one line that a user can act on; all that assembles a problem raises `Refused`."""
 
 from __future__ import annotations
 
@@ -124,20 +124,7 @@ class Refused(LaufruheError):
 
 
 def measured(text: str, unit: str, where: str, given: str | None = None) -> float:
-    """SI value of a text such as '120 mm' in the dimension of `unit`.
-
-    Parameters
-    ----------
-    where
-        Key that it stands at.
-    given
-        What stands there, if the text is only made of it.
-
-    Raises
-    ------
-    Refused
-        If it is no such value.
-    """
+    """SI value of a text such as '120 mm'; `given` is what stands at the key, where the text is only made of it."""
     try:
         return units.parse(text, unit)
     except units.UnitError as error:

@@ -107,10 +107,8 @@ class EngineTable(Table):
     @property
     def given_throws(self) -> list[float] | None:
         """Throws, where every one is a number."""
-        if self.throws is None or self.throws == "open":
-            return None
-        angles = [angle for angle in self.throws if isinstance(angle, float)]
-        return angles if len(angles) == len(self.throws) else None
+        angles = [angle for angle in self.throws or () if isinstance(angle, float)]
+        return angles if self.throws is not None and len(angles) == len(self.throws) else None
 
     @property
     def given_order(self) -> list[int] | None:
@@ -252,10 +250,10 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
         raise Refused("engine.slider_cranks", None, "is missing", "list at least one [[engine.slider_cranks]]")
     shafts = {"crankshaft": CRANKSHAFT}
     for k, shaft in enumerate(table.shafts):
+        where = f"engine.shafts[{k + 1}]"
         if shaft.name in shafts:
-            rule = "is the name of another shaft"
-            raise Refused(f"engine.shafts[{k + 1}].name", shaft.name, rule, "give each its own name")
-        with blamed_on(f"engine.shafts[{k + 1}]"):
+            raise Refused(f"{where}.name", shaft.name, "is the name of another shaft", "give each its own name")
+        with blamed_on(where):
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
     return tuple(_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks))
 

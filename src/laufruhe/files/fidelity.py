@@ -39,13 +39,7 @@ class FidelityTable(Table):
 
 
 def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
-    """The problem at the fidelity that a table describes.
-
-    Raises
-    ------
-    Refused
-        If a key contradicts another, or the problem.
-    """
+    """The problem at the fidelity that a table describes."""
     is_auto = table.kinematics == "auto"
     if table.tolerance is not None and not is_auto:
         raise Refused("fidelity.tolerance", table.tolerance, "goes with auto only", 'add kinematics = "auto"')

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
@@ -88,13 +89,8 @@ class Number:
         if not self.openable:
             return number
         pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
-        between = {
-            "type": "object",
-            "properties": {"between": pair, "start": number},
-            "required": ["between"],
-            "additionalProperties": False,
-        }
-        return {"anyOf": [number, between]}
+        between = {"type": "object", "properties": {"between": pair, "start": number}, "required": ["between"]}
+        return {"anyOf": [number, {**between, "additionalProperties": False}]}
 
     def _number_schema(self) -> dict[str, Any]:
         if not self.unit:
@@ -104,9 +100,7 @@ class Number:
         return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
 
     def _read(self, given: Any) -> float | Open:
-        if isinstance(given, dict):
-            return self._open(given)
-        return self._bounded(self._number(given))
+        return self._open(given) if isinstance(given, dict) else self._bounded(self._number(given))
 
     def _number(self, given: Any) -> float:
         if isinstance(given, bool) or not isinstance(given, int | float | str):
@@ -118,10 +112,8 @@ class Number:
                 raise refusal(str(error)) from None
         if self.unit and self.plain is None:
             raise refusal(f"has no unit, {units.dimension_name(self.unit)} needs one; {units.advice(self.unit)}")
-        try:
-            value = float(given) * (self.plain if self.plain is not None else 1.0)
-        except OverflowError:
-            value = math.inf
+        # a whole number may be beyond all floats
+        value = math.inf if abs(given) > sys.float_info.max else given * (1.0 if self.plain is None else self.plain)
         if not math.isfinite(value):
             raise refusal("is not finite; give a number")
         return value

@@ -69,13 +69,7 @@ def is_open(engine: EngineTable, shafts: Sequence[BalancerShaftTable]) -> bool:
 def opened(
     engine: EngineTable, shafts: Sequence[BalancerShaftTable], table: PhasingTable | None, assemble: Assemble
 ) -> Problem:
-    """The problem with the first design that its phasing allows, and the phasing.
-
-    Raises
-    ------
-    Refused
-        If the open parts contradict the file.
-    """
+    """The problem with the first design that its phasing allows, and the phasing."""
     table = table or PhasingTable()
     _check_openable(engine)
     cycle, count, bounds = cycle_of(engine), _cylinders(engine), _throw_bounds(engine)
@@ -111,11 +105,9 @@ def opened(
 def _check_speed(problem: Problem, phasing: Phasing) -> None:
     """The smooth program of uneven throws knows a crank that turns evenly (S19)."""
     if phasing.continuous and problem.fidelity.is_uneven:
-        raise Refused(
-            "fidelity.crank_inertia", f"{problem.fidelity.crank_inertia:g} kg m^2",
-            "makes the crank's speed uneven, and throws that leave the even steps are decided at an even one",
-            "leave it out, or fix the throws",
-        )  # fmt: skip
+        inertia = f"{problem.fidelity.crank_inertia:g} kg m^2"
+        rule = "makes the crank's speed uneven, and throws that leave the even steps are decided at an even one"
+        raise Refused("fidelity.crank_inertia", inertia, rule, "leave it out, or fix the throws")
 
 
 def _has_open(value: object) -> bool:
@@ -187,7 +179,7 @@ def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> 
         if shaft.optional:
             _check_sizes(shaft, where)
         if any((leader in optional) != shaft.optional for leader in leaders):
-            rule = "follows a shaft that is not optional" if shaft.optional else "follows a shaft that is optional"
+            rule = f"follows a shaft that is {'not ' if shaft.optional else ''}optional"
             raise Refused(f"{where}.optional", None, rule, "make both optional")
         if not shaft.optional:
             continue
@@ -196,9 +188,8 @@ def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> 
         sets = [group for group in sets if group not in joined] + [merged]
     for key in ("most_shafts", "most_shaft_mass"):
         if getattr(table, key) is not None and not sets:
-            raise Refused(
-                f"phasing.{key}", None, "limits optional shafts, and none is", "set optional = true on a shaft"
-            )
+            rule = "limits optional shafts, and none is"
+            raise Refused(f"phasing.{key}", None, rule, "set optional = true on a shaft")
     return ShaftChoice(
         tuple(tuple(shaft.name for shaft in group) for group in sets),
         tuple(sum(shaft.shaft_mass for shaft in group) for group in sets),
@@ -238,10 +229,8 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
         raise Refused("engine.throws", None, f"has {len(engine.throws)} of {throws} throws", "let them agree")
     check_order(phasing.firing_order, count)
     if phasing.throw_bounds is not None and phasing.intervals.forbid_unevenness:
-        raise Refused(
-            "phasing.intervals", None, "allows even firing alone, and throws between bounds fire unevenly",
-            'allow more, leave it out, or write throws = "open"',
-        )  # fmt: skip
+        rule = "allows even firing alone, and throws between bounds fire unevenly"
+        raise Refused("phasing.intervals", None, rule, 'allow more, leave it out, or write throws = "open"')
     if phasing.intervals.least > phasing.intervals.most:
         raise Refused("phasing.intervals.min", None, "is more than max", "swap or relax them")
 

@@ -40,13 +40,7 @@ def load(path: str | Path) -> Problem:
 
 
 def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
-    """A problem from the tables of its file, changed or not; complaints name the file.
-
-    Raises
-    ------
-    InputError
-        As `load` does.
-    """
+    """A problem from the tables of its file, changed or not; complaints name the file (`InputError`)."""
     if "study" in tables:
         raise InputError(str(path), (Complaint("study", "", "makes this a study file", "use laufruhe study"),))
     try:
@@ -65,13 +59,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
 
 
 def tables_of(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file, their keys not yet checked.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or is no TOML.
-    """
+    """The tables of a TOML file, their keys not yet checked; `InputError` where it is none."""
     try:
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except IsADirectoryError:
