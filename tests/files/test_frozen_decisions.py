@@ -8,7 +8,7 @@ import pytest
 
 from files.test_reader import complaint_about
 from laufruhe.files.reader import load
-from problem_files import changed, written
+from problem_files import changed, open_unbalance, shaft, written
 
 GEARED = """
 title = "Two singles on geared counter-rotating cranks"
@@ -98,3 +98,12 @@ def test_orders_of_a_two_stroke_are_whole(tmp_path: Path) -> None:
     assert load(written(tmp_path, text)).objective[0].measure.orders == (1.5, 2.0)
     line = complaint_about(written(tmp_path, changed(text, "four-stroke", "two-stroke")))
     assert line.endswith("holds 1.5, and the orders of its cycle are multiples of 1; did you mean 2?")
+
+
+def test_a_shaft_that_follows_an_optional_one_is_optional(tmp_path: Path) -> None:
+    """It would be left without a leader where that is not built."""
+    leader = shaft("left", 2, "60 mm", open_unbalance()).replace("ratio", "optional = true\nratio", 1)
+    text = changed(TWIN, "throws = [0]", 'throws = "open"') + leader
+    text += shaft("right", -2, "-60 mm", 'coupled = { to = "left", as = "mirrored" }')
+    line = complaint_about(written(tmp_path, text))
+    assert line == "balancer_shafts[2].optional: follows a shaft that is optional; make both optional"
