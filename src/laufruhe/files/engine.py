@@ -165,21 +165,24 @@ def _asked(table: EngineTable, gas: bool = False) -> Asked:
 
 
 def _cylinders(table: EngineTable) -> int:
-    order, throws = table.given_order, table.given_throws
-    told = {
-        "cylinders": table.cylinders,
-        "firing_order": None if order is None else len(order),
-        "throws": None if throws is None else len(throws) * table.kind.cylinders_per_throw,
-    }
-    given = [(f"engine.{key}", count) for key, count in told.items() if count is not None]
+    given = told_cylinders(table)
     if not given:
         raise Refused("engine.cylinders", None, "is missing", "add it, or throws, or firing_order")
     first, count = given[0]
     for key, other in given:
         if other != count:
-            raise Refused(key, None, f"makes {other} cylinder(s), but {first} makes {count}", "let them agree")
-    check_order(order, count)
+            rule = f"makes {other} cylinder(s), but engine.{first} makes {count}"
+            raise Refused(f"engine.{key}", None, rule, "let them agree")
+    check_order(table.given_order, count)
     return count
+
+
+def told_cylinders(table: EngineTable) -> list[tuple[str, int]]:
+    """Keys that tell how many cylinders there are, and how many each tells."""
+    throws, order, per_throw = table.throws, table.given_order, table.kind.cylinders_per_throw
+    told = [("cylinders", table.cylinders)] if table.cylinders is not None else []
+    told += [("firing_order", len(order))] if order is not None else []
+    return told + ([("throws", len(throws) * per_throw)] if isinstance(throws, list) else [])
 
 
 def check_order(order: Sequence[int] | None, count: int) -> None:

@@ -6,14 +6,14 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
-from laufruhe.files.engine import EngineTable, check_order, cycle_of, layout_of
+from laufruhe.files.engine import EngineTable, check_order, cycle_of, layout_of, told_cylinders
 from laufruhe.files.fields import Open, Table
 from laufruhe.files.rotors import BalancerShaftTable
 from laufruhe.machine import Cycle
@@ -73,7 +73,9 @@ def opened(
     table = table or PhasingTable()
     _check_openable(engine)
     cycle, count, bounds = cycle_of(engine), _cylinders(engine), _throw_bounds(engine)
-    left, given = _without_choice(engine, count), engine.given_throws
+    # a layout that leaves its throws no choice
+    fixed = None if engine.kind.is_free or engine.kind.takes("throws") else layout_of(_closed(engine, count))
+    given = fixed.throws if fixed else engine.given_throws
 
     def realise(candidate: Candidate) -> Problem:
         return _without(assemble(_with(engine, count, candidate), candidate.without_gas), candidate.left_out)
@@ -82,12 +84,12 @@ def opened(
         cycle=cycle,
         layout=lambda bank, split: layout_of(_closed(engine, count, bank, split)),
         cylinders=count,
-        throws=left.throws if left else None if given is None else tuple(given),
+        throws=None if given is None else tuple(given),
         throw_bounds=bounds,
         firing_order=None if engine.given_order is None else tuple(engine.given_order),
         bank=_bounds(engine.own("bank_angle")),
         split=_bounds(engine.own("split_pin_angle")),
-        intervals=_intervals(table.intervals, cycle, count, bounds is not None, left.spread if left else 0.0),
+        intervals=_intervals(table.intervals, cycle, count, bounds is not None, fixed.spread if fixed else 0.0),
         realise=realise,
         steps=table.phases,
         shafts=_shaft_choice(shafts, table),
@@ -124,22 +126,11 @@ def _check_openable(engine: EngineTable) -> None:
 
 
 def _cylinders(engine: EngineTable) -> int:
-    if engine.cylinders is not None:
-        return engine.cylinders
-    if engine.given_order is not None:
-        return len(engine.given_order)
-    if isinstance(engine.throws, list):
-        return len(engine.throws) * engine.kind.cylinders_per_throw
-    if engine.kind.is_free:
-        return len(engine.slider_cranks)
-    raise Refused("engine.cylinders", None, "is missing, and open throws do not tell it", "add it")
-
-
-def _without_choice(engine: EngineTable, count: int) -> Layout | None:
-    """The layout, if it leaves its throws no choice."""
-    if engine.kind.is_free or engine.kind.takes("throws"):
-        return None
-    return layout_of(_closed(engine, count, None, None))
+    told = [count for _, count in told_cylinders(engine)]
+    told += [len(engine.slider_cranks)] if engine.kind.is_free else []
+    if not told:
+        raise Refused("engine.cylinders", None, "is missing, and open throws do not tell it", "add it")
+    return told[0]
 
 
 def _throw_bounds(engine: EngineTable) -> tuple[tuple[float, float], ...] | None:
@@ -272,9 +263,12 @@ def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> t
     return min(found)[1] if found else None
 
 
-def _closed(engine: EngineTable, count: int, bank: float | None, split: float | None) -> EngineTable:
-    update = {"cylinders": count, "throws": None, "firing_order": None}
-    return engine.model_copy(update={**update, "bank_angle": bank, "split_pin_angle": split})
+def _closed(
+    engine: EngineTable, count: int, bank: float | None = None, split: float | None = None, **told: list[Any] | None
+) -> EngineTable:
+    """[engine] with these numbers, and nothing told of throws and firing order but this."""
+    update = {"cylinders": count, "throws": None, "firing_order": None, "bank_angle": bank, "split_pin_angle": split}
+    return engine.model_copy(update=update | told)
 
 
 def _with(engine: EngineTable, count: int, candidate: Candidate) -> EngineTable:
@@ -283,8 +277,7 @@ def _with(engine: EngineTable, count: int, candidate: Candidate) -> EngineTable:
         return engine
     order = None if candidate.firing_order is None else list(candidate.firing_order)
     throws = list(candidate.throws) if engine.kind.takes("throws") else None
-    closed = _closed(engine, count, candidate.bank_angle, candidate.split_pin)
-    return closed.model_copy(update={"throws": throws, "firing_order": order})
+    return _closed(engine, count, candidate.bank_angle, candidate.split_pin, throws=throws, firing_order=order)
 
 
 def _without(problem: Problem, shafts: Sequence[str]) -> Problem:
