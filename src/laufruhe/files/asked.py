@@ -81,7 +81,9 @@ class Scene:
             raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
         channel, norm = MEASURES[name]
         at, of = where.rsplit(".", 1)[0], getattr(table, "of", None)
-        self._meets(channel.needs, where, name)
+        lacking = {Needs.MOUNTS: not self.engine.mounts, Needs.ELASTIC: self.engine.block is None}
+        if lacking.get(channel.needs):
+            raise Refused(where, name, *_NEEDS[channel.needs])
         self._check_keys(channel, table, at)
         weights = table.direction_weights
         found = Measure(
@@ -106,11 +108,6 @@ class Scene:
             remedy = "say which natural frequency about the axis is wanted"
             raise Refused(f"{at}.frequency", None, "is missing", remedy)
         self._orders(table.orders, f"{at}.orders")
-
-    def _meets(self, needs: Needs, where: str, name: str) -> None:
-        lacking = {Needs.MOUNTS: not self.engine.mounts, Needs.ELASTIC: self.engine.block is None}
-        if lacking.get(needs):
-            raise Refused(where, name, *_NEEDS[needs])
 
     def _orders(self, orders: list[float] | None, where: str) -> None:
         """Refuse what no load can have: all that turns returns within the cycle (C6)."""
@@ -192,13 +189,13 @@ def limits_of(tables: Sequence[ConstraintTable], scene: Scene) -> tuple[Limit, .
 def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
     measure = scene.measure(table.limit, table, f"{where}.limit")
     sides, channel = measure.channel.sides, measure.channel
-    norm = not channel.is_mounting
+    norm, remedy = not channel.is_mounting, "give " + " or ".join(sides)
     for key in _SIDES:
         if getattr(table, key) is not None and key not in sides:
             rule = f"{channel}, which has a largest value only" if norm else table.limit
-            raise Refused(f"{where}.{key}", None, f"does not go with {rule}", "give " + " or ".join(sides))
+            raise Refused(f"{where}.{key}", None, f"does not go with {rule}", remedy)
     if all(getattr(table, key) is None for key in sides):
-        raise Refused(f"{where}.{sides[0]}", None, "is missing", "add it" if norm else "give " + " or ".join(sides))
+        raise Refused(f"{where}.{sides[0]}", None, "is missing", "add it" if norm else remedy)
     low, high = (_side(getattr(table, key), measure, f"{where}.{key}") for key in ("min", "max"))
     if not norm and "max" not in sides and low is not None and low > 1.0:
         raise Refused(f"{where}.min", table.min, "is more than the whole energy", "give a share under 1")
@@ -233,6 +230,6 @@ def _check_together(limits: Sequence[Limit]) -> None:
                 continue
             unit = low.measure.unit
             rule = f"at least {units.shown(low.minimum, unit)} and at most {units.shown(high.maximum, unit)}"
-            said = f"'{low.name}' and '{high.name}' contradict each other"
-            said = said if low is not high else f"'{low.name}' contradicts itself"
+            both = f"'{low.name}' and '{high.name}' contradict each other"
+            said = both if low is not high else f"'{low.name}' contradicts itself"
             raise Refused("constraints", None, f"{said}: {rule}", "let the limits leave room")

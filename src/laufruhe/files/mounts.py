@@ -173,14 +173,18 @@ def _elastic(table: MountsTable, block: Block) -> MountsFound:
         for key in _FIELDS:
             if key not in followed:
                 read.take(name, key, _values(table, place, key, where, "add it, or like, or mirror_of"))
-    stops = [place.stop or table.stop for place in places]
-    bare = [_stopped(Mount(name, (0.0, 0.0, 0.0)), stop) for name, stop in zip(names, stops, strict=True)]
+    bare = (_bare(name, place.stop or table.stop) for name, place in zip(names, places, strict=True))
     mounts = tuple(mount_of(mount, row) for mount, row in zip(bare, read.rows, strict=True))
-    _check_held(block, mounts)
+    with blamed_on("mounts"):
+        loose = free_motion(elastic_mounting(block, mounts).modes)
+    if loose:
+        remedy = "add a mount or a stiffness there; an open stiffness may be given a start"
+        raise Refused("mounts", None, f"leave the block free in {loose}", remedy)
     return MountsFound(mounts, block, tuple(map(tuple, read.rows)), tuple(read.decisions))
 
 
-def _stopped(mount: Mount, stop: StopTable | None) -> Mount:
+def _bare(name: str, stop: StopTable | None) -> Mount:
+    mount = Mount(name, (0.0, 0.0, 0.0))
     return mount if stop is None else replace(mount, stop_gap=stop.gap, stop_stiffness=stop.stiffness)
 
 
@@ -231,11 +235,3 @@ class _Numbers:
                 drives = [v for v in decision.mount_drives if v.mount == leader and v.number == number]
                 new = (MountDrive(last, number, gain * drive.gain) for drive in drives)
                 self.decisions[d] = replace(decision, drives=(*decision.drives, *new))
-
-
-def _check_held(block: Block, mounts: tuple[Mount, ...]) -> None:
-    with blamed_on("mounts"):
-        loose = free_motion(elastic_mounting(block, mounts).modes)
-    if loose:
-        remedy = "add a mount or a stiffness there; an open stiffness may be given a start"
-        raise Refused("mounts", None, f"leave the block free in {loose}", remedy)
