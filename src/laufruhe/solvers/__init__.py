@@ -9,10 +9,11 @@ from functools import partial
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.channels import MountChannel
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.accuracy import solve_within
-from laufruhe.solvers.conclusion import state
+from laufruhe.solvers.conclusion import broken_limits, none_within, state
 from laufruhe.solvers.direct_cones import solve_direct
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
@@ -84,9 +85,20 @@ def _smooth(problem: Problem, _: Say) -> Result:
     return solve_joint(problem)
 
 
+def _given(problem: Problem, _: Say) -> Result:
+    result = state(problem)
+    broken = broken_limits(problem.limits, result.final)
+    return none_within(problem, result.final, broken, dict(result.timing)) if broken else result
+
+
 def _stars(problem: Problem, _: Say) -> Result:
     from laufruhe.solvers.phasing import solve_phasing
 
+    if problem.mount_limits:
+        given = evaluate(problem)
+        broken = broken_limits(problem.mount_limits, given)
+        if broken:
+            return none_within(problem, given, broken, {})
     return solve_within(problem, solve_phasing)
 
 
@@ -104,10 +116,10 @@ def _asks_loads(problem: Problem) -> bool:
 
 _U, _K, _M, _S = Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR
 METHODS: tuple[Method, ...] = (
-    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, lambda problem, _: state(problem)),
+    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, _given),
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem, _: solve_within(problem, solve_unbalances)),
-    Method("stars, each with cones", frozenset({_S, _U}), lambda p: not p.asks_mounts, Reach.WHOLE, _stars),
+    Method("stars, each with cones", frozenset({_S, _U}), _asks_loads, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), lambda _: True, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), lambda _: True, Reach.ASIDE, _smooth),

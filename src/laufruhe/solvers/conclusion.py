@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
@@ -30,6 +31,8 @@ KEPT = 10.0 * FEASIBLE
 ACTIVE = 1e-5
 # share of the objective under which a price is a rounding
 _FELT = 1e-7
+# share of the objective from which a price tells that a limit holds the design, whatever room its tolerance left
+_TOLD = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +145,7 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
         objective=objective_of(problem, evaluation, evaluation),
         certificate=None,
         decisions=(),
-        limits=(),
+        limits=() if evaluation.resonance else limit_values(problem, evaluation),
         initial=evaluation,
         final=evaluation,
         error_estimate=0.0 if evaluation.resonance else error_of(problem, evaluation),
@@ -155,10 +158,14 @@ def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...]
     return infeasible(problem, initial, limit_values(problem, initial), conflict, timing)
 
 
+def broken_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
+    """Names of those that a design breaks."""
+    return tuple(limit.name for limit in limits if evaluation.standing(limit).excess > KEPT)
+
+
 def _broken(problem: Problem, design: Design) -> str:
-    """Names of the limits that a design breaks."""
-    names = [f"'{x.name}'" for x in problem.limits if design.evaluation.standing(x).excess > KEPT]
-    return " and ".join(names) or "a limit"
+    """What a message says of the limits that a design breaks."""
+    return " and ".join(f"'{name}'" for name in broken_limits(problem.limits, design.evaluation)) or "a limit"
 
 
 def limit_values(
@@ -168,9 +175,10 @@ def limit_values(
     out = []
     for k, limit in enumerate(problem.limits):
         found = evaluation.standing(limit)
-        active = bool(found.excess >= -ACTIVE)
-        price = prices[k] if active and k < len(prices) else 0.0
-        price = price if price * abs(found.edge) > _FELT * value else 0.0
+        price = prices[k] if k < len(prices) else 0.0
+        told = price * abs(found.edge) > _TOLD * value and found.excess >= -problem.tolerance
+        active = bool(found.excess >= -ACTIVE or told)
+        price = price if active and price * abs(found.edge) > _FELT * value else 0.0
         out.append(LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side))
     return tuple(out)
 

@@ -14,7 +14,7 @@ from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.problem.evaluation import BETWEEN, evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_unit, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, concluded, judged, none_within
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
 from laufruhe.solvers.direct_cones import ConicSolution
 from laufruhe.solvers.result import Result
 
@@ -75,7 +75,7 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     initial = evaluate(problem) if any(problem.start) else model.bare
     modelled = time.perf_counter()
     # what is asked of mounts that stay holds for every design, or for none
-    broken = tuple(limit.name for limit in problem.mount_limits if initial.standing(limit).excess > KEPT)
+    broken = broken_limits(problem.mount_limits, initial)
     if broken:
         return none_within(problem, initial, broken, {"model": modelled - started})
     optimum, samples = _refine(problem, model, objective_value(problem, initial), cones or _stated)
@@ -199,6 +199,9 @@ def _without_negligible(affine: AffineProblem, x: Array) -> Array:
     """
     x = x.copy()
     nothing = np.zeros_like(x)
+    may_be_nothing = all(domain.set.lower <= 0.0 for domain in affine.domains)
+    if may_be_nothing and affine.objective(nothing) <= affine.objective(x) and _keeps_limits(affine, x, nothing):
+        return nothing
     norms = [(norm, max(norm.value(x), norm.value(nothing))) for _, norm in affine.terms]
     norms = _linear(norms)
     for domain in affine.domains:

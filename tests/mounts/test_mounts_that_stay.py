@@ -1,0 +1,53 @@
+"""Limits that nothing open acts on hold for every design or for none, whatever else is open."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+from laufruhe.solvers.result import Status
+from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN, problem_of
+
+GIVEN = MOUNTS.replace(OPEN, '"400 N/mm"')
+CHEAPEST = '[objective]\nminimise = "rms mount force"\n'
+
+
+def limited(limit: str, most: str) -> str:
+    """A limit of a problem file."""
+    return f'[[constraints]]\nlimit = "{limit}"\nmax = "{most}"\n'
+
+
+@pytest.mark.parametrize(
+    ("limit", "most", "status"),
+    [
+        ("static sag", "50 mm", Status.FEASIBLE),
+        ("static sag", "0.1 mm", Status.INFEASIBLE),
+        ("peak to peak mount force", "1 N", Status.INFEASIBLE),
+    ],
+)
+def test_a_design_with_nothing_open_is_held_to_its_limits(
+    tmp_path: Path, limit: str, most: str, status: Status
+) -> None:
+    parts = (ENGINE, BLOCK, GIVEN, CHEAPEST, limited(limit, most))
+    result = solve(problem_of(tmp_path, *parts))
+    assert result.status is status
+    assert [entry.name for entry in result.limits] == [limit]
+    assert result.conflict == ((limit,) if status is Status.INFEASIBLE else ())
+
+
+def test_a_star_on_mounts_that_stay_is_proven_beside_a_limit_on_sag(tmp_path: Path) -> None:
+    star = ENGINE.replace("throws = [0, 180, 180, 0]", 'throws = "open"\ncylinders = 4')
+    parts = (star, BLOCK, GIVEN, CHEAPEST)
+    free = solve(problem_of(tmp_path, *parts))
+    kept = solve(problem_of(tmp_path, *parts, limited("static sag", "50 mm")))
+    broken = solve(problem_of(tmp_path, *parts, limited("static sag", "0.1 mm")))
+    assert kept.certificate is not None
+    assert kept.certificate.kind is Proof.GLOBAL
+    assert free.objective is not None
+    assert kept.objective is not None
+    assert kept.objective.value == pytest.approx(free.objective.value, rel=1e-9)
+    assert broken.status is Status.INFEASIBLE
+    assert broken.conflict == ("static sag",)
