@@ -89,6 +89,8 @@ BAD = [
     (REPLICA.replace("mean mount force", "mean mount farce"), "did you mean 'mean mount force'?"),
     (REPLICA.replace("{m} kg", "{mm} kg"), "'mm' is no name here; did you mean 'm'?"),
     (REPLICA.replace("{m} kg", "{m kg"), "cannot be read"),
+    (REPLICA.replace("numbers = {", "nummbers = {") + REPLICA[REPLICA.index("[[study.parts]]"):].replace('"p"', '"q"'),
+     "study.common.nummbers"),
     (REPLICA.replace("{m} kg", "{m} mm"), "'mm' is not a unit of a mass"),
     (REPLICA.replace("within", "witin"), "did you mean 'within'?"),
     (REPLICA.replace('within = "5 %"', ""), "needs is and within together; give both"),

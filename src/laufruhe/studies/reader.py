@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, Union
 
@@ -49,6 +52,17 @@ class StudyFile(Table):
     study: StudyTable
 
 
+def _once(found: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple[Complaint, ...]:
+    """What is wrong with keys that all parts have in common is said once."""
+    common = tables["study"].get("common", {}) if isinstance(tables["study"], dict) else {}
+    kept: dict[str, Complaint] = {}
+    for one in found:
+        key = re.sub(r"^study\.parts\[\d+\]\.", "", one.where)
+        where = f"study.common.{key}" if re.split(r"[.\[]", key)[0] in common else one.where
+        kept.setdefault(where, replace(one, where=where))
+    return tuple(kept.values())
+
+
 def load_study(path: Path) -> StudyFile:
     """Read and check a study file.
 
@@ -63,7 +77,7 @@ def load_study(path: Path) -> StudyFile:
     try:
         file = StudyFile.model_validate(tables)
     except ValidationError as error:
-        raise InputError(str(path), complaints_of(error, StudyFile)) from None
+        raise InputError(str(path), _once(complaints_of(error, StudyFile), tables)) from None
     names = [part.name for part in file.study.parts]
     for k, part in enumerate(file.study.parts):
         where = f"study.parts[{k + 1}]"
