@@ -119,6 +119,5 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
 def _check_decided(decisions: Sequence[Decision]) -> None:
     """Refuse what is open and moves nothing."""
     for decision in decisions:
-        gains: list[complex] = [drive.gain for drive in decision.rotor_drives]
-        if not any([*gains, *(drive.gain for drive in decision.mount_drives)]):
+        if not any(drive.acts for drive in decision.drives):
             raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -23,6 +24,18 @@ Array = NDArray[np.float64]
 
 STIFFNESS, LOSS, DAMPING, POSITION, TURNED = slice(0, 3), 3, slice(4, 7), slice(7, 10), slice(10, 13)
 NUMBERS_OF_MOUNT = 13
+
+
+class Kind(IntEnum):
+    """Kinds of what may be open, by what a method has to know of them; of several the last one counts."""
+
+    UNBALANCE = 1
+    """Every load is affine in it (P1)."""
+    STIFFNESS = 2
+    """K is linear in it."""
+    MOUNT = 3
+    STAR = 4
+    """Of the phasing: no number."""
 
 
 @dataclass
@@ -40,6 +53,11 @@ class Numbers:
     unbalances: dict[str, Any] = field(default_factory=dict)
     mounts: list[list[Any]] = field(default_factory=list)
 
+    @classmethod
+    def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
+        """Those of an engine as given, and of its mounts where these may move."""
+        return cls({rotor.name: rotor.unbalance for rotor in engine.rotors}, [list(row) for row in mounts])
+
     def engine(self, given: Engine) -> Engine:
         """The engine with these numbers."""
         rotors = tuple(replace(rotor, unbalance=self.unbalances[rotor.name]) for rotor in given.rotors)
@@ -50,15 +68,15 @@ class Numbers:
 
 
 class Drive(Protocol):
-    """How a decision acts on one number of the engine.
+    """How a decision acts on one number of the engine."""
 
-    Attributes
-    ----------
-    is_affine
-        Whether every load is affine in what it moves (P1).
-    """
+    @property
+    def kind(self) -> Kind:
+        """What a method has to know of it."""
 
-    is_affine: ClassVar[bool]
+    @property
+    def acts(self) -> bool:
+        """Whether anything of the engine follows."""
 
     def move(self, numbers: Numbers, change: Any) -> None:
         """Move the number by a change of the decision."""
@@ -71,7 +89,12 @@ class RotorDrive:
     rotor: str
     gain: complex
     mirrored: bool = False
-    is_affine: ClassVar[bool] = True
+    kind: ClassVar[Kind] = Kind.UNBALANCE
+
+    @property
+    def acts(self) -> bool:
+        """Unless the gain is nothing."""
+        return self.gain != 0.0
 
     def of(self, change: Value) -> Value:
         """What a change of the decision does to the unbalance."""
@@ -89,12 +112,16 @@ class MountDrive:
     mount: int
     number: int
     gain: float
-    is_affine: ClassVar[bool] = False
 
     @property
-    def is_stiffness(self) -> bool:
-        """Whether K is linear in it."""
-        return self.number < STIFFNESS.stop
+    def kind(self) -> Kind:
+        """K is linear in stiffness alone."""
+        return Kind.STIFFNESS if self.number < STIFFNESS.stop else Kind.MOUNT
+
+    @property
+    def acts(self) -> bool:
+        """Unless the gain is nothing."""
+        return self.gain != 0.0
 
     def move(self, numbers: Numbers, change: Any) -> None:
         """Of the mount's number."""
@@ -141,9 +168,14 @@ class Decision:
         return self.start.real
 
     @property
+    def kind(self) -> Kind:
+        """Of what follows."""
+        return max(drive.kind for drive in self.drives)
+
+    @property
     def is_affine(self) -> bool:
         """Whether every load is affine in it."""
-        return all(drive.is_affine for drive in self.drives)
+        return self.kind is Kind.UNBALANCE
 
     @property
     def rotor_drives(self) -> tuple[RotorDrive, ...]:
@@ -158,15 +190,12 @@ class Decision:
     @property
     def is_stiffness(self) -> bool:
         """Whether nothing but stiffness of mounts follows."""
-        return all(isinstance(drive, MountDrive) and drive.is_stiffness for drive in self.drives)
+        return self.kind is Kind.STIFFNESS
 
 
 def without_rotors(decisions: Sequence[Decision], gone: Collection[str]) -> tuple[Decision, ...]:
     """Decisions as they are once some rotors are left out; those that drive nothing else go with them."""
-    fewer = (
-        replace(d, drives=tuple(v for v in d.drives if not (isinstance(v, RotorDrive) and v.rotor in gone)))
-        for d in decisions
-    )
+    fewer = (replace(d, drives=tuple(v for v in d.drives if getattr(v, "rotor", None) not in gone)) for d in decisions)
     return tuple(decision for decision in fewer if decision.drives)
 
 

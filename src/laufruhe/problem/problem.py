@@ -190,10 +190,7 @@ class Problem:
         """The numbers of the engine with decisions at these values; symbols do as well."""
         moved = self.decisions if decisions is None else decisions
         on_mounts = any(decision.mount_drives for decision in moved)
-        given = Numbers(
-            {rotor.name: rotor.unbalance for rotor in self.engine.rotors},
-            [list(row) for row in self.mount_numbers] if on_mounts else [],
-        )
+        given = Numbers.of(self.engine, self.mount_numbers if on_mounts else ())
         return moved_numbers(given, moved, values)
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum, auto
 from functools import partial
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.channels import MountChannel
+from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
@@ -21,15 +21,6 @@ from laufruhe.solvers.unbalances import solve_unbalances
 __all__ = ["METHODS", "Result", "Status", "solve", "state"]
 
 Say = Callable[[str], None]
-
-
-class Kind(Enum):
-    """Kinds of what may be open, by what a method has to know of them."""
-
-    UNBALANCE = auto()
-    STIFFNESS = auto()
-    MOUNT = auto()
-    STAR = auto()
 
 
 @dataclass(frozen=True)
@@ -59,12 +50,13 @@ class Method:
 
 def kinds_of(problem: Problem) -> frozenset[Kind]:
     """Kinds of what is open."""
-    found = {Kind.STAR} if problem.phasing is not None else set()
-    for decision in problem.decisions:
-        found.add(
-            Kind.UNBALANCE if decision.is_affine else Kind.STIFFNESS if decision.is_stiffness else Kind.MOUNT
-        )  # fmt: skip
-    return frozenset(found)
+    stars = [Kind.STAR] if problem.phasing is not None else []
+    return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
+
+
+def _named(kinds: frozenset[Kind]) -> str:
+    """Kinds in words."""
+    return " and ".join(kind.name.lower() for kind in sorted(kinds))
 
 
 def _convex_mounts(problem: Problem, _: Say) -> Result:
@@ -154,7 +146,9 @@ def solve(problem: Problem, say: Say = lambda _: None, *, many: bool = False) ->
     kinds = kinds_of(problem)
     if problem.decisions and not problem.objective and Kind.STAR not in kinds:
         raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
-    method = next(m for m in METHODS if kinds <= m.decides and m.suits(problem))
+    method = next((m for m in METHODS if kinds <= m.decides and m.suits(problem)), None)
+    if method is None:
+        raise ModelError(f"no method decides {_named(kinds)} together, with what is asked here; fix one of them")
     if many and method.decides == {Kind.UNBALANCE}:
         return solve_within(problem, partial(solve_unbalances, cones=solve_direct))
     return method.solve(problem, say)
