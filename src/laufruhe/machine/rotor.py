@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from laufruhe.errors import ModelError
@@ -63,6 +63,16 @@ class Rotor:
     shaft: Shaft = CRANKSHAFT
     role: Role = Role.COUNTERWEIGHT
     radius: float | None = None
+
+    @property
+    def place(self) -> tuple[float, float, float]:
+        """Its x, and y and z of its shaft [m] (C2)."""
+        return self.x, self.shaft.y, self.shaft.z
+
+    def placed(self, x: float, y: float, z: float) -> Rotor:
+        """The same elsewhere, its shaft with it."""
+        moved = self.shaft if (y, z) == (self.shaft.y, self.shaft.z) else replace(self.shaft, y=y, z=z)
+        return replace(self, x=x, shaft=moved)
 
     @property
     def mass(self) -> float:

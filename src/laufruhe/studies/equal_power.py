@@ -79,11 +79,9 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
         rotors=tuple(
             replace(
                 rotor,
-                x=rotor.x * k,
                 unbalance=rotor.unbalance * m * k,
                 radius=None if rotor.radius is None else rotor.radius * k,
-                shaft=replace(rotor.shaft, y=rotor.shaft.y * k, z=rotor.shaft.z * k),
-            )
+            ).placed(*(k * along for along in rotor.place))
             for rotor in engine.rotors
         ),
         mounts=tuple(
