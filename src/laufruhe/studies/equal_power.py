@@ -7,11 +7,11 @@ from dataclasses import replace
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
 from laufruhe.machine.similarity import EqualPowerScale, equal_power_scale
-from laufruhe.problem.decision import Decision
+from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.problem import Problem
 
 # what a decision's size is multiplied by when the engine is rebuilt, as powers of its unit
-_FRACTION, _MASS, _UNBALANCE = "", "kg", "kg m"
+_FRACTION, _LENGTH, _MASS, _UNBALANCE = "", "m", "kg", "kg m"
 
 
 def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
@@ -35,9 +35,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
         problem,
         engine=_engine(problem.engine, scale),
         points=tuple(replace(point, speed=point.speed * scale.speed) for point in problem.points),
-        decisions=tuple(
-            _decision(decision, scale) if decision.is_affine else decision for decision in problem.decisions
-        ),
+        decisions=tuple(_decision(decision, scale) for decision in problem.decisions),
     )
 
 
@@ -93,11 +91,15 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
 
 def _decision(decision: Decision, scale: EqualPowerScale) -> Decision:
     """Bounds grow with the size in its unit; gains turn that unit into kg m."""
-    size = {_FRACTION: 1.0, _MASS: scale.mass, _UNBALANCE: scale.mass * scale.length}[decision.unit]
+    sizes = {_FRACTION: 1.0, _LENGTH: scale.length, _MASS: scale.mass, _UNBALANCE: scale.mass * scale.length}
+    size = sizes[decision.unit]
     gain = scale.mass * scale.length / size
     return replace(
         decision,
         set=decision.set.scaled(size),
         start=decision.start * size,
-        drives=tuple(replace(drive, gain=drive.gain * gain) for drive in decision.rotor_drives),
+        drives=tuple(
+            replace(drive, gain=drive.gain * gain) if isinstance(drive, RotorDrive) else drive
+            for drive in decision.drives
+        ),
     )
