@@ -17,7 +17,7 @@ from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.numerics.turns import as_turn, cis
-from laufruhe.problem.decision import Decision, RotorDrive
+from laufruhe.problem.decision import Decision, PlaceDrive, RotorDrive
 from laufruhe.problem.sets import Interval, Sector, Set
 
 _HOW = {"equal": (1.0, False), "opposite": (-1.0, False), "mirrored": (1.0, True), "mirrored opposite": (-1.0, True)}
@@ -37,7 +37,7 @@ class CounterweightTable(Table):
     )
     balance_fraction: f.OpenFraction | None = f.told("An earlier name of balance_factor.")
     throws: list[CylinderNumber] | None = None
-    x: f.Length | None = None
+    x: f.OpenLength | None = None
     opposite_throw: CylinderNumber | None = f.told("Angle and place are counted from it.")
     unbalance: f.OpenUnbalance | None = None
     mass: f.OpenMass | None = None
@@ -61,7 +61,7 @@ class UnbalanceTable(Table):
     """One unbalance of a shaft."""
 
     name: Name | None = None
-    x: f.Length = 0.0
+    x: f.OpenLength = 0.0
     unbalance: f.OpenUnbalance | None = None
     mass: f.OpenMass | None = None
     radius: f.PositiveLength | None = None
@@ -77,7 +77,7 @@ class BalancerShaftTable(Table):
 
     name: Name
     ratio: f.Ratio
-    position: f.Pair[f.Length] = Field(description="y and z of its axis.")
+    position: f.Pair[f.OpenLength] = Field(description="y and z of its axis.")
     unbalances: list[UnbalanceTable] = Field(min_length=1)
     optional: bool = f.told("Whether it is built is decided too.", False)
     shaft_mass: f.Mass = f.told("Of an optional shaft, its unbalances not included.", 0.0)
@@ -95,6 +95,15 @@ class RotorList:
         if any(other.name == rotor.name for other in self.rotors):
             raise Refused(where, rotor.name, "is the name of another unbalance", "give each its own name")
         self.rotors.append(rotor)
+
+    def move(self, name: str, rotors: Sequence[str], axis: int, place: float | Open | None) -> None:
+        """Let the place of rotors along an axis be decided, if it is open; nothing follows of those of no size."""
+        if not isinstance(place, Open) or not place.is_open:
+            return
+        sized = {rotor.name for rotor in self.rotors if rotor.unbalance != 0.0}
+        sized |= {drive.rotor for decision in self.decisions for drive in decision.rotor_drives}
+        drives = tuple(PlaceDrive(rotor, axis) for rotor in rotors if rotor in sized)
+        self.decisions.append(Decision(name, "m", Interval(*place.bounds), place.start, drives))
 
     def drive(self, rotor: str, source: str, gain: float, mirrored: bool) -> None:
         """Let a rotor follow whatever decides another one."""
@@ -160,7 +169,7 @@ def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
 
 
 def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
-    reference, x = 0.0, table.x
+    reference, x = 0.0, None if table.x is None else Open.of(table.x).start
     none_of(table, ("throws",), where, "goes with balance_factor only", "use opposite_throw")
     if table.opposite_throw is not None:
         pin = _pin(pins, table.opposite_throw, f"{where}.opposite_throw")
@@ -168,6 +177,7 @@ def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where
     if x is None:
         raise Refused(f"{where}.x", None, "is missing", "give its place, or opposite_throw")
     _place(Rotor(table.name, x, 0j, radius=table.radius), table, reference, where, into)
+    into.move(f"{table.name}.x", [table.name], 0, table.x)
 
 
 def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> None:
@@ -178,7 +188,7 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
         if table.name in names[:k] or table.name == CRANKSHAFT.name:
             raise Refused(f"{where}.name", table.name, "is the name of another shaft", "give each its own name")
         with blamed_on(f"{where}.ratio"):
-            shaft = Shaft(table.name, table.ratio, *table.position)
+            shaft = Shaft(table.name, table.ratio, *(Open.of(along).start for along in table.position))
         for j, unbalance in enumerate(table.unbalances):
             at = f"{where}.unbalances[{j + 1}]"
             single = len(table.unbalances) == 1 and unbalance.name is None
@@ -186,8 +196,12 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
             if unbalance.coupled is not None:
                 _follow(name, unbalance, unbalance.coupled, shaft, at, into)
             else:
-                rotor = Rotor(name, unbalance.x, 0j, shaft, Role.BALANCER, unbalance.radius)
+                rotor = Rotor(name, Open.of(unbalance.x).start, 0j, shaft, Role.BALANCER, unbalance.radius)
                 _place(rotor, unbalance, 0.0, at, into)
+            into.move(f"{name}.x", [name], 0, unbalance.x)
+        built = [rotor.name for rotor in into.rotors if rotor.shaft == shaft]
+        for axis, along in enumerate(table.position, start=1):
+            into.move(f"{table.name}.{'xyz'[axis]}", built, axis, along)
 
 
 def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaft, where: str, into: RotorList) -> None:
@@ -200,7 +214,7 @@ def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaf
     leader = leaders[coupled.to]
     sign, mirrored = _HOW[coupled.how]
     value = sign * (leader.unbalance.conjugate() if mirrored else leader.unbalance)
-    into.add(Rotor(name, table.x, value, shaft, Role.BALANCER, table.radius or leader.radius), where)
+    into.add(Rotor(name, Open.of(table.x).start, value, shaft, Role.BALANCER, table.radius or leader.radius), where)
     into.drive(name, coupled.to, sign, mirrored)
 
 

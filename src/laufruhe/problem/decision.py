@@ -31,10 +31,12 @@ class Kind(IntEnum):
 
     UNBALANCE = 1
     """Every load is affine in it (P1)."""
-    STIFFNESS = 2
+    PLACE = 2
+    """Every load is affine in it while the unbalances are held (P8)."""
+    STIFFNESS = 3
     """K is linear in it."""
-    MOUNT = 3
-    STAR = 4
+    MOUNT = 4
+    STAR = 5
     """Of the phasing: no number."""
 
 
@@ -46,21 +48,30 @@ class Numbers:
     ----------
     unbalances
         Of the rotors by name [kg m] (C4).
+    places
+        Of the rotors by name: x, and y and z of their shafts [m] (C2).
     mounts
         Of every mount thirteen: stiffness, loss factor, damping, position, turned angles (E13).
     """
 
     unbalances: dict[str, Any] = field(default_factory=dict)
+    places: dict[str, list[Any]] = field(default_factory=dict)
     mounts: list[list[Any]] = field(default_factory=list)
 
     @classmethod
     def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
         """Those of an engine as given, and of its mounts where these may move."""
-        return cls({rotor.name: rotor.unbalance for rotor in engine.rotors}, [list(row) for row in mounts])
+        rotors = {rotor.name: rotor for rotor in engine.rotors}
+        unbalances = {name: rotor.unbalance for name, rotor in rotors.items()}
+        places: dict[str, list[Any]] = {name: list(rotor.place) for name, rotor in rotors.items()}
+        return cls(unbalances, places, [list(row) for row in mounts])
 
     def engine(self, given: Engine) -> Engine:
         """The engine with these numbers."""
-        rotors = tuple(replace(rotor, unbalance=self.unbalances[rotor.name]) for rotor in given.rotors)
+        rotors = tuple(
+            replace(rotor, unbalance=self.unbalances[rotor.name]).placed(*self.places[rotor.name])
+            for rotor in given.rotors
+        )
         mounts = given.mounts
         if self.mounts:
             mounts = tuple(mount_of(mount, row) for mount, row in zip(given.mounts, self.mounts, strict=True))
@@ -103,6 +114,20 @@ class RotorDrive:
     def move(self, numbers: Numbers, change: Any) -> None:
         """Of the unbalance."""
         numbers.unbalances[self.rotor] += self.of(change)
+
+
+@dataclass(frozen=True)
+class PlaceDrive:
+    """Place of one rotor += change, along x, or by the y or z of its shaft (C2)."""
+
+    rotor: str
+    axis: int
+    kind: ClassVar[Kind] = Kind.PLACE
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the rotor."""
+        numbers.places[self.rotor][self.axis] += change
 
 
 @dataclass(frozen=True)
@@ -181,6 +206,11 @@ class Decision:
     def rotor_drives(self) -> tuple[RotorDrive, ...]:
         """Unbalances that follow."""
         return tuple(drive for drive in self.drives if isinstance(drive, RotorDrive))
+
+    @property
+    def place_drives(self) -> tuple[PlaceDrive, ...]:
+        """Places of rotors that follow."""
+        return tuple(drive for drive in self.drives if isinstance(drive, PlaceDrive))
 
     @property
     def mount_drives(self) -> tuple[MountDrive, ...]:

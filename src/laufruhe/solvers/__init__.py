@@ -100,17 +100,24 @@ def _stars_on_mounts(problem: Problem, say: Say) -> Result:
     return solve_star_mounts(problem, say)
 
 
+def _places(problem: Problem, say: Say) -> Result:
+    from laufruhe.solvers.places import solve_places
+
+    return solve_within(problem, lambda at: solve_places(at, say))
+
+
 def _asks_loads(problem: Problem) -> bool:
     """Whether nothing that is asked of the mounts depends on loads: it holds for every design, or for none."""
     asked = [limit.measure.channel for limit in problem.mount_limits]
     return not problem.mount_terms and not any(isinstance(c, MountChannel) and c.of_loads for c in asked)
 
 
-_U, _K, _M, _S = Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR
+_U, _P, _K, _M, _S = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR
 METHODS: tuple[Method, ...] = (
     Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, _given),
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem, _: solve_within(problem, solve_unbalances)),
+    Method("cones over boxes of places", frozenset({_U, _P}), _asks_loads, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_loads, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), lambda _: True, Reach.NEAR, _smooth),

@@ -1,0 +1,345 @@
+"""Places of unbalances, and the unbalances with them: cones over boxes of places (P8).
+
+The load of an unbalance U at a place r is linear in U and in U r. Where r lies in a box with
+the corners r_c, it is the load of unbalances
+
+    U_c = l_c U,    sum l_c = 1,    l_c >= 0,    r = sum l_c r_c                           (P8)
+
+at the corners. That the U_c share one angle, and unbalances of one place their l_c, is left
+out: a cone program, whose least value no design with its places in the box goes under. The
+smaller the box, the less was left out. An unbalance that is given makes U r linear in r, and
+nothing is left out at all.
+"""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Role, Rotor
+from laufruhe.problem.channels import ADDED_MASS
+from laufruhe.problem.decision import Decision, Kind, RotorDrive
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Interval, Set, Value
+from laufruhe.prove.certificate import Reach, gap_unit
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged, none_within
+from laufruhe.solvers.direct_cones import solve_direct
+from laufruhe.solvers.mount_starts import unbalances_of
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.unbalances import solve_unbalances
+
+Array = NDArray[np.float64]
+
+MOST_BOXES = 300
+# of the tolerance that the programs of the boxes may use up
+SHARE = 0.25
+# of a side, that a cut keeps from its ends
+EDGE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """Places between bounds, shape (places,) each, what bounds the objective there, and where it looks best.
+
+    Attributes
+    ----------
+    spread
+        By how much what was left out pulls each place apart [m].
+    """
+
+    lower: Array
+    upper: Array
+    bound: float
+    middle: Array
+    spread: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A design, and the result for its unbalances where it stands."""
+
+    design: Design
+    result: Result | None
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """By what breaks limits least, then by what is least."""
+        broken = self.design.excess > KEPT
+        return broken, self.design.excess if broken else self.design.value
+
+    @property
+    def value(self) -> float:
+        """The objective of a design that is allowed."""
+        return np.inf if self.rank[0] else self.design.value
+
+
+def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Result:
+    """Places and unbalances, proven as far as dividing the boxes of places goes.
+
+    Parameters
+    ----------
+    problem
+        Whose decisions are unbalances and places.
+
+    Raises
+    ------
+    SolverError
+        If the cone solver stops without an answer.
+    """
+    started = time.perf_counter()
+    search, initial = _Search(problem), evaluate(problem)
+    given = objective_value(problem, initial)
+    root = search.box(*search.bounds)
+    heap: list[tuple[float, int, _Box]] = []
+    best: _Found | None = None
+    number, most = count(), MOST_BOXES if problem.search.boxes is None else problem.search.boxes
+    for box in (root,) if root is not None else ():
+        heapq.heappush(heap, (box.bound, next(number), box))
+        best = search.better(best, box.middle)
+    seen = 1
+    while heap and seen < most:
+        value = best.value if best is not None else np.inf
+        if value - heap[0][0] <= (1.0 - SHARE) * problem.tolerance * gap_unit(value, given):
+            break
+        _, _, box = heapq.heappop(heap)
+        for half in search.halves(box):
+            seen += 1
+            if half is not None and half.bound < value:
+                heapq.heappush(heap, (half.bound, next(number), half))
+                best = search.better(best, half.middle)
+        say(f"{seen} boxes of places")
+    timing = {"solve": time.perf_counter() - started}
+    if best is None or (best.rank[0] and not heap):
+        return none_within(problem, initial, search.conflict, timing)
+    own, design = best.result, best.design
+    certificate = own.certificate if own is not None else None
+    shown = Shown(
+        bound=min([design.value, *(bound for bound, _, _ in heap)]),
+        reach=Reach.WHOLE,
+        kkt_residual=certificate.kkt_residual if certificate is not None else 0.0,
+        method=f"second-order cones over {seen} box{'es' * (seen > 1)} of places",
+        prices=[limit.shadow_price for limit in own.limits] if own is not None else (),
+    )
+    return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
+
+
+class _Search:
+    """Boxes of the places of a problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.conflict: tuple[str, ...] = ()
+        self.places = tuple(d for d in problem.decisions if d.kind is Kind.PLACE)
+        self.unbalances = problem.unbalances
+        sets: list[Set] = [decision.set for decision in self.unbalances]
+        self._least = [_least(own) for own in sets]
+        # what each unbalance is when every decision is as small as it may be
+        self._still = {rotor.name: rotor for rotor in problem.design(self._least, self.unbalances).rotors}
+        self._placed = {d.rotor: [] for p in self.places for d in p.place_drives}  # type: dict[str, list[int]]
+        for k, place in enumerate(self.places):
+            for drive in place.place_drives:
+                self._placed[drive.rotor].append(k)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Of all places."""
+        return np.array([p.lower for p in self.places]), np.array([p.upper for p in self.places])
+
+    def better(self, best: _Found | None, places: Array) -> _Found | None:
+        """The better of the best design so far and the best with these places."""
+        found = self._at(places)
+        return found if best is None or found.rank < best.rank else best
+
+    def halves(self, box: _Box) -> Iterator[_Box | None]:
+        """A box cut where what was left out pulls most."""
+        width = box.upper - box.lower
+        whole = self.bounds[1] - self.bounds[0]
+        pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole
+        side = int(np.argmax(pulled))
+        keep = EDGE * width[side]
+        cut = float(np.clip(box.middle[side], box.lower[side] + keep, box.upper[side] - keep))
+        here = np.arange(len(width)) == side
+        yield self.box(box.lower, np.where(here, cut, box.upper), box.bound)
+        yield self.box(np.where(here, cut, box.lower), box.upper, box.bound)
+
+    def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | None:
+        """The bound of a box, and where its program puts the places; None where no design is allowed."""
+        relaxed = self._relaxed(lower, upper)
+        result = solve_unbalances(relaxed, solve_direct)
+        if result.status is Status.INFEASIBLE:
+            known = {limit.name for limit in self.problem.limits}
+            self.conflict = self.conflict or tuple(name for name in result.conflict if name in known)
+            return None
+        bound = result.certificate.lower_bound if result.certificate is not None else 0.0
+        middle, spread = self._placing(relaxed, result, lower, upper)
+        return _Box(lower, upper, max(bound, floor), middle, spread)
+
+    def _at(self, places: Array) -> _Found:
+        """The best design with its places given."""
+        where: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
+        engine = self.problem.design(list(where.values()), self.places)
+        tolerance = SHARE * self.problem.tolerance
+        held = replace(self.problem, engine=engine, decisions=self.unbalances, tolerance=tolerance)
+        result, samples = None, None
+        values = dict(zip((d.name for d in self.problem.decisions), self.problem.start, strict=True)) | where
+        if self.unbalances:
+            result = solve_unbalances(held, solve_direct)
+            # where none is allowed the unbalances stay as given, and the design breaks its limits
+            if result.status is not Status.INFEASIBLE:
+                found = unbalances_of(held, result)
+                values |= dict(zip((d.name for d in self.unbalances), found, strict=True))
+            samples = result.final.samples
+        return _Found(judged(self.problem, list(values.values()), samples), result)
+
+    # the program of a box
+
+    def _relaxed(self, lower: Array, upper: Array) -> Problem:
+        """Every unbalance whose place is open at the corners of its box."""
+        rotors, decisions = self._given(lower, upper)
+        limits: list[Limit] = []
+        names = {name: [name] for name in self._placed}
+        for decision in self.unbalances:
+            axes = sorted({k for drive in decision.rotor_drives for k in self._placed.get(drive.rotor, ())})
+            if not axes:
+                decisions.append(decision)
+                continue
+            parts: dict[str, list[Rotor]] = {drive.rotor: [] for drive in decision.rotor_drives}
+            for c, corner in enumerate(_corners(lower, upper, axes)):
+                drives = []
+                for drive in decision.rotor_drives:
+                    rotor = self._placed_at(drive.rotor, corner, f"{drive.rotor} | {decision.name} {c}")
+                    parts[drive.rotor].append(rotor)
+                    drives.append(replace(drive, rotor=rotor.name))
+                own = Decision(_corner_name(decision, c), decision.unit, _from_zero(decision.set), 0.0, tuple(drives))
+                decisions.append(own)
+            first = decision.rotor_drives[0]
+            for name, made in parts.items():
+                rotors += made
+                names.setdefault(name, [name]).extend(rotor.name for rotor in made)
+            limits.append(_together(decision, first, parts[first.rotor]))
+        kept = tuple(rotor for rotor in self._still.values() if rotor.name not in self._placed)
+        problem = self.problem
+        return replace(
+            problem,
+            engine=replace(problem.engine, rotors=(*kept, *rotors)),
+            decisions=tuple(self._shifted(decision) for decision in decisions),
+            objective=tuple(replace(t, measure=_renamed(t.measure, names)) for t in problem.objective),
+            limits=(*(replace(x, measure=_renamed(x.measure, names)) for x in problem.limits), *limits),
+            tolerance=SHARE * problem.tolerance,
+        )
+
+    def _shifted(self, decision: Decision) -> Decision:
+        """An unbalance that stands still, told from what it is as given."""
+        for own, least in zip(self.unbalances, self._least, strict=True):
+            if own is decision:
+                return replace(decision, start=least)
+        return decision
+
+    def _given(self, lower: Array, upper: Array) -> tuple[list[Rotor], list[Decision]]:
+        """Unbalances that are there whatever is decided: their loads are linear in how far they are moved."""
+        rotors: list[Rotor] = []
+        drives: list[list[RotorDrive]] = [[] for _ in self.places]
+        for name, axes in self._placed.items():
+            unbalance = self._still[name].unbalance
+            least = {k: float(lower[k]) for k in axes}
+            rotors.append(self._placed_at(name, least, name))
+            for k in axes if unbalance else ():
+                for at, gain in ((0.0, -unbalance), (1.0, unbalance)):
+                    end = self._placed_at(name, least | {k: least[k] + at}, f"{name} | {k} {at:g}")
+                    # its mass is counted once, where it stands
+                    rotors.append(replace(end, role=Role.THROW))
+                    drives[k].append(RotorDrive(end.name, gain))
+        decisions = [
+            Decision(_place_name(place), place.unit, Interval(0.0, float(high - low)), 0.0, tuple(own))
+            for place, low, high, own in zip(self.places, lower, upper, drives, strict=True)
+            if own
+        ]
+        return rotors, decisions
+
+    def _placed_at(self, name: str, places: dict[int, float], new: str) -> Rotor:
+        """A rotor elsewhere, under a name of its own; without its unbalance unless it keeps its name."""
+        still = self._still[name]
+        where = list(still.place)
+        for k, at in places.items():
+            for drive in self.places[k].place_drives:
+                if drive.rotor == name:
+                    where[drive.axis] = at
+        moved = replace(still.placed(*where), name=new)
+        # its mass is counted where the sizes at all corners are, which needs a radius, any one
+        return moved if new == name else replace(moved, unbalance=0.0j, radius=still.radius or 1.0)
+
+    def _placing(self, relaxed: Problem, result: Result, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Where the program puts each place, and how far apart what shares it."""
+        found = dict(zip((d.name for d in relaxed.decisions), unbalances_of(relaxed, result), strict=True))
+        votes: list[list[tuple[float, float]]] = [[] for _ in self.places]
+        for k, place in enumerate(self.places):
+            if _place_name(place) in found:
+                weight = sum(abs(self._still[drive.rotor].unbalance) for drive in place.place_drives)
+                votes[k].append((weight, lower[k] + found[_place_name(place)].real))
+        for decision in self.unbalances:
+            axes = sorted({k for drive in decision.rotor_drives for k in self._placed.get(drive.rotor, ())})
+            corners = _corners(lower, upper, axes) if axes else ()
+            gain = sum(abs(drive.gain) for drive in decision.rotor_drives)
+            for c, corner in enumerate(corners):
+                size = gain * abs(found[_corner_name(decision, c)])
+                for k, at in corner.items():
+                    votes[k].append((size, at))
+        middle, spread = 0.5 * (lower + upper), np.zeros(len(lower))
+        for k, own in enumerate(votes):
+            total = sum(weight for weight, _ in own)
+            if total > 0.0:
+                middle[k] = np.clip(sum(weight * at for weight, at in own) / total, lower[k], upper[k])
+                spread[k] = sum(weight * abs(at - middle[k]) for weight, at in own) / total
+        return middle, spread
+
+
+def _corners(lower: Array, upper: Array, axes: Sequence[int]) -> tuple[dict[int, float], ...]:
+    """Corners of a box along some of its sides."""
+    sides: Iterable[tuple[float, ...]] = product(*((float(lower[k]), float(upper[k])) for k in axes))
+    return tuple(dict(zip(axes, corner, strict=True)) for corner in sides)
+
+
+def _corner_name(decision: Decision, corner: int) -> str:
+    stem, key = decision.name.rsplit(".", 1)
+    return f"{stem} | {corner}.{key}"
+
+
+def _place_name(place: Decision) -> str:
+    return f"{place.name} | .place"
+
+
+def _least(own: Set) -> Value:
+    """The value of a decision that is nearest to nothing."""
+    if isinstance(own, Interval):
+        return min(max(own.lower, 0.0), own.upper) * own.directions[0]
+    return 0.0j
+
+
+def _from_zero(own: Set) -> Set:
+    """What may be added to the least value, and any share of it."""
+    if isinstance(own, Interval):
+        least = min(max(own.lower, 0.0), own.upper)
+        return replace(own, lower=min(own.lower - least, 0.0), upper=max(own.upper - least, 0.0))
+    return own
+
+
+def _together(decision: Decision, drive: RotorDrive, parts: Sequence[Rotor]) -> Limit:
+    """All corners together are no larger than the unbalance may be."""
+    radius = parts[0].radius or 1.0
+    most = _from_zero(decision.set).scale * abs(drive.gain) / radius
+    return Limit(decision.name, Measure(ADDED_MASS, rotors=tuple(part.name for part in parts)), most)
+
+
+def _renamed(measure: Measure, names: dict[str, list[str]]) -> Measure:
+    """A measure of named rotors, of all that stand for them."""
+    if measure.rotors is None:
+        return measure
+    return replace(measure, rotors=tuple(part for name in measure.rotors for part in names.get(name, [name])))

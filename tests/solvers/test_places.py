@@ -1,0 +1,222 @@
+"""Places of unbalances: against another search, against closed forms, and in what must hold whatever the engine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import laufruhe
+from laufruhe.errors import InputError, ModelError
+from laufruhe.machine import Engine
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from problem_files import READY
+
+HEIGHTS = next(path for path in READY if path.stem == "tractor-four-shaft-heights")
+
+ENGINE = """
+title = "One, two or four in line"
+[engine]
+layout = "inline"
+cycle = "two-stroke"
+bore = "80 mm"
+stroke = "90 mm"
+rod_ratio = {rod:.3f}
+reciprocating_mass = "0.8 kg"
+cylinder_spacing = "100 mm"
+throws = {throws}
+[[operating_points]]
+speed = "{speed:.0f} rpm"
+[mounts]
+names = ["a", "b", "c"]
+positions = [["200 mm", "200 mm", "-100 mm"], ["-300 mm", "-150 mm", "-50 mm"], ["-150 mm", "250 mm", "0 mm"]]
+[objective]
+minimise = "{norm} {load}"
+"""
+
+SHAFT = """
+[[balancer_shafts]]
+name = "{name}"
+ratio = {ratio}
+position = [{y}, {z}]
+[[balancer_shafts.unbalances]]
+x = {x}
+radius = "30 mm"
+unbalance = {unbalance}
+angle = {angle}
+"""
+
+
+def _between(low: float, high: float, unit: str = " mm") -> str:
+    return f'{{ between = ["{low:g}{unit}", "{high:g}{unit}"] }}'
+
+
+def _problem(tmp_path: Path, text: str) -> Problem:
+    path = tmp_path / "engine.toml"
+    path.write_text(text, encoding="utf-8")
+    return laufruhe.load(path)
+
+
+def _engine(throws: list[int] | None = None, load: str = "mount force", norm: str = "mean", **told: Any) -> str:
+    told = {"rod": 0.28, "speed": 2400.0, **told}
+    return ENGINE.format(throws=throws or [0], load=load, norm=norm, **told)
+
+
+def _shaft(**told: str) -> str:
+    given = {"ratio": "-1", "y": '"0 mm"', "z": '"0 mm"', "x": '"0 mm"', "unbalance": '"0.02 kg m"', "angle": "180"}
+    return SHAFT.format(**{"name": "shaft", **given, **told})
+
+
+def _searched(problem: Problem, seed: int, samples: int | None, starts: int = 6) -> float:
+    """Least objective that a search of the exact model finds from several starts, penalties on what is forbidden."""
+    generator = np.random.default_rng(seed)
+    sets = [decision.set for decision in problem.decisions]
+    low = np.concatenate([[s.lower] if s.width == 1 else [0.0, s.angles[0]] for s in sets])
+    high = np.concatenate([[s.upper] if s.width == 1 else [s.upper, s.angles[1]] for s in sets])
+
+    def objective(share: Any) -> float:
+        at = iter(low + np.clip(share, 0.0, 1.0) * (high - low))
+        values = [next(at) * s.directions[0] if s.width == 1 else next(at) * np.exp(1j * next(at)) for s in sets]
+        found = evaluate(problem, problem.design(values), samples)
+        return objective_value(problem, found) * (1.0 + 10.0 * max(found.excess(problem.limits), 0.0))
+
+    best = np.inf
+    for _ in range(starts):
+        found = minimize(objective, generator.uniform(size=len(low)), method="Powell", bounds=[(0.0, 1.0)] * len(low))
+        best = min(best, float(found.fun))
+    return best
+
+
+class TestAgainstClosedForms:
+    def test_a_given_shaft_goes_where_its_couple_cancels_another(self, tmp_path: Path) -> None:
+        """Two opposite throws a apart make the couple of one shaft's two weights at b where m r a = U b (eq. 8)."""
+        text = _engine([0, 180], load="rocking couple", rod=1e-3)
+        # half of the reciprocating mass turns with the crank, half against it: a shaft each way, a pair of weights each
+        for name, ratio in (("with", "1"), ("against", "-1")):
+            pair = _shaft(name=name, ratio=ratio, unbalance='"0.018 kg m"', angle="0", x=_between(-200.0, 200.0))
+            text += (
+                pair
+                + '[[balancer_shafts.unbalances]]\nname = "other"\nx = "0 mm"\nunbalance = "0.018 kg m"\nangle = 180\n'
+            )
+        problem = _problem(tmp_path, text)
+        result = laufruhe.solve(problem)
+        assert result.certificate is not None
+        assert result.certificate.kind is Proof.GLOBAL
+        # m r / 2 = 0.8 x 0.045 / 2 = 0.018 kg m on either shaft, the throws 100 mm apart
+        assert result.objective is not None
+        assert result.objective.value < 1e-3 * result.objective.initial
+        assert [abs(decision.value) for decision in result.decisions] == pytest.approx([0.1, 0.1], rel=1e-3)
+        assert "over 1 box of" in result.certificate.method
+
+    def test_heights_turn_against_the_second_order(self) -> None:
+        """Shafts of unequal height save what shafts side by side cannot."""
+        problem = laufruhe.load(HEIGHTS)
+        result = laufruhe.solve(problem)
+        assert result.certificate is not None
+        assert result.certificate.kind is Proof.GLOBAL
+        places = [d for d in problem.decisions if d.place_drives]
+        level = problem.design([0.0] * len(places), places)
+        beside = laufruhe.solve(_held(problem, level))
+        assert result.objective is not None
+        assert beside.objective is not None
+        assert result.objective.value < 0.98 * beside.objective.value
+
+
+def _held(problem: Problem, engine: Engine) -> Problem:
+    return replace(problem, engine=engine, decisions=problem.unbalances)
+
+
+CASES = {
+    "given": {"x": _between(-200, 50), "z": _between(-100, 150)},
+    "sized": {"x": _between(-200, 50), "unbalance": _between(0.0, 0.03, " kg m")},
+    "at least": {"x": _between(-200, 50), "y": _between(20, 150), "unbalance": _between(0.01, 0.03, " kg m")},
+    "turned": {"x": _between(-150, 150), "unbalance": _between(0.0, 0.03, " kg m"), "angle": "{ between = [90, 270] }"},
+    "on one side": {"x": _between(-150, -50), "z": _between(-200, -80), "unbalance": _between(0.0, 0.03, " kg m")},
+}
+LOADS = ("mount force", "rocking couple", "roll moment")
+
+
+@pytest.mark.parametrize("load", LOADS)
+@pytest.mark.parametrize("case", CASES)
+def test_no_search_finds_better(case: str, load: str, tmp_path: Path) -> None:
+    """No design that a search of the exact model finds goes under the bound, or far under the design."""
+    seed = LOADS.index(load) * len(CASES) + list(CASES).index(case)
+    generator = np.random.default_rng(seed)
+    throws = [[0], [0, 180], [0, 120, 240]][seed % 3]
+    norm = ("mean", "rms")[seed % 2]
+    told = {"rod": generator.uniform(0.2, 0.33), "speed": generator.uniform(1500, 4000)}
+    problem = _problem(tmp_path, _engine(throws, load=load, norm=norm, **told) + _shaft(**CASES[case]))
+    result = laufruhe.solve(problem)
+    assert result.certificate is not None
+    assert result.objective is not None
+    searched = _searched(problem, seed, result.final.samples, 3)
+    assert result.certificate.lower_bound <= searched * (1.0 + 1e-6) + 1e-9
+    assert result.objective.value <= searched * (1.0 + 2e-3) + 1e-6 * result.objective.initial
+
+
+def test_masses_are_counted_wherever_they_stand(tmp_path: Path) -> None:
+    """A limit on the mass holds for the unbalance of an open place, and is met with equality where it binds."""
+    text = _engine([0, 180]) + _shaft(x=_between(-200, 50), unbalance=_between(0.0, 0.03, " kg m"))
+    limit = '[[constraints]]\nlimit = "balancer mass"\nmax = "0.1 kg"\n'
+    free, bound = (laufruhe.solve(_problem(tmp_path, each)) for each in (text, text + limit))
+    assert bound.limits[0].value <= 0.1 * (1.0 + 1e-5)
+    assert bound.objective is not None
+    assert free.objective is not None
+    assert bound.objective.value >= free.objective.value * (1.0 - 1e-3)
+    assert bound.certificate is not None
+    assert bound.certificate.kind is Proof.GLOBAL
+    narrowed = limit.replace("max = ", 'of = ["shaft"]\nmax = ')
+    named = laufruhe.solve(_problem(tmp_path, text + narrowed))
+    assert named.objective is not None
+    assert named.objective.value == pytest.approx(bound.objective.value, rel=1e-3)
+
+
+def test_more_room_is_never_worse(tmp_path: Path) -> None:
+    """Wider bounds of a place hold every design of narrower ones."""
+    text = _engine([0, 180])
+    found = []
+    for reach in (0.0, 40.0, 120.0):
+        x = _between(-reach, reach) if reach else '"0 mm"'
+        result = laufruhe.solve(_problem(tmp_path, text + _shaft(x=x, unbalance=_between(0, 0.03, " kg m"))))
+        assert result.objective is not None
+        assert result.certificate is not None
+        found.append((result.objective.value, result.certificate.lower_bound))
+    for (narrow, _), (_, wide) in pairwise(found):
+        assert wide <= narrow * (1.0 + 1e-9)
+
+
+def test_limits_that_no_place_keeps(tmp_path: Path) -> None:
+    """No design is claimed where none keeps the limits, and their names are told."""
+    text = _engine([0]) + _shaft(z=_between(-100, 100), unbalance=_between(0, 0.001, " kg m"))
+    text += '[[constraints]]\nlimit = "mean shaking force"\nmax = "1 N"\n'
+    result = laufruhe.solve(_problem(tmp_path, text))
+    assert str(result.status) == "infeasible"
+    assert result.conflict == ("mean shaking force",)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(_shaft(x=_between(-10, 10), unbalance='"0 kg m"'), id="nothing follows"),
+        pytest.param(_shaft(x=_between(10, -10)), id="reversed"),
+        pytest.param(_shaft(x="{ between = [1, 2] }"), id="without a unit"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(change: str, tmp_path: Path) -> None:
+    """By the file that says it, in one line."""
+    with pytest.raises(InputError):
+        _problem(tmp_path, _engine() + change)
+
+
+def test_an_open_firing_order_is_refused_beside_places(tmp_path: Path) -> None:
+    """What no method decides together is an error, and never frozen."""
+    text = _engine([0, 120, 240]).replace("throws = [0, 120, 240]", 'cylinders = 3\nthrows = "open"')
+    with pytest.raises(ModelError, match="place and star"):
+        laufruhe.solve(_problem(tmp_path, text + _shaft(x=_between(-10, 10))))
