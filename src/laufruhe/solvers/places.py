@@ -96,39 +96,47 @@ def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) 
     """
     started = time.perf_counter()
     search, initial = _Search(problem), evaluate(problem)
-    given = objective_value(problem, initial)
-    root = search.box(*search.bounds)
-    heap: list[tuple[float, int, _Box]] = []
-    best: _Found | None = None
-    number, most = count(), MOST_BOXES if problem.search.boxes is None else problem.search.boxes
-    for box in (root,) if root is not None else ():
-        heapq.heappush(heap, (box.bound, next(number), box))
-        best = search.better(best, box.middle)
-    seen = 1
-    while heap and seen < most:
-        value = best.value if best is not None else np.inf
-        if value - heap[0][0] <= (1.0 - SHARE) * problem.tolerance * gap_unit(value, given):
-            break
-        _, _, box = heapq.heappop(heap)
-        for half in search.halves(box):
-            seen += 1
-            if half is not None and half.bound < value:
-                heapq.heappush(heap, (half.bound, next(number), half))
-                best = search.better(best, half.middle)
-        say(f"{seen} boxes of places")
+    best, bound, boxes = _divided(search, objective_value(problem, initial), say)
     timing = {"solve": time.perf_counter() - started}
-    if best is None or (best.rank[0] and not heap):
+    if best is None:
         return none_within(problem, initial, search.conflict, timing)
     own, design = best.result, best.design
     certificate = own.certificate if own is not None else None
     shown = Shown(
-        bound=min([design.value, *(bound for bound, _, _ in heap)]),
+        bound=min(bound, design.value),
         reach=Reach.WHOLE,
         kkt_residual=certificate.kkt_residual if certificate is not None else 0.0,
-        method=f"second-order cones over {seen} box{'es' * (seen > 1)} of places",
+        method=f"second-order cones over {boxes} box{'es' * (boxes > 1)} of places",
         prices=[limit.shadow_price for limit in own.limits] if own is not None else (),
     )
     return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
+
+
+def _divided(search: _Search, given: float, say: Callable[[str], None]) -> tuple[_Found | None, float, int]:
+    """Divide the boxes until their least bound meets the best design, or as often as is worth it.
+
+    Returns
+    -------
+    That design, None where no place allows one; what bounds the boxes that are left; and how many there were.
+    """
+    problem, number, seen = search.problem, count(), 1
+    most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
+    root = search.box(*search.bounds)
+    if root is None:
+        return None, np.inf, seen
+    heap, best = [(root.bound, next(number), root)], search.better(None, root.middle)
+    while heap and seen < most:
+        enough = (1.0 - SHARE) * problem.tolerance * gap_unit(best.design.value, given)
+        if best.value - heap[0][0] <= enough:
+            break
+        _, _, box = heapq.heappop(heap)
+        for half in search.halves(box):
+            seen += 1
+            if half is not None and half.bound < best.value:
+                heapq.heappush(heap, (half.bound, next(number), half))
+                best = search.better(best, half.middle)
+        say(f"{seen} boxes of places")
+    return (best, heap[0][0], seen) if heap else (None if best.rank[0] else best, np.inf, seen)
 
 
 class _Search:
@@ -139,8 +147,7 @@ class _Search:
         self.conflict: tuple[str, ...] = ()
         self.places = tuple(d for d in problem.decisions if d.kind is Kind.PLACE)
         self.unbalances = problem.unbalances
-        sets: list[Set] = [decision.set for decision in self.unbalances]
-        self._least = [_least(own) for own in sets]
+        self._least = [_least(decision.set) for decision in self.unbalances]
         # what each unbalance is when every decision is as small as it may be
         self._still = {rotor.name: rotor for rotor in problem.design(self._least, self.unbalances).rotors}
         self._placed = {d.rotor: [] for p in self.places for d in p.place_drives}  # type: dict[str, list[int]]
@@ -153,7 +160,7 @@ class _Search:
         """Of all places."""
         return np.array([p.lower for p in self.places]), np.array([p.upper for p in self.places])
 
-    def better(self, best: _Found | None, places: Array) -> _Found | None:
+    def better(self, best: _Found | None, places: Array) -> _Found:
         """The better of the best design so far and the best with these places."""
         found = self._at(places)
         return found if best is None or found.rank < best.rank else best
@@ -175,8 +182,9 @@ class _Search:
         relaxed = self._relaxed(lower, upper)
         result = solve_unbalances(relaxed, solve_direct)
         if result.status is Status.INFEASIBLE:
-            known = {limit.name for limit in self.problem.limits}
-            self.conflict = self.conflict or tuple(name for name in result.conflict if name in known)
+            # what cannot be met in one box may be in another: all boxes together tell
+            told = {*self.conflict, *result.conflict}
+            self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in told)
             return None
         bound = result.certificate.lower_bound if result.certificate is not None else 0.0
         middle, spread = self._placing(relaxed, result, lower, upper)
@@ -201,15 +209,19 @@ class _Search:
 
     # the program of a box
 
+    def _axes(self, decision: Decision) -> list[int]:
+        """Places of what an unbalance drives."""
+        return sorted({k for drive in decision.rotor_drives for k in self._placed.get(drive.rotor, ())})
+
     def _relaxed(self, lower: Array, upper: Array) -> Problem:
         """Every unbalance whose place is open at the corners of its box."""
         rotors, decisions = self._given(lower, upper)
         limits: list[Limit] = []
         names = {name: [name] for name in self._placed}
-        for decision in self.unbalances:
-            axes = sorted({k for drive in decision.rotor_drives for k in self._placed.get(drive.rotor, ())})
+        for decision, least in zip(self.unbalances, self._least, strict=True):
+            axes = self._axes(decision)
             if not axes:
-                decisions.append(decision)
+                decisions.append(replace(decision, start=least))
                 continue
             parts: dict[str, list[Rotor]] = {drive.rotor: [] for drive in decision.rotor_drives}
             for c, corner in enumerate(_corners(lower, upper, axes)):
@@ -230,18 +242,11 @@ class _Search:
         return replace(
             problem,
             engine=replace(problem.engine, rotors=(*kept, *rotors)),
-            decisions=tuple(self._shifted(decision) for decision in decisions),
+            decisions=tuple(decisions),
             objective=tuple(replace(t, measure=_renamed(t.measure, names)) for t in problem.objective),
             limits=(*(replace(x, measure=_renamed(x.measure, names)) for x in problem.limits), *limits),
             tolerance=SHARE * problem.tolerance,
         )
-
-    def _shifted(self, decision: Decision) -> Decision:
-        """An unbalance that stands still, told from what it is as given."""
-        for own, least in zip(self.unbalances, self._least, strict=True):
-            if own is decision:
-                return replace(decision, start=least)
-        return decision
 
     def _given(self, lower: Array, upper: Array) -> tuple[list[Rotor], list[Decision]]:
         """Unbalances that are there whatever is decided: their loads are linear in how far they are moved."""
@@ -285,7 +290,7 @@ class _Search:
                 weight = sum(abs(self._still[drive.rotor].unbalance) for drive in place.place_drives)
                 votes[k].append((weight, lower[k] + found[_place_name(place)].real))
         for decision in self.unbalances:
-            axes = sorted({k for drive in decision.rotor_drives for k in self._placed.get(drive.rotor, ())})
+            axes = self._axes(decision)
             corners = _corners(lower, upper, axes) if axes else ()
             gain = sum(abs(drive.gain) for drive in decision.rotor_drives)
             for c, corner in enumerate(corners):
