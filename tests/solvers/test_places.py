@@ -17,6 +17,7 @@ from laufruhe.machine import Engine
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
+from laufruhe.studies.trade import trade
 from problem_files import READY
 
 HEIGHTS = next(path for path in READY if path.stem == "tractor-four-shaft-heights")
@@ -159,6 +160,15 @@ def test_no_search_finds_better(case: str, load: str, tmp_path: Path) -> None:
     searched = _searched(problem, seed, result.final.samples, 3)
     assert result.certificate.lower_bound <= searched * (1.0 + 1e-6) + 1e-9
     assert result.objective.value <= searched * (1.0 + 2e-3) + 1e-6 * result.objective.initial
+
+
+def test_a_trade_decides_places_too(tmp_path: Path) -> None:
+    """Every fidelity of a trade is solved as the problem is: more physics left out, no better design."""
+    text = _engine([0, 180]) + _shaft(x=_between(-200, 50), unbalance=_between(0.0, 0.03, " kg m"))
+    problem = _problem(tmp_path, text)
+    traded, result = trade(problem), laufruhe.solve(problem)
+    assert result.objective is not None
+    assert traded.optimum == pytest.approx(result.objective.value, rel=1e-3)
 
 
 def test_masses_are_counted_wherever_they_stand(tmp_path: Path) -> None:

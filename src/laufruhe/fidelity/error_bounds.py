@@ -127,8 +127,9 @@ class Scale:
 
     @property
     def open_rotors(self) -> set[str]:
-        """Rotors whose unbalance is decided."""
-        return {drive.rotor for decision in self.problem.decisions for drive in decision.rotor_drives}
+        """Rotors whose unbalance or place is decided."""
+        sized = {drive.rotor for decision in self.problem.decisions for drive in decision.rotor_drives}
+        return sized | {drive.rotor for decision in self.problem.decisions for drive in decision.place_drives}
 
     @cached_property
     def mounting(self) -> ElasticMounting | None:
@@ -139,6 +140,10 @@ class Scale:
     def decided_modes(self) -> set[int]:
         """Modes that an open rotor drives, 1 the lowest: what is small now may not stay so."""
         rotors = [replace(r, unbalance=1.0) for r in self.problem.engine.rotors if r.name in self.open_rotors]
+        by_name = {rotor.name: rotor for rotor in rotors}
+        for drive in (drive for decision in self.problem.decisions for drive in decision.place_drives):
+            rotor = by_name[drive.rotor]
+            rotors.append(rotor.placed(*(at + (k == drive.axis) for k, at in enumerate(rotor.place))))
         if self.mounting is None or not rotors:
             return set()
         wrenches = np.array([rotor_wrench(rotor, 1.0) for rotor in rotors])

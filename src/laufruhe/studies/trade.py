@@ -154,7 +154,7 @@ def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
     both together the stars that rank first.
     """
     try:
-        if problem.phasing is None and not problem.mount_decisions:
+        if problem.phasing is None and len(problem.unbalances) == len(problem.decisions):
             model = AffineModel(problem)
             x = ConicProgram(model.at(samples or model.full_samples)).solve().x
             return None if x is None else problem.design([domain.complex_value(x) for domain in model.domains])
