@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import heapq
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, product
 
@@ -41,6 +41,10 @@ Array = NDArray[np.float64]
 MOST_BOXES = 300
 # of the tolerance that the programs of the boxes may use up
 SHARE = 0.25
+# of the tolerance that counts as met
+NEARLY = 0.99
+# [m]
+EXACT = 1e-6
 # of a side, that a cut keeps from its ends
 EDGE = 0.1
 
@@ -52,7 +56,7 @@ class _Box:
     Attributes
     ----------
     spread
-        By how much what was left out pulls each place apart [m].
+        By how much what was left out pulls each place apart [m]; next to nothing where it made no difference.
     """
 
     lower: Array
@@ -126,8 +130,9 @@ def _divided(search: _Search, given: float, say: Callable[[str], None]) -> tuple
         return None, np.inf, seen
     heap, best = [(root.bound, next(number), root)], search.better(None, root.middle)
     while heap and seen < most:
-        enough = (1.0 - SHARE) * problem.tolerance * gap_unit(best.design.value, given)
-        if best.value - heap[0][0] <= enough:
+        gap = (best.value - heap[0][0]) / gap_unit(best.design.value, given)
+        # a box that left nothing out has no better design, only a bound as near as its program came
+        if gap <= NEARLY * problem.tolerance or (gap < np.inf and heap[0][2].spread.max() <= EXACT):
             break
         _, _, box = heapq.heappop(heap)
         for half in search.halves(box):
@@ -150,10 +155,10 @@ class _Search:
         self._least = [_least(decision.set) for decision in self.unbalances]
         # what each unbalance is when every decision is as small as it may be
         self._still = {rotor.name: rotor for rotor in problem.design(self._least, self.unbalances).rotors}
-        self._placed = {d.rotor: [] for p in self.places for d in p.place_drives}  # type: dict[str, list[int]]
+        self._placed: dict[str, list[int]] = {}
         for k, place in enumerate(self.places):
             for drive in place.place_drives:
-                self._placed[drive.rotor].append(k)
+                self._placed.setdefault(drive.rotor, []).append(k)
 
     @property
     def bounds(self) -> tuple[Array, Array]:
@@ -167,8 +172,7 @@ class _Search:
 
     def halves(self, box: _Box) -> Iterator[_Box | None]:
         """A box cut where what was left out pulls most."""
-        width = box.upper - box.lower
-        whole = self.bounds[1] - self.bounds[0]
+        width, whole = box.upper - box.lower, self.bounds[1] - self.bounds[0]
         pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole
         side = int(np.argmax(pulled))
         keep = EDGE * width[side]
@@ -263,7 +267,7 @@ class _Search:
                     rotors.append(replace(end, role=Role.THROW))
                     drives[k].append(RotorDrive(end.name, gain))
         decisions = [
-            Decision(_place_name(place), place.unit, Interval(0.0, float(high - low)), 0.0, tuple(own))
+            Decision(f"{place.name} | .place", place.unit, Interval(0.0, float(high - low)), 0.0, tuple(own))
             for place, low, high, own in zip(self.places, lower, upper, drives, strict=True)
             if own
         ]
@@ -284,41 +288,37 @@ class _Search:
     def _placing(self, relaxed: Problem, result: Result, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Where the program puts each place, and how far apart what shares it."""
         found = dict(zip((d.name for d in relaxed.decisions), unbalances_of(relaxed, result), strict=True))
-        votes: list[list[tuple[float, float]]] = [[] for _ in self.places]
+        # of every place what its unbalances are, and where, one pair of arrays for each that is decided apart
+        votes: list[list[tuple[NDArray[np.complex128], Array]]] = [[] for _ in self.places]
         for k, place in enumerate(self.places):
-            if _place_name(place) in found:
-                weight = sum(abs(self._still[drive.rotor].unbalance) for drive in place.place_drives)
-                votes[k].append((weight, lower[k] + found[_place_name(place)].real))
+            if f"{place.name} | .place" in found:
+                still = sum(abs(self._still[drive.rotor].unbalance) for drive in place.place_drives)
+                votes[k].append((np.array([still], complex), lower[[k]] + found[f"{place.name} | .place"].real))
         for decision in self.unbalances:
             axes = self._axes(decision)
             corners = _corners(lower, upper, axes) if axes else ()
             gain = sum(abs(drive.gain) for drive in decision.rotor_drives)
-            for c, corner in enumerate(corners):
-                size = gain * abs(found[_corner_name(decision, c)])
-                for k, at in corner.items():
-                    votes[k].append((size, at))
+            sizes = np.array([gain * found[_corner_name(decision, c)] for c in range(len(corners))], complex)
+            for k in axes:
+                votes[k].append((sizes, np.array([corner[k] for corner in corners])))
         middle, spread = 0.5 * (lower + upper), np.zeros(len(lower))
         for k, own in enumerate(votes):
-            total = sum(weight for weight, _ in own)
+            total = sum(float(np.abs(sizes).sum()) for sizes, _ in own)
             if total > 0.0:
-                middle[k] = np.clip(sum(weight * at for weight, at in own) / total, lower[k], upper[k])
-                spread[k] = sum(weight * abs(at - middle[k]) for weight, at in own) / total
+                middle[k] = np.clip(sum(np.abs(sizes) @ at for sizes, at in own) / total, lower[k], upper[k])
+                spread[k] = sum(abs(sizes @ (at - middle[k])) for sizes, at in own) / total
         return middle, spread
 
 
 def _corners(lower: Array, upper: Array, axes: Sequence[int]) -> tuple[dict[int, float], ...]:
     """Corners of a box along some of its sides."""
-    sides: Iterable[tuple[float, ...]] = product(*((float(lower[k]), float(upper[k])) for k in axes))
+    sides = product(*((float(lower[k]), float(upper[k])) for k in axes))
     return tuple(dict(zip(axes, corner, strict=True)) for corner in sides)
 
 
 def _corner_name(decision: Decision, corner: int) -> str:
     stem, key = decision.name.rsplit(".", 1)
     return f"{stem} | {corner}.{key}"
-
-
-def _place_name(place: Decision) -> str:
-    return f"{place.name} | .place"
 
 
 def _least(own: Set) -> Value:
