@@ -51,10 +51,7 @@ class Maximum(Norm):
 
     def spread(self, z: Array, steps: int, times: int) -> Array:
         """In place: the angles between have nothing."""
-        blocks = z.reshape(-1, steps, z.shape[-1])
-        out = np.zeros((len(blocks), steps * times, z.shape[-1]))
-        out[:, ::times] = blocks
-        return out.reshape(-1, z.shape[-1])
+        return in_place(z, steps, times)
 
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
         """The largest."""
@@ -104,3 +101,11 @@ class Maximum(Norm):
 
 def _amplitudes(signal: Spectrum) -> float:
     return float(order_amplitude(signal.coefficients).sum(axis=0).max(initial=0.0))
+
+
+def in_place(z: Array, steps: int, times: int) -> Array:
+    """Dual rows on a finer grid, nothing at the angles between."""
+    blocks = z.reshape(-1, steps, z.shape[-1])
+    out = np.zeros((len(blocks), steps * times, z.shape[-1]))
+    out[:, ::times] = blocks
+    return out.reshape(-1, z.shape[-1])

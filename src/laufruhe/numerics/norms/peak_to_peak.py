@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from laufruhe.numerics.norms.maximum import in_place
 from laufruhe.numerics.norms.norm import (
     Array,
     Cones,
@@ -74,10 +75,7 @@ class PeakToPeak(Norm):
 
     def spread(self, z: Array, steps: int, times: int) -> Array:
         """In place: the angles between have nothing."""
-        blocks = z.reshape(-1, steps, z.shape[-1])
-        out = np.zeros((len(blocks), steps * times, z.shape[-1]))
-        out[:, ::times] = blocks
-        return out.reshape(-1, z.shape[-1])
+        return in_place(z, steps, times)
 
     def cones(self, grid: Grid) -> Cones:
         """One head over all rows, those of a signal counted from a centre that is free."""
