@@ -166,7 +166,7 @@ def test_no_uneven_star_goes_under_the_bound(tmp_path, cycle, cylinders):
     problem = engines.problem(tmp_path, cylinders, cycle, phasing=allowed % (even - 3.0, even + 2.0))
     phasing = problem.phasing
     (family,), _ = families_of(phasing)
-    objective = amplitude_objective(problem)
+    objective = amplitude_objective(problem, phasing, family.layout)
     costs = throw_costs(phasing, family.space, objective, phasing.intervals)
     least = uneven_bound(phasing, family.space, objective, phasing.intervals)
     rng = np.random.default_rng(cylinders)

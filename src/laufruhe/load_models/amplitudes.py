@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, Role
 from laufruhe.machine.firing import even_patterns
+from laufruhe.machine.layouts import Layout
 from laufruhe.physics.crank_stars import Array, Stars, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Term
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.problem import Phasing, Problem
 
 NEGLIGIBLE = 1e-13
 DIRECTIONS = 400
@@ -56,23 +57,31 @@ class AmplitudeObjective:
         return out
 
 
-def amplitude_objective(problem: Problem) -> AmplitudeObjective | None:
+def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> AmplitudeObjective | None:
     """The objective as norms of |F_h| and |C_h|, where it is of that kind; else None.
 
-    It is if nothing but the throws and what hangs on them makes forces and couples,
+    It is if nothing but throws that are alike and what hangs on them makes forces and couples,
     nothing else is open, no limit can tell even stars apart, and every term is a root mean square or is
     of a single order: then no phase between orders can matter.
+
+    Parameters
+    ----------
+    problem
+        Of one of the stars.
+    phasing, layout
+        What is open, and where the cylinders of these stars stand.
     """
     engine = problem.engine
-    choosing = problem.phasing is not None and bool(problem.phasing.shafts.optional)
-    if problem.decisions or choosing or not problem.objective or not _limits_idle(problem):
+    if problem.decisions or phasing.shafts.optional or not problem.objective:
         return None
     if any(rotor.role is not Role.THROW for rotor in engine.rotors):
         return None
-    single = _one_throw(engine)
+    single = _one_throw(engine, layout)
     if single is None or not all(_is_amplitude(term) for term in problem.objective):
         return None
-    x = single.slider_cranks[0].x
+    if not _limits_idle(problem, phasing, layout):
+        return None
+    x = layout.throw_positions[0]
     silent = tuple(replace(point, gas=None) for point in problem.points)
     alone = evaluate(replace(problem, engine=single, points=silent))
     highest = max(len(shaking_loads(single, point, problem.fidelity).coefficients) for point in silent)
@@ -91,13 +100,11 @@ def amplitude_objective(problem: Problem) -> AmplitudeObjective | None:
     )
 
 
-def _limits_idle(problem: Problem) -> bool:
+def _limits_idle(problem: Problem, phasing: Phasing, layout: Layout) -> bool:
     """Whether only forces are limited, and met: of even stars the counts on the steps fix them."""
-    forces = all(limit.measure.lever == 0 for limit in problem.limits)
-    if not problem.limits or not forces or problem.phasing is None:
-        return not problem.limits
-    layout = problem.phasing.layout(*problem.phasing.geometries[0])
-    if len(even_patterns(problem.phasing.cycle, layout)) > 1:
+    if not problem.limits:
+        return True
+    if any(limit.measure.lever != 0 for limit in problem.limits) or len(even_patterns(phasing.cycle, layout)) > 1:
         return False
     given = evaluate(problem)
     return all(given.value(limit.measure) <= limit.maximum for limit in problem.limits)
@@ -110,14 +117,13 @@ def _is_amplitude(term: Term) -> bool:
     return q.norm.is_euclidean or (q.orders is not None and len(q.orders) == 1)
 
 
-def _one_throw(engine: Engine) -> Engine | None:
-    """The engine with its first throw alone; None where a throw's cylinders stand apart or at the middle."""
-    first = engine.slider_cranks[0]
-    same = tuple(p for p in engine.slider_cranks if p.x == first.x)
-    if first.x == 0.0 or len(engine.slider_cranks) % len(same):
+def _one_throw(engine: Engine, layout: Layout) -> Engine | None:
+    """The engine with its first throw alone; None where cylinders stand beside their throw, or it in the middle."""
+    places, pins = layout.throw_positions, layout.pins
+    if places[0] == 0.0 or any(x != places[pin] for x, pin in zip(layout.positions, pins, strict=True)):
         return None
-    rotors = tuple(rotor for rotor in engine.rotors if rotor.x == first.x)
-    return Engine(engine.name, engine.cycle, same, rotors)
+    own = tuple(part for part, pin in zip(engine.slider_cranks, pins, strict=True) if pin == 0)
+    return Engine(engine.name, engine.cycle, own, tuple(rotor for rotor in engine.rotors if rotor.x == places[0]))
 
 
 def _orders(problem: Problem, highest: int) -> list[int]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import SolverError
-from laufruhe.load_models.amplitudes import amplitude_objective
+from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate, Method
@@ -52,14 +52,13 @@ class Answer:
 
 def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
     """The best designs of all even stars, by whatever suits objective and size (S18)."""
-    simple = amplitude_objective(problem)
-    if simple is None or any(family.fixed for family in families):
+    simple = [(family, own) for family in families if (own := _amplitudes(phasing, family)) is not None]
+    if len(simple) < len(families) or any(family.fixed for family in families):
         return _by_designs(problem, phasing, families)
     if phasing.method is Method.PROGRAM:
         return _by_program(problem, phasing, families)
     answers = []
-    for family in families:
-        own = amplitude_objective(phasing.realise(family.candidate(phasing, family.first))) or simple
+    for family, own in simple:
         space = replace(family.space, mirror=True, reflect=True)
         few = phasing.method is Method.AUTO and space.size <= FEW_STARS
         if few or phasing.method is Method.ENUMERATION:
@@ -69,6 +68,12 @@ def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> 
             found = search_stars(space, own, phasing.best, phasing.time_limit)
             answers.append(_stars_answer(phasing, family, found, "branch and bound over partial stars"))
     return _joined(answers, phasing.best)
+
+
+def _amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
+    """The objective of a family by order alone, where it is of that kind (S3)."""
+    first = phasing.realise(family.candidate(phasing, family.first))
+    return amplitude_objective(first, phasing, family.layout)
 
 
 def _decided(
@@ -127,9 +132,9 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     from laufruhe.solvers.mixed_conic import solve_program
 
     floor = FLOOR * objective_value(problem, evaluate(problem))
-    simple = amplitude_objective(problem) is not None
     answers = []
     for family in families:
+        simple = _amplitudes(phasing, family) is not None
         space = replace(family.space, mirror=simple, reflect=simple)
         model = StarModel(phasing, space, family.geometry, family.fixed)
         exact = all(term.measure.norm.is_euclidean for term in problem.objective) and not problem.limits

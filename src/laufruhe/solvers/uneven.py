@@ -211,12 +211,14 @@ def _ends(bounds: tuple[float, float] | None) -> list[float | None]:
 
 def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[float, str]:
     """What no design with these intervals goes under, and where that is from (S22, S24)."""
-    objective = amplitude_objective(problem)
-    families, _ = families_of(phasing)
-    if objective is None or phasing.throw_bounds is not None or len(families) != 1 or families[0].fixed is not None:
-        return steady_bound(problem), "the steady part of the loads"
-    bound = uneven_bound(phasing, families[0].space, objective, intervals)
-    return bound, "windows around the even steps"
+    families = families_of(phasing)[0] if phasing.throw_bounds is None else ()
+    if len(families) == 1 and families[0].fixed is None:
+        # a limit only takes designs away
+        first = replace(phasing.realise(families[0].candidate(phasing, families[0].first)), limits=())
+        objective = amplitude_objective(first, phasing, families[0].layout)
+        if objective is not None:
+            return uneven_bound(phasing, families[0].space, objective, intervals), "windows around the even steps"
+    return steady_bound(problem), "the steady part of the loads"
 
 
 def _trade(
