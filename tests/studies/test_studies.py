@@ -27,7 +27,7 @@ from laufruhe.files.study_parts import CaseTable
 from laufruhe.problem.measure import Limit
 from laufruhe.solvers import solve
 from laufruhe.studies import Point, Scenes, kinds, run, work
-from laufruhe.studies.kept import NAME, KeptPoints
+from laufruhe.studies.kept import NAME
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
 from laufruhe.studies.kinds.replication import Replication
@@ -66,6 +66,12 @@ def swept(quantity: str, text: str) -> str:
 
 def computed(path: Path, folder: Path = PROBLEMS, jobs: int = 1, kept: Path | None = None) -> xr.Dataset:
     return run(load_study(path), folder, kept or path.parent / "kept" / NAME, jobs=jobs)[0]["p"]
+
+
+def points_in(content: bytes) -> set[str]:
+    """Marks and records of lines that are whole; times differ."""
+    found = [line.partition(b" ")[2] for line in content.splitlines()]
+    return {str(json.loads(line)[::2]) for line in found if line.endswith(b"}]")}
 
 
 SPEEDS = swept(SPEED, 'from = "6 m/s"\nto = "12 m/s"\npoints = {}')
@@ -181,7 +187,7 @@ def test_a_scene_of_two_names_is_solved_once_and_shown_twice(tmp_path: Path) -> 
     data = computed(study(tmp_path, text))
     assert data["case"].values.tolist() == ["boxer-four", "b"]
     assert np.ptp(data["objective"].values) == 0.0
-    assert (tmp_path / "kept" / NAME).read_bytes().count(b"\n") == 1
+    assert len(points_in((tmp_path / "kept" / NAME).read_bytes())) == 1
 
 
 def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
@@ -193,33 +199,18 @@ def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
     assert np.isnan([kept["objective"], kept["lower_bound"], *kept["mean"].values()]).all()
 
 
-def test_goes_on_from_a_file_cut_at_any_byte(tmp_path: Path, small: Path) -> None:
+def test_goes_on_from_a_file_cut_anywhere(tmp_path: Path, small: Path) -> None:
     path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(5)))
     kept = tmp_path / "kept" / NAME
     whole = computed(path, small, kept=kept)
     content = kept.read_bytes()
-    assert content.count(b"\n") == 5
+    assert len(points_in(content)) == 5
     cut = tmp_path / "cut" / NAME
     cut.parent.mkdir()
-    for length in range(0, len(content) + 1, 7):
-        cut.write_bytes(content[:length])
-        with KeptPoints(cut) as store:
-            assert len(store.records) == content[:length].count(b"\n")
     for length in (1, len(content) // 2, len(content) - 1):
         cut.write_bytes(content[:length])
         assert computed(path, small, kept=cut).identical(whole)
-        # times differ, records do not
-        assert [json.loads(line)[2] for line in cut.read_bytes().splitlines()] == [
-            json.loads(line)[2] for line in content.splitlines()
-        ]
-
-
-def test_a_line_that_is_no_point_is_refused(tmp_path: Path, small: Path) -> None:
-    path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(2)))
-    kept = tmp_path / NAME
-    kept.write_bytes(b'{"half": \n')
-    with pytest.raises(InputError, match="line 1: is no finished point of a study; remove this line"):
-        computed(path, small, kept=kept)
+        assert points_in(cut.read_bytes()) == points_in(content)
 
 
 def test_points_hang_on_all_that_they_use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -314,19 +305,18 @@ def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
     kept = out / NAME
     for _ in range(2000):
-        if kept.is_file() and kept.read_bytes().count(b"\n") >= 3:
+        if kept.is_file() and len(points_in(kept.read_bytes())) >= 3:
             break
         time.sleep(0.01)
     process.send_signal(stop)
     said = process.communicate()[1]
-    finished = kept.read_bytes().count(b"\n")
-    assert 3 <= finished < 60
+    content = kept.read_bytes()
+    assert 3 <= len(points_in(content)) < 60
     if stop is signal.SIGINT:
         assert process.returncode == 130
         assert said == "laufruhe: interrupted; finished points are kept, the same command goes on\n"
-    lines = kept.read_bytes().split(b"\n")[:finished]
     data = computed(path, tmp_path, kept=kept)
-    assert kept.read_bytes().split(b"\n")[:finished] == lines
+    assert kept.read_bytes().startswith(content)
     assert data.identical(whole)
 
 

@@ -42,9 +42,9 @@ def run(
     scenes = Scenes(folder)
     work = [(part, point) for part in study.study.parts for point in part.points(scenes)]
     marks = [scenes.fingerprint(point, part.settings()) for part, point in work]
-    with KeptPoints(kept) as store:
-        # a scene that stands in two parts of one kind is solved once
-        wanted = dict(zip(marks, work, strict=True))
+    # a scene that stands in two parts of one kind is solved once
+    wanted = dict(zip(marks, work, strict=True))
+    with KeptPoints(kept, wanted.keys()) as store:
         todo = {mark: task for mark, task in wanted.items() if mark not in store.records}
         names, whole = list(todo), len(wanted)
         say(whole - len(todo), whole)

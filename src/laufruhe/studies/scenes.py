@@ -110,7 +110,8 @@ class Scenes:
     def fingerprint(self, point: Point, settings: Mapping[str, Any]) -> str:
         """Of everything that a point hangs on: scene, files that it names, what is asked, and this package."""
         tables = self.tables(point)
-        about = [settings, point.case.problem, point.case.equal_power_to, point.shafts, tables, __version__]
+        case = point.case.model_dump(exclude={"name", "sweep"})
+        about = [settings, case, point.shafts, tables, __version__]
         found = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
         gas = tables.get("gas")
         named = gas.get("file") if isinstance(gas, dict) else None

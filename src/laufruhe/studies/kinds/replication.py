@@ -88,8 +88,7 @@ class Replication(Part):
 
     def settings(self) -> dict[str, Any]:
         """What is asked of every case; numbers and problems stand in the scenes."""
-        told = [(case.computation, case.numbers) for case in self.cases if case.computation]
-        return {"kind": self.kind, "quantities": {k: str(what) for k, what in self.quantities.items()}, "told": told}
+        return {"kind": self.kind, "quantities": {k: str(what) for k, what in self.quantities.items()}}
 
     @property
     def ends(self) -> tuple[str, ...]:

@@ -1,0 +1,138 @@
+"""Kept points of a study: what is damaged is solved again, never trusted, and never in the way."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import shutil
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from laufruhe.studies import Scenes, run
+from laufruhe.studies.kept import NAME, KeptPoints
+from laufruhe.studies.reader import load_study
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+MARKS = [f"{k:032x}" for k in range(5)]
+RECORDS = [{"objective": 100.125 + k, "status": "optimal", "lower_bound": math.nan} for k in range(5)]
+STUDY = """
+title = "t"
+[study]
+[[study.parts]]
+name = "p"
+kind = "layout comparison"
+title = "t"
+sweep = [{ quantity = "operating_points.1.mean_piston_speed", from = "6 m/s", to = "12 m/s", points = 4 }]
+cases = [{ name = "single", problem = "tractor-single.toml" }]
+"""
+
+
+def written(path: Path, count: int = 5) -> bytes:
+    path.unlink(missing_ok=True)
+    with KeptPoints(path, MARKS) as store:
+        for mark, record in list(zip(MARKS, RECORDS, strict=True))[:count]:
+            store.keep(mark, 0.25, record)
+    return path.read_bytes()
+
+
+def trusted(path: Path) -> list[int]:
+    """Which points are taken from a file; each as it was kept, or the test fails."""
+    with KeptPoints(path, MARKS) as store:
+        for mark, record in store.records.items():
+            whole = RECORDS[MARKS.index(mark)]
+            assert json.dumps(record) == json.dumps(whole)
+            assert store.seconds[mark] == 0.25
+        return sorted(map(MARKS.index, store.records))
+
+
+def test_points_are_read_as_they_were_kept(tmp_path: Path) -> None:
+    written(tmp_path / NAME)
+    assert trusted(tmp_path / NAME) == [0, 1, 2, 3, 4]
+    with KeptPoints(tmp_path / NAME, MARKS[1:3]) as store:
+        assert list(store.records) == MARKS[1:3]
+
+
+def test_a_byte_changed_anywhere_costs_one_point(tmp_path: Path) -> None:
+    """A point is as it was kept, or it is none; an end of line may be lost without harm, there are two."""
+    path = tmp_path / NAME
+    content = written(path)
+    rng = random.Random(1)
+    for place in range(0, len(content), 3):
+        spoilt = bytearray(content)
+        spoilt[place] = rng.choice([value for value in range(256) if value != content[place]])
+        path.write_bytes(spoilt)
+        found = trusted(path)
+        assert len(found) == 4 or (len(found) == 5 and content[place : place + 1] == b"\n")
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_lines_in_any_disorder(tmp_path: Path, seed: int) -> None:
+    path, rng = tmp_path / NAME, random.Random(seed)
+    lines = [line for line in written(path).splitlines(keepends=True) if line.strip()]
+    whole = [*lines, rng.choice(lines)]
+    rng.shuffle(whole)
+    cut = whole.pop(rng.randrange(len(whole)))
+    path.write_bytes(b"".join(whole) + cut[: rng.randrange(len(cut))])
+    found = trusted(path)
+    assert len(found) >= 4
+    # what is added after a line that was cut is not lost with it
+    missing = next((k for k in range(5) if k not in found), 0)
+    with KeptPoints(path, MARKS) as store:
+        store.keep(MARKS[missing], 0.25, RECORDS[missing])
+    assert sorted({*found, missing}) == trusted(path)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\n\n", b"\x00" * 99, b"\xff\xfe\n", b"[" * 5000 + b"\n", b"1\n", b'{"half": \n', b"null\n",
+                b'["a", 1, {}]\n', b'["' + b"0" * 32 + b'", 0.25, {"objective": 1.0}]\n', b"9" * 5000 + b"\n"],
+)  # fmt: skip
+def test_what_is_no_point_is_passed_over(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / NAME
+    path.write_bytes(content)
+    assert trusted(path) == []
+    with KeptPoints(path, MARKS) as store:
+        store.keep(MARKS[0], 0.25, RECORDS[0])
+    assert trusted(path) == [0]
+
+
+def test_two_at_once_keep_whole_lines(tmp_path: Path) -> None:
+    """One that found the end of the file before the other added to it."""
+    path = tmp_path / NAME
+    with KeptPoints(path, MARKS) as one, KeptPoints(path, MARKS) as other:
+        for k in range(5):
+            (one if k % 2 else other).keep(MARKS[k], 0.25, RECORDS[k])
+            one.keep(MARKS[0], 0.25, RECORDS[0])
+    assert trusted(path) == [0, 1, 2, 3, 4]
+
+
+def test_a_changed_figure_is_solved_again(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
+    study, path = load_study(tmp_path / "s.toml"), tmp_path / "kept" / NAME
+
+    def computed() -> xr.Dataset:
+        return run(study, PROBLEMS, path)[0]["p"]
+
+    whole = computed()
+    lines = path.read_bytes()
+    for digit in b"123456789":
+        path.write_bytes(lines.replace(b'"objective": %c' % digit, b'"objective": 9%c' % digit))
+        assert computed().identical(whole)
+
+
+def test_points_hang_on_the_numbers_of_a_computation(tmp_path: Path) -> None:
+    """Two studies that differ in a number which only a computation reads share no point."""
+    shutil.copy(PROBLEMS / "tractor-single.toml", tmp_path)
+    marks = set()
+    for imep in (5.5, 9.0):
+        text = (
+            'title = "t"\n[[study.parts]]\nname = "p"\nkind = "replication"\ntitle = "t"\n'
+            f'numbers = {{ kp = {imep} }}\ncases = [{{ name = "a", problem = "tractor-single.toml", '
+            'computation = "gas trace of a four-cylinder", numbers = { imep = "kp" } }]\n'
+        )
+        (tmp_path / "s.toml").write_text(text, encoding="utf-8")
+        (part,), scenes = load_study(tmp_path / "s.toml").study.parts, Scenes(tmp_path)
+        marks |= {scenes.fingerprint(point, part.settings()) for point in part.points(scenes)}
+    assert len(marks) == 2
