@@ -216,3 +216,20 @@ def test_given_throws_that_break_a_limit_are_no_design(tmp_path):
     found = solve(engines.problem(tmp_path, 3, "four-stroke", engine, rest=rest))
     assert found.status is Status.INFEASIBLE
     assert "limits" in found.message
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("measure", ["rms shaking force", "mean mount force", "rms shaking force, mean rocking couple"])
+@pytest.mark.parametrize("cylinders", [3, 4, 5])
+def test_an_order_that_every_star_cancels_asks_for_nothing(tmp_path, cylinders, measure, order):
+    """What is left of it is a rounding, and no size that unbalances could be counted in."""
+    names = measure.split(", ")
+    terms = f'[[objective.terms]]\nquantity = "{names[0]}"\norders = [{order}]\n'
+    terms += "".join(f'[[objective.terms]]\nquantity = "{name}"\n' for name in names[1:])
+    half = engines.WEIGHTS.replace("360", "180", 1)
+    problem = engines.problem(tmp_path, cylinders, rest=engines.MOUNTS + half + "[objective]\n" + terms, samples=720)
+    result = solve(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value <= result.objective.initial * (1.0 + 1e-9)
+    if measure == "rms shaking force":
+        assert result.objective.value <= 1e-9

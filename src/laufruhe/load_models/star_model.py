@@ -27,6 +27,7 @@ from laufruhe.problem.problem import Phasing, Problem
 Array = NDArray[np.float64]
 
 _SAME_SLOPE = 1e-11
+_ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +55,16 @@ class StarNorm:
     def at(self, star: Sequence[int]) -> AffineNorm:
         """The norm of one star."""
         chosen = np.arange(len(star)), np.asarray(star, dtype=np.intp)
-        constant = self.constant + self.moves[chosen].sum(axis=0)
-        slope = self.slope if self.turns is None else self.slope + self.turns[chosen].sum(axis=0)
+        constant = _cancelled(self.constant, self.moves[chosen])
+        slope = self.slope if self.turns is None else _cancelled(self.slope, self.turns[chosen])
         return AffineNorm(self.norm, constant, slope, self.grid)
+
+
+def _cancelled(first: Array, moves: Array) -> Array:
+    """The sum of rows and of their moves; what is a rounding of the largest of them is zero."""
+    whole = first + moves.sum(axis=0)
+    reach = np.abs(first).max(initial=0.0) + np.abs(moves).max(initial=0.0, axis=tuple(range(1, moves.ndim))).sum()
+    return np.where(np.abs(whole) <= _ROUNDING * reach, 0.0, whole)
 
 
 @dataclass(frozen=True, eq=False)
