@@ -20,7 +20,7 @@ from pages import PAGES, ROOT, publish
 from laufruhe import load
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conic import ConicProgram
+from laufruhe.solvers.conic import solve_cones
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester.toml"
 OUT = PAGES / "solve.md"
@@ -63,17 +63,16 @@ def resolve_rows() -> list[Row]:
     rows = []
     for samples in (72, 180, 720):
         sweep = [at_speed(problem, samples, factor) for factor in np.linspace(0.6, 1.0, 25)]
-        program = ConicProgram(sweep[-1], reusable=True)
-        program.solve(sweep[0])
+        solve_cones(sweep[0])
         start = time.perf_counter()
-        inside = sum(program.solve(affine).solver_seconds for affine in sweep)
+        inside = sum(solve_cones(affine).solver_seconds for affine in sweep)
         whole = time.perf_counter() - start
         rows.append((f"re-solve at {samples} angles", whole / 25, "Clarabel alone", inside / 25))
     return rows
 
 
 def at_speed(problem: Problem, samples: int, factor: float) -> AffineProblem:
-    """The problem at another speed in forces over speed squared, so that only constants change."""
+    """The problem at another speed in forces over speed squared."""
     point = replace(problem.points[0], speed=factor * problem.points[0].speed)
     rated = AffineModel(problem).at(samples)
     slower = AffineModel(replace(problem, points=(point,))).at(samples)

@@ -25,7 +25,7 @@ from scipy.optimize import NonlinearConstraint, differential_evolution, minimize
 from laufruhe import load  # noqa: E402
 from laufruhe.load_models.affine import AffineModel, AffineProblem  # noqa: E402
 from laufruhe.solvers import solve  # noqa: E402
-from laufruhe.solvers.conic import ConicProgram  # noqa: E402
+from laufruhe.solvers.conic import solve_cones  # noqa: E402
 from laufruhe.studies import run  # noqa: E402
 from laufruhe.studies.reader import load_study  # noqa: E402
 
@@ -83,11 +83,10 @@ def study_rows() -> list[str]:
         for factor in factors:
             model = AffineModel(replace(problem, points=(replace(rated, speed=factor * rated.speed),)))
             affines.append(over_square(model.at(model.full_samples), factor * rated.speed))
-        program = ConicProgram(affines[0], reusable=True)
-        program.solve()
+        solve_cones(affines[0])
 
-        def bare(program: ConicProgram = program, affines: list[AffineProblem] = affines) -> list[float]:
-            return [program.solve(affine).solver_seconds for affine in affines]
+        def bare(affines: list[AffineProblem] = affines) -> list[float]:
+            return [solve_cones(affine).solver_seconds for affine in affines]
 
         turns = [(timed(bare)[0], timed(lambda n=name: studied(n))[0]) for _ in range(5)]
         plain, whole = (1e3 * statistics.median(turn[k] for turn in turns) / STUDY_POINTS for k in (0, 1))
@@ -120,12 +119,11 @@ def main() -> None:
     swept = []
 
     def sweep() -> list[float]:
-        swept[:] = [solve(replace(problem, points=(replace(rated, speed=s),)), many=True) for s in speeds]
+        swept[:] = [solve(replace(problem, points=(replace(rated, speed=s),))) for s in speeds]
         return [result.objective.value for result in swept]
 
     def bare() -> list[float]:
-        program = ConicProgram(squared[0], reusable=True)
-        return [float(program.solve(a).x is not None) for a in squared]
+        return [float(solve_cones(a).x is not None) for a in squared]
 
     squared = [over_square(affine, speed) for affine, speed in zip(coarse, speeds, strict=True)]
     sweep()

@@ -55,7 +55,7 @@ def test_values_are_those_of_the_exact_model(tmp_path: Path) -> None:
     data = computed(tmp_path, part(str(path), 'from = "1000 rpm", to = "2600 rpm", step = "500 rpm"'))
     rated = problem.points[0].speed / RPM
     speeds = sorted({1000.0, 1500.0, 2000.0, 2500.0, round(rated, 9)})
-    result = solve(problem, many=True)
+    result = solve(problem)
     assert data["measure"].values.tolist() == ["mean mount force"]
     for design, engine in (("as given", problem.engine), ("as decided", result.final.engine)):
         one = data.isel(point=np.flatnonzero(data["design"].values == design))

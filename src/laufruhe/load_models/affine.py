@@ -26,7 +26,7 @@ from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
-NEEDED = 1e3
+NEEDED, LEAST_UNIT = 1e3, 1e-9
 FEASIBLE = 1e-6
 """Relative excess over a limit that counts as none."""
 
@@ -99,6 +99,11 @@ class AffineProblem:
         return sum(domain.width for domain in self.domains)
 
     @property
+    def start(self) -> Array:
+        """The decision vector of the design as given."""
+        return np.concatenate([np.zeros(0), *(domain.columns_of(domain.decision.start) for domain in self.domains)])
+
+    @property
     def scales(self) -> Array:
         """Largest size of every column."""
         return np.concatenate([np.full(d.width, d.scale) for d in self.domains]) if self.domains else np.zeros(0)
@@ -116,8 +121,9 @@ class AffineProblem:
         for domain in self.domains:
             own = [math.sqrt(float(square[domain.columns].sum())) for square in squares]
             needs = [constant / size for constant, size in zip(constants, own, strict=True) if size > 0.0]
-            needed = NEEDED * max(needs, default=0.0)
-            found.append(np.full(domain.width, min(domain.scale, needed) if needed > 0.0 else domain.scale))
+            # a need that is a rounding of what the bounds could load is none
+            needed = max(NEEDED * max(needs, default=0.0), LEAST_UNIT * domain.scale)
+            found.append(np.full(domain.width, min(domain.scale, needed) if max(needs, default=0.0) else domain.scale))
         return np.concatenate(found) if found else np.zeros(0)
 
     def objective(self, x: Array) -> float:

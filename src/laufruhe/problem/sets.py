@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Value: TypeAlias = complex | float
 
+EDGE = 1e-6
+"""Share of a size within which a point counts as standing at a bound."""
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -33,6 +36,10 @@ class Interval:
     def scaled(self, factor: float) -> Interval:
         """The same in a unit of another size."""
         return replace(self, lower=self.lower * factor, upper=self.upper * factor)
+
+    def within(self, size: float) -> Interval:
+        """The part of it that is no larger than a size."""
+        return replace(self, lower=max(self.lower, -size), upper=min(self.upper, size))
 
     @property
     def angles(self) -> tuple[float, float]:
@@ -56,6 +63,12 @@ class Interval:
         """The nearest point of the set."""
         return np.clip(v, self.lower, self.upper)
 
+    def inside(self, v: Array) -> Array:
+        """Directions in which a point of the set is not at its bounds, shape (1, m)."""
+        at = float(v[0])
+        low, high = (abs(at - bound) <= EDGE * max(abs(at), abs(bound)) for bound in (self.lower, self.upper))
+        return np.eye(1, int(not low and not high))
+
 
 @dataclass(frozen=True)
 class Sector:
@@ -75,6 +88,10 @@ class Sector:
     def scaled(self, factor: float) -> Sector:
         """The same in a unit of another size."""
         return replace(self, upper=self.upper * factor)
+
+    def within(self, size: float) -> Sector:
+        """The part of it that is no larger than a size."""
+        return replace(self, upper=min(self.upper, size))
 
     @property
     def free_angle(self) -> bool:
@@ -108,6 +125,14 @@ class Sector:
             v = along[best] * self.edges[best]
         size = float(np.hypot(*v))
         return v * (self.upper / size) if size > self.upper else v
+
+    def inside(self, v: Array) -> Array:
+        """Directions in which a point of the set is not at its bounds, shape (2, m)."""
+        size = float(np.hypot(*v))
+        if size >= self.upper * (1.0 - EDGE):
+            return np.zeros((2, 0))
+        along = [edge[:, None] for edge in self.edges if abs(edge[0] * v[1] - edge[1] * v[0]) <= EDGE * size]
+        return along[0] if along else np.eye(2)
 
     def _inside_cone(self, v: Array) -> bool:
         edges = self.edges

@@ -9,7 +9,7 @@ form. Any Z and mu give a valid bound; the solver only proposes good ones.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 
 FLOOR = 1e-3
 """Share of the objective as given beside which a gap is counted: a balanced engine has none of its own."""
+
+ROUNDING = 1e-12
+# rounds of levelling, and the share of a bound from which it is worth one
+LEVELLINGS, LEVEL = 2, 1e-6
 
 
 def gap_unit(value: float, given: float) -> float:
@@ -129,7 +133,8 @@ def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
     gradient, constant = np.zeros(problem.size), 0.0
     terms = []
     for (weight, norm), given in zip(problem.terms, multipliers.terms, strict=True):
-        z = norm.dual_feasible(given)
+        # a term that nothing open acts on is its own bound
+        z = norm.dual_feasible(given) if norm.slope.any() else norm.subgradient(np.zeros(problem.size))
         terms.append(z)
         constant += weight * float(np.vdot(z, norm.constant))
         gradient += weight * np.einsum("kd,kdn->n", z, norm.slope)
@@ -141,6 +146,14 @@ def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
     least = constant + sum(domain.least(gradient) for domain in problem.domains)
     # every term is a norm, so nothing lies under zero
     return Bound(max(least, 0.0), gradient, Multipliers(tuple(terms), tuple(held)))
+
+
+def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:
+    """Whether these dual rows of the limits show that no design keeps all of them (P4)."""
+    proof = lower_bound(replace(problem, terms=()), Multipliers((), limits))
+    sizes = [maximum + norm.value(np.zeros(problem.size)) for maximum, norm in problem.limits]
+    whole = sum(price * size for price, size in zip(proof.multipliers.shadow_prices(problem), sizes, strict=True))
+    return proof.value > ROUNDING * whole
 
 
 def best_bound(fine: AffineProblem, coarse: AffineProblem, x: Array, found: Multipliers) -> Bound:
@@ -159,7 +172,39 @@ def best_bound(fine: AffineProblem, coarse: AffineProblem, x: Array, found: Mult
         ),
         spread.limits,
     )
-    return max((lower_bound(fine, m) for m in (spread, direct)), key=lambda bound: bound.value)
+    best = max((lower_bound(fine, m) for m in (spread, direct)), key=lambda bound: bound.value)
+    for _ in range(LEVELLINGS):
+        if fine.objective(x) - best.value > LEVEL * best.value:
+            best = max(best, lower_bound(fine, _levelled(fine, x, best)), key=lambda bound: bound.value)
+    return best
+
+
+def _levelled(problem: AffineProblem, x: Array, bound: Bound) -> Multipliers:
+    """Dual rows of the terms, changed by as little as makes the bound level along what is inside its set.
+
+    A slope that is a rounding of the solver, times a bound far from what is needed, would else be all that is left.
+    """
+    inside = _inside(problem, x)
+    slopes = [norm.slope @ inside for _, norm in problem.terms]
+    weighed = [norm.grid.weights[:, None, None] * slope for (_, norm), slope in zip(problem.terms, slopes, strict=True)]
+    parts = zip(problem.terms, slopes, weighed, strict=True)
+    pull = sum(weight * np.einsum("kdm,kdn->mn", slope, by) for (weight, _), slope, by in parts)
+    if not inside.size or not np.any(pull):
+        return bound.multipliers
+    sizes = np.sqrt(np.where(np.diag(pull) > 0.0, np.diag(pull), 1.0))
+    steps = np.linalg.lstsq(pull / np.outer(sizes, sizes), -(bound.gradient @ inside) / sizes)[0] / sizes
+    terms = zip(bound.multipliers.terms, weighed, strict=True)
+    return replace(bound.multipliers, terms=tuple(z + by @ steps for z, by in terms))
+
+
+def _inside(problem: AffineProblem, x: Array) -> Array:
+    """Directions in which every decision is inside its set, shape (n, m)."""
+    columns = [np.zeros((problem.size, 0))]
+    for domain in problem.domains:
+        own = np.zeros((problem.size, domain.width))
+        own[domain.columns] = np.eye(domain.width)
+        columns.append(own @ domain.set.inside(x[domain.columns]))
+    return np.concatenate(columns, axis=1)
 
 
 def _spread(fine: AffineNorm, samples: int, z: Array) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.channels import MountChannel
@@ -14,7 +13,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.conclusion import broken_limits, none_within, state
-from laufruhe.solvers.direct_cones import solve_direct
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
 
@@ -128,7 +126,7 @@ METHODS: tuple[Method, ...] = (
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
 
-def solve(problem: Problem, say: Say = lambda _: None, *, many: bool = False) -> Result:
+def solve(problem: Problem, say: Say = lambda _: None) -> Result:
     """Decide what a problem leaves open.
 
     Parameters
@@ -137,9 +135,6 @@ def solve(problem: Problem, say: Say = lambda _: None, *, many: bool = False) ->
         What is open, wanted and forbidden.
     say
         Told what is being decided, where that takes long.
-    many
-        Whether this is one of many small problems: cone programs are then handed to the solver as
-        arrays, and not stated in cvxpy first. The design is the same.
 
     Raises
     ------
@@ -156,6 +151,4 @@ def solve(problem: Problem, say: Say = lambda _: None, *, many: bool = False) ->
     method = next((m for m in METHODS if kinds <= m.decides and m.suits(problem)), None)
     if method is None:
         raise ModelError(f"no method decides {_named(kinds)} together, with what is asked here; fix one of them")
-    if many and method.decides == {Kind.UNBALANCE}:
-        return solve_within(problem, partial(solve_unbalances, cones=solve_direct))
     return method.solve(problem, say)

@@ -1,169 +1,299 @@
-"""Least weighted sum of norms under limits, as a second-order cone program (P1).
+"""Least weighted sum of norms under limits, as a second-order cone program in arrays for Clarabel (P1).
 
-The program is built once for a set of slopes; constants and limits may be parameters, so
-that a sweep solves again without building again.
+Nothing is kept between two solves, so a result hangs on its own problem alone. Norms that nothing
+open acts on, and limits that every design keeps, are no part of the program. Where the solver stops
+without an answer it is asked again with other settings, and where none of these helps, for the best
+it had: whatever it says is judged by the exact model, and bounds are taken from its dual rows anew.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-import cvxpy as cp
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import SolverError
-from laufruhe.load_models.affine import AffineNorm, AffineProblem, reach
-from laufruhe.numerics.norms import Cones
+from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem, reach
+from laufruhe.numerics.norms import MEAN, Cones, Grid
 from laufruhe.problem.decision import Domain
-from laufruhe.prove.certificate import Multipliers
-from laufruhe.solvers.direct_cones import TIGHT, ConicSolution
+from laufruhe.prove.certificate import Multipliers, excludes
 
 Array = NDArray[np.float64]
 
+# flat optima need a small gap before their decisions are digits one can build
+TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
+ATTEMPTS: tuple[Mapping[str, Any], ...] = (
+    TIGHT,
+    # limits that all but contradict each other
+    {},
+    {**TIGHT, "equilibrate_enable": False},
+    {"tol_gap_abs": 1e-6, "tol_gap_rel": 1e-6, "tol_feas": 1e-7, "max_iter": 500, "max_step_fraction": 0.9},
+)
+"""Settings of the solver, in the order in which they are tried."""
 
-@dataclass
-class _Cone:
-    """One norm in the program, its rows in units of `unit`."""
 
-    constant: Any
-    value: Any
-    cone: Any
+@dataclass(frozen=True, eq=False)
+class ConicSolution:
+    """What the cone solver returned; nothing in it is believed before it is evaluated.
+
+    Attributes
+    ----------
+    x
+        Decision vector; None where the limits cannot be met together.
+    multipliers
+        Dual rows of terms and limits.
+    solver_seconds
+        Spent inside the cone solver.
+    iterations
+        Of the interior-point method.
+    """
+
+    x: Array | None
+    multipliers: Multipliers
+    solver_seconds: float
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """One norm: its columns of heads and its rows in the program.
+
+    Attributes
+    ----------
+    cones
+        Its form.
+    unit
+        Rows are counted in it.
+    first
+        First column of its heads.
+    """
+
+    norm: AffineNorm
+    cones: Cones
     unit: float
-    shape: tuple[int, int]
-    row_factors: Array
+    first: int
 
-    def dual_rows(self, objective_unit: float) -> Array:
-        """mu Z of the rows [SI] (P2), in the objective's own unit."""
-        z = -np.asarray(self.cone.dual_value[1], dtype=float).reshape(self.shape)
-        return z * self.row_factors[:, None] * (objective_unit / self.unit)
+    @property
+    def heads(self) -> slice:
+        """Columns of the heads."""
+        return slice(self.first, self.first + len(self.cones.value))
+
+    @property
+    def centres(self) -> NDArray[np.int64]:
+        """Column of the free vector that each number of the rows is counted from, shape (k, d); none, (0, 0)."""
+        if not self.cones.centred:
+            return np.zeros((0, 0), dtype=int)
+        k, d = self.norm.constant.shape
+        signal = np.arange(k) // self.norm.grid.steps
+        return np.asarray(self.heads.stop + signal[:, None] * d + np.arange(d))
 
 
-class ConicProgram:
-    """An affine problem as a cvxpy program, solved by Clarabel as often as wanted.
+class _Rows:
+    """A x + s = b, s in a product of cones: blocks of rows as they are added."""
+
+    def __init__(self, columns: int) -> None:
+        self.columns = columns
+        self.entries: list[tuple[NDArray[np.int64], NDArray[np.int64], Array]] = []
+        self.right: list[Array] = []
+        self.cones: list[Any] = []
+        self.count = 0
+
+    def add(self, rows: Any, columns: Any, values: Any, right: Array) -> None:
+        """Entries, their rows counted from the block's first."""
+        at, across, numbers = np.broadcast_arrays(rows, columns, values)
+        self.entries.append((at.ravel() + self.count, across.ravel(), numbers.ravel()))
+        self.right.append(right)
+        self.count += len(right)
+
+    def matrix(self) -> Any:
+        from scipy.sparse import csc_array
+
+        rows, columns, values = (np.concatenate([entry[k] for entry in self.entries]) for k in range(3))
+        used = values != 0.0
+        return csc_array((values[used], (rows[used], columns[used])), shape=(self.count, self.columns))
+
+
+def solve_cones(problem: AffineProblem, held: tuple[Array, Array] | None = None) -> ConicSolution:
+    """Least weighted sum of norms under limits.
 
     Parameters
     ----------
-    problem
-        Its slopes, weights and domains are built in.
-    reusable
-        Whether constants and maxima may change between solves. What is gained in a
-        sweep is paid once, when the program is compiled.
+    held
+        A and b of A x = b, which the decision vector is to keep as well.
     """
-
-    def __init__(self, problem: AffineProblem, reusable: bool = False) -> None:
-        self._problem = problem
-        self._reusable = reusable
-        # decisions in units of what they may need, rows in units of what these can reach
-        self._y = cp.Variable(problem.size)
-        self._unit = reach(problem, [norm for _, norm in problem.terms])
-        self._terms = [self._cone(norm, self._unit) for _, norm in problem.terms]
-        self._limits = [self._cone(norm, reach(problem, [norm])) for _, norm in problem.limits]
-        self._maxima = [
-            self._number(np.array(maximum / cone.unit))
-            for (maximum, _), cone in zip(problem.limits, self._limits, strict=True)
-        ]
-        least = [weight * cone.value for (weight, _), cone in zip(problem.terms, self._terms, strict=True)]
-        constraints = [cone.cone for cone in (*self._terms, *self._limits)]
-        constraints += [cone.value <= most for cone, most in zip(self._limits, self._maxima, strict=True)]
-        constraints += [
-            c
-            for domain in problem.domains
-            for c in membership(domain, self._y[domain.columns], float(problem.units[domain.start]))
-        ]
-        self._program = cp.Problem(cp.Minimize(sum(least)), constraints)
-
-    def _cone(self, norm: AffineNorm, unit: float) -> _Cone:
-        """V0 + B x in a second-order cone a row, or in one cone for a root mean square."""
-        k, d = norm.constant.shape
-        constant = self._number(norm.constant / unit)
-        slope = (norm.slope * (self._problem.units / unit)).reshape(k * d, -1)
-        rows = cp.reshape(slope @ self._y, (k, d), order="C") + constant
-        cones = norm.norm.cones(norm.grid)
-        value, cone = held_norm(cones, rows, norm.grid.steps)
-        return _Cone(constant, value, cone, unit, (k, d), cones.factors)
-
-    def _number(self, value: Array) -> Any:
-        return cp.Parameter(value.shape, value=value) if self._reusable else cp.Constant(value)
-
-    def solve(self, problem: AffineProblem | None = None) -> ConicSolution:
-        """Solve with the constants and maxima of `problem`, whose slopes must be those built in.
-
-        Raises
-        ------
-        SolverError
-            If the solver stops without telling optimal from infeasible.
-        """
-        if problem is not None:
-            self._take(problem)
-        problem = self._problem if problem is None else problem
-        with warnings.catch_warnings():
-            # an inaccurate answer is judged by its certificate, not by a warning
-            warnings.simplefilter("ignore")
-            try:
-                self._program.solve(solver=cp.CLARABEL, **TIGHT)
-            except cp.error.SolverError:
-                self._solve_loosely()
-        return self._answer(problem)
-
-    def _solve_loosely(self) -> None:
-        """At the solver's own tolerances, which tell limits that all but contradict each other from those that do."""
-        try:
-            self._program.solve(solver=cp.CLARABEL)
-        except cp.error.SolverError as error:
-            raise SolverError(f"the cone solver gave up ({error})") from None
-
-    def _take(self, problem: AffineProblem) -> None:
-        if not self._reusable:
-            raise ValueError("a program that is not reusable cannot take other constants")
-        for cone, (_, norm) in zip((*self._terms, *self._limits), (*problem.terms, *problem.limits), strict=True):
-            cone.constant.value = norm.constant / cone.unit
-        for most, cone, (maximum, _) in zip(self._maxima, self._limits, problem.limits, strict=True):
-            most.value = maximum / cone.unit
-
-    def _answer(self, problem: AffineProblem) -> ConicSolution:
-        status, stats = self._program.status, self._program.solver_stats
-        seconds, iterations = float(stats.solve_time or 0.0), int(stats.num_iters or 0)
-        if status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
-            return ConicSolution(None, Multipliers((), ()), seconds, iterations)
-        if self._y.value is None:
-            raise SolverError(f"the cone solver stopped with status '{status}'")
-        x = np.asarray(self._y.value) * self._problem.units
-        for domain in problem.domains:
-            x[domain.columns] = domain.project(x)
-        terms = tuple(
-            cone.dual_rows(self._unit) / weight for cone, (weight, _) in zip(self._terms, problem.terms, strict=True)
-        )
-        limits = tuple(cone.dual_rows(self._unit) for cone in self._limits)
-        return ConicSolution(x, Multipliers(terms, limits), seconds, iterations)
+    acting = [k for k, (_, norm) in enumerate(problem.terms) if norm.slope.any()]
+    binding = [k for k, limit in enumerate(problem.limits) if _may_bind(problem, *limit)]
+    fewer = replace(
+        problem, terms=tuple(problem.terms[k] for k in acting), limits=tuple(problem.limits[k] for k in binding)
+    )
+    found = _solved(fewer, held)
+    terms, limits = ([np.zeros_like(norm.constant) for _, norm in of] for of in (problem.terms, problem.limits))
+    for kept, rows, own in ((acting, terms, found.multipliers.terms), (binding, limits, found.multipliers.limits)):
+        for k, z in zip(kept, own, strict=False):
+            rows[k] = z
+    return replace(found, multipliers=Multipliers(tuple(terms), tuple(limits)))
 
 
-def held_norm(cones: Cones, rows: Any, steps: int) -> tuple[Any, Any]:
-    """A norm of rows (k, d), signals of `steps` rows, as a linear expression, and the cones that hold it (P1)."""
-    heads = cp.Variable(len(cones.value))
-    if cones.centred:
-        k, d = rows.shape
-        centres = cp.Variable((k // steps, d))
-        rows = rows - np.kron(np.eye(k // steps), np.ones((steps, 1))) @ centres
-    if cones.whole:
-        return heads[0], cp.SOC(heads[0], cp.vec(cp.multiply(cones.factors[:, None], rows), order="C"))
-    tops = heads if len(cones.value) == len(cones.head) else heads[cones.head]
-    return cones.value @ heads, cp.SOC(tops, rows, axis=1)
+def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
+    """Whether some design may break a limit that decisions act on; a triangle of norms tells."""
+    if not norm.slope.any():
+        return False
+    most = norm.norm.value(norm.grid, norm.constant)
+    for column, scale in enumerate(problem.scales):
+        most += scale * norm.norm.value(norm.grid, norm.slope[..., column])
+    return most > maximum
 
 
-def membership(domain: Domain, y: Any, unit: float, on: Any = 1.0) -> list[Any]:
-    """The decision's own set, in units of a size (P4), shrunk to nothing where `on` is zero (S10)."""
-    low, high = domain.set.lower / unit, domain.set.upper / unit
+def _solved(problem: AffineProblem, held: tuple[Array, Array] | None) -> ConicSolution:
+    """The first answer that the solver stands by; else the best of where it stopped."""
+    blocks, starts, rows, cost = _program(problem, held)
+    stopped: list[ConicSolution] = []
+    for settings in ATTEMPTS:
+        found = _told(rows, cost, settings)
+        status = str(found.status)
+        answer = _answer(problem, blocks, starts, found)
+        if "Infeasible" in status and excludes(problem, answer.multipliers.limits):
+            return replace(answer, x=None)
+        if "Solved" in status:
+            return answer
+        stopped.append(replace(answer, x=None) if "Infeasible" in status else answer)
+    points = [answer for answer in stopped if answer.x is not None]
+    points.append(replace(stopped[0], x=_projected(problem, problem.start)))
+    best = min(points, key=lambda answer: _rank(problem, answer.x))
+    contradiction = len(points) <= len(stopped) and _rank(problem, best.x)[0] > 0.0
+    return replace(best, x=None) if contradiction else best
+
+
+def _rank(problem: AffineProblem, x: Array | None) -> tuple[float, float]:
+    """By what breaks limits least, then by what is least."""
+    if x is None:
+        return np.inf, np.inf
+    excess = problem.excess(x)
+    return excess if excess > FEASIBLE else 0.0, problem.objective(x)
+
+
+def _program(
+    problem: AffineProblem, held: tuple[Array, Array] | None
+) -> tuple[list[_Block], list[int], _Rows, Array]:  # fmt: skip
+    """Blocks of the norms, their first rows, all rows, and the cost of every column."""
+    import clarabel
+
+    unit = reach(problem, [norm for _, norm in problem.terms])
+    blocks: list[_Block] = []
+    columns = problem.size
+    for norm, size in [
+        *((norm, unit) for _, norm in problem.terms),
+        *((norm, reach(problem, [norm])) for _, norm in problem.limits),
+    ]:
+        blocks.append(_Block(norm, norm.norm.cones(norm.grid), size, columns))
+        columns = int(blocks[-1].centres.max(initial=blocks[-1].heads.stop - 1)) + 1
+    rows = _Rows(columns)
+    if held is not None:
+        matrix, right = held
+        rows.add(np.arange(len(right))[:, None], np.arange(problem.size), matrix * problem.units, right)
+        rows.cones.append(clarabel.ZeroConeT(len(right)))
+    for domain in problem.domains:
+        _add_domain(rows, domain, float(problem.units[domain.start]))
+    for (maximum, _), block in zip(problem.limits, blocks[len(problem.terms) :], strict=True):
+        rows.add(0, np.arange(columns)[block.heads], block.cones.value, np.array([maximum / block.unit]))
+        rows.cones.append(clarabel.NonnegativeConeT(1))
+    starts = [_add_norm(rows, block, problem) for block in blocks]
+    cost = np.zeros(columns)
+    for (weight, _), block in zip(problem.terms, blocks, strict=False):
+        cost[block.heads] = weight * block.cones.value
+    return blocks, starts, rows, cost
+
+
+def _told(rows: _Rows, cost: Array, told: Mapping[str, Any]) -> Any:
+    import clarabel
+    from scipy.sparse import csc_array
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    for name, value in told.items():
+        setattr(settings, name, value)
+    nothing = csc_array((rows.columns, rows.columns))
+    right = np.concatenate(rows.right)
+    return clarabel.DefaultSolver(nothing, cost, rows.matrix(), right, rows.cones, settings).solve()
+
+
+def _answer(problem: AffineProblem, blocks: list[_Block], starts: list[int], found: Any) -> ConicSolution:
+    """Decisions in their sets, and dual rows; zero where the solver has lost its numbers."""
+    x = _projected(problem, _numbers(found.x)[: problem.size] * problem.units)
+    duals = _numbers(found.z)
+    unit = blocks[0].unit if problem.terms else 1.0
+    rows = [_dual_rows(block, duals, start, unit) for block, start in zip(blocks, starts, strict=True)]
+    terms = tuple(z / weight for z, (weight, _) in zip(rows, problem.terms, strict=False))
+    multipliers = Multipliers(terms, tuple(rows[len(terms) :]))
+    return ConicSolution(x, multipliers, float(found.solve_time), int(found.iterations))
+
+
+def _numbers(values: Sequence[float]) -> Array:
+    return np.asarray(np.nan_to_num(np.asarray(values, dtype=float), posinf=0.0, neginf=0.0))
+
+
+def _projected(problem: AffineProblem, x: Array) -> Array:
+    """Every decision in its set."""
+    for domain in problem.domains:
+        x[domain.columns] = domain.project(x)
+    return x
+
+
+def _add_domain(rows: _Rows, domain: Domain, unit: float) -> None:
+    """The decision's own set, in units of a size (P4)."""
+    import clarabel
+
+    upper, lower = domain.set.upper / unit, domain.set.lower / unit
     if domain.width == 1:
-        return [y >= low * on, y <= high * on]
-    inside: list[Any] = [cp.SOC(high * cp.Constant(1.0) * on, y)]
+        rows.add([0, 1], domain.start, [1.0, -1.0], np.array([upper, -lower]))
+        rows.cones.append(clarabel.NonnegativeConeT(2))
+        return
     if len(domain.set.edges):
         (ax, ay), (bx, by) = domain.set.edges
-        inside += [ax * y[1] - ay * y[0] >= 0.0, bx * y[1] - by * y[0] <= 0.0]
-    return inside
+        across = np.array([domain.start, domain.start + 1])
+        rows.add([[0], [1]], across, [[ay, -ax], [-by, bx]], np.zeros(2))
+        rows.cones.append(clarabel.NonnegativeConeT(2))
+    rows.add([1, 2], [domain.start, domain.start + 1], -1.0, np.array([upper, 0.0, 0.0]))
+    rows.cones.append(clarabel.SecondOrderConeT(3))
+
+
+def _add_norm(rows: _Rows, block: _Block, problem: AffineProblem) -> int:
+    """V0 + B x in a cone a row, or in one cone for a root mean square; returns the first row."""
+    import clarabel
+
+    norm, cones, start = block.norm, block.cones, rows.count
+    k, d = norm.constant.shape
+    slope = norm.slope * (problem.units / block.unit) * cones.factors[:, None, None]
+    constant = norm.constant / block.unit * cones.factors[:, None]
+    # rows of the program in the order of its cones: a head, then what is under it
+    width = k * d + 1 if cones.whole else d + 1
+    heads = np.arange(len(cones.head)) * width
+    under = (1 + np.arange(k * d).reshape(k, d)) if cones.whole else heads[:, None] + 1 + np.arange(d)
+    right = np.zeros(width * len(heads))
+    right[under] = constant
+    places = np.broadcast_to(under[:, :, None], slope.shape)
+    across = np.broadcast_to(np.arange(problem.size), slope.shape)
+    centres = block.centres.ravel()
+    rows.add(
+        np.concatenate([heads, places.ravel(), under.ravel()[: len(centres)]]),
+        np.concatenate([block.first + cones.head, across.ravel(), centres]),
+        np.concatenate([np.full(len(heads), -1.0), -slope.ravel(), np.ones(len(centres))]),
+        right,
+    )
+    rows.cones += [clarabel.SecondOrderConeT(width)] * len(heads)
+    return start
+
+
+def _dual_rows(block: _Block, duals: Array, start: int, objective_unit: float) -> Array:
+    """mu Z of the rows [SI] (P2), in the objective's own unit."""
+    k, d = block.norm.constant.shape
+    if block.cones.whole:
+        z = -duals[start + 1 : start + 1 + k * d].reshape(k, d)
+    else:
+        z = -duals[start : start + k * (d + 1)].reshape(k, d + 1)[:, 1:]
+    return np.asarray(z * block.cones.factors[:, None] * (objective_unit / block.unit))
 
 
 def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[float]) -> Array:
@@ -180,43 +310,32 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
     weights
         Of every decision's size.
     """
-    total = sum(w * float(np.hypot.reduce(x[d.columns])) for w, d in zip(weights, problem.domains, strict=True))
-    # nothing lighter is larger than all of this together, whatever the bounds
-    units = [
-        min(d.scale, total / w) if w * total > 0.0 else d.scale for w, d in zip(weights, problem.domains, strict=True)
-    ]
-    scales = np.repeat(units, [d.width for d in problem.domains])
-    z = cp.Variable(still.shape[1])
-    step = still * (np.abs(x).max() or 1.0)
-    y = x / scales + (step / scales[:, None]) @ z
-    sizes = [
-        w * unit / max(units) * cp.norm(y[d.columns])
-        for w, unit, d in zip(weights, units, problem.domains, strict=True)
-    ]
-    held = [c for d, unit in zip(problem.domains, units, strict=True) for c in membership(d, y[d.columns], unit)]
-    program = cp.Problem(cp.Minimize(cp.sum(cp.hstack(sizes))), [*held, *_masses_held(problem, x, step, z)])
-    with warnings.catch_warnings():
-        # the loads stay what they are however accurate this is
-        warnings.simplefilter("ignore")
-        try:
-            program.solve(solver=cp.CLARABEL)
-        except cp.error.SolverError:
-            return x
-    if z.value is None:
+    sizes = [float(np.hypot.reduce(x[domain.columns])) for domain in problem.domains]
+    total = sum(w * size for w, size in zip(weights, sizes, strict=True))
+    if total == 0.0:
         return x
-    lighter = x + step @ np.asarray(z.value)
-    for domain in problem.domains:
-        lighter[domain.columns] = domain.project(lighter)
-    return np.asarray(lighter)
+    # nothing lighter is larger than all of this together, whatever the bounds
+    domains = tuple(
+        replace(d, decision=replace(d.decision, set=d.set.within(total / w if w else size)))
+        for d, w, size in zip(problem.domains, weights, sizes, strict=True)
+    )
+    limits = tuple((max(most, norm.value(x)), norm) for most, norm in problem.limits if norm.norm.sums_lengths)
+    limits = tuple((most, norm) for most, norm in limits if np.any(np.einsum("kdn,nm->kdm", norm.slope, still)))
+    terms = tuple((w, _size(d, problem.size)) for w, d in zip(weights, domains, strict=True) if w)
+    scales = np.concatenate([np.full(d.width, d.scale) for d in domains])
+    # across the directions, in units of the sizes, nothing moves
+    base, values, _ = np.linalg.svd(still / scales[:, None], full_matrices=True)
+    across = base[:, len(values) :].T / scales
+    found = solve_cones(AffineProblem(terms, limits, domains, problem.samples), (across, across @ x))
+    if found.x is None:
+        return x
+    steps, *_ = np.linalg.lstsq(still / scales[:, None], (found.x - x) / scales)
+    lighter = x + still @ steps
+    return _projected(problem, lighter)
 
 
-def _masses_held(problem: AffineProblem, x: Array, step: Array, z: Any) -> list[Any]:
-    """Limits on masses, along the directions that no load can tell apart."""
-    held = []
-    for maximum, norm in problem.limits:
-        moves = np.einsum("kdn,nm->kdm", norm.slope, step)
-        if np.any(moves != 0.0) and norm.norm.sums_lengths:
-            k, d = norm.constant.shape
-            rows = norm.rows(x) + cp.reshape(moves.reshape(k * d, -1) @ z, (k, d), order="C")
-            held.append(norm.grid.weights @ cp.norm(rows, axis=1) <= max(maximum, norm.value(x)))
-    return held
+def _size(domain: Domain, columns: int) -> AffineNorm:
+    """Of one decision."""
+    slope = np.zeros((1, domain.width, columns))
+    slope[0, :, domain.columns] = np.eye(domain.width)
+    return AffineNorm(MEAN, np.zeros((1, domain.width)), slope, Grid(np.ones(1), 1))

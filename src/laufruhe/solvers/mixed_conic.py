@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
 from laufruhe.load_models.star_model import StarNorm, StarProblem
+from laufruhe.numerics.norms import Cones
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import ShaftChoice
-from laufruhe.solvers.conic import held_norm, membership
 
 Array = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ def solve_program(
     built = cp.Variable(max(len(shafts.optional), 1), boolean=True)
     held = [*_stars(steps, space), *_shafts(built, shafts)]
     for domain, own in zip(problem.domains, owners, strict=True):
-        held += membership(domain, y[domain.columns], domain.scale, 1.0 if own < 0 else built[own])
+        held += _membership(domain, y[domain.columns], domain.scale, 1.0 if own < 0 else built[own])
     if not size:
         held.append(y == 0.0)
     unit = max((_reach(norm) for _, norm in problem.terms), default=0.0) or 1.0
@@ -145,7 +146,32 @@ class _Rows:
         flat = norm.constant.reshape(-1) / unit + moves @ self._steps
         if self._size:
             flat = flat + (norm.slope * (self._scales / unit)).reshape(k * d, -1) @ self._y
-        return held_norm(norm.norm.cones(norm.grid), cp.reshape(flat, (k, d), order="C"), norm.grid.steps)
+        return _held_norm(norm.norm.cones(norm.grid), cp.reshape(flat, (k, d), order="C"), norm.grid.steps)
+
+
+def _held_norm(cones: Cones, rows: Any, steps: int) -> tuple[Any, Any]:
+    """A norm of rows (k, d), signals of `steps` rows, as a linear expression, and the cones that hold it (P1)."""
+    heads = cp.Variable(len(cones.value))
+    if cones.centred:
+        k, d = rows.shape
+        centres = cp.Variable((k // steps, d))
+        rows = rows - np.kron(np.eye(k // steps), np.ones((steps, 1))) @ centres
+    if cones.whole:
+        return heads[0], cp.SOC(heads[0], cp.vec(cp.multiply(cones.factors[:, None], rows), order="C"))
+    tops = heads if len(cones.value) == len(cones.head) else heads[cones.head]
+    return cones.value @ heads, cp.SOC(tops, rows, axis=1)
+
+
+def _membership(domain: Domain, y: Any, unit: float, on: Any = 1.0) -> list[Any]:
+    """The decision's own set, in units of a size (P4), shrunk to nothing where `on` is zero (S10)."""
+    low, high = domain.set.lower / unit, domain.set.upper / unit
+    if domain.width == 1:
+        return [y >= low * on, y <= high * on]
+    inside: list[Any] = [cp.SOC(high * cp.Constant(1.0) * on, y)]
+    if len(domain.set.edges):
+        (ax, ay), (bx, by) = domain.set.edges
+        inside += [ax * y[1] - ay * y[0] >= 0.0, bx * y[1] - by * y[0] <= 0.0]
+    return inside
 
 
 def _stars(steps: Any, space: StarSpace) -> list[Any]:

@@ -31,7 +31,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Set, Value
 from laufruhe.prove.certificate import Reach, gap_unit
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged, none_within
-from laufruhe.solvers.direct_cones import solve_direct
 from laufruhe.solvers.mount_starts import unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
@@ -92,11 +91,6 @@ def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) 
     ----------
     problem
         Whose decisions are unbalances and places.
-
-    Raises
-    ------
-    SolverError
-        If the cone solver stops without an answer.
     """
     started = time.perf_counter()
     search, initial = _Search(problem), evaluate(problem)
@@ -184,7 +178,7 @@ class _Search:
     def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | None:
         """The bound of a box, and where its program puts the places; None where no design is allowed."""
         relaxed = self._relaxed(lower, upper)
-        result = solve_unbalances(relaxed, solve_direct)
+        result = solve_unbalances(relaxed)
         if result.status is Status.INFEASIBLE:
             # what cannot be met in one box may be in another: all boxes together tell
             told = {*self.conflict, *result.conflict}
@@ -203,7 +197,7 @@ class _Search:
         result, samples = None, None
         values = dict(zip((d.name for d in self.problem.decisions), self.problem.start, strict=True)) | where
         if self.unbalances:
-            result = solve_unbalances(held, solve_direct)
+            result = solve_unbalances(held)
             # where none is allowed the unbalances stay as given, and the design breaks its limits
             if result.status is not Status.INFEASIBLE:
                 found = unbalances_of(held, result)

@@ -22,6 +22,7 @@ from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import ShaftChoice
 from laufruhe.prove.certificate import Multipliers, best_bound
 from laufruhe.prove.star_cut import Cut, cut_of
+from laufruhe.solvers.conic import solve_cones
 
 COARSE = 48
 _CHUNK = 1 << 17
@@ -221,12 +222,10 @@ def solve_design(
     kept = tuple(own < 0 or own in built for own in owners)
     if not any(kept):
         return _fixed(fine, whole, star, built)
-    from laufruhe.solvers.conic import ConicProgram
-
     best: tuple[Solved, Multipliers] | None = None
     for samples in _grids(full):
         coarse, judged = _only(model.at(samples).at(star), kept), _only(whole, kept)
-        solution = ConicProgram(coarse).solve()
+        solution = solve_cones(coarse)
         if solution.x is None:
             return None
         bound = best_bound(judged, coarse, solution.x, solution.multipliers)

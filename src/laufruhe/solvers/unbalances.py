@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +14,10 @@ from laufruhe.problem.evaluation import BETWEEN, evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_unit, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
-from laufruhe.solvers.direct_cones import ConicSolution
+from laufruhe.solvers.conic import lightest, solve_cones
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
-ConeSolver: TypeAlias = Callable[[AffineProblem], ConicSolution]
 
 MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
@@ -51,23 +49,13 @@ class _Optimum:
     samples: int
 
 
-def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Result:
+def solve_unbalances(problem: Problem) -> Result:
     """Global optimum of a problem whose decisions are unbalances.
-
-    Parameters
-    ----------
-    cones
-        What solves the cone programs; a program in cvxpy where left out.
 
     Returns
     -------
     Result with a certificate computed from the exact model, or with the limits that
     cannot be met together.
-
-    Raises
-    ------
-    SolverError
-        If the cone solver stops without an answer.
     """
     started = time.perf_counter()
     model = AffineModel(problem)
@@ -78,7 +66,7 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     broken = broken_limits(problem.mount_limits, initial)
     if broken:
         return none_within(problem, initial, broken, {"model": modelled - started})
-    optimum, samples = _refine(problem, model, objective_value(problem, initial), cones or _stated)
+    optimum, samples = _refine(problem, model, objective_value(problem, initial))
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
@@ -95,7 +83,7 @@ def solve_unbalances(problem: Problem, cones: ConeSolver | None = None) -> Resul
     return concluded(design, initial, shown, {**timing, "evaluate": time.perf_counter() - solved})
 
 
-def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSolver) -> tuple[_Optimum | None, int]:
+def _refine(problem: Problem, model: AffineModel, initial: float) -> tuple[_Optimum | None, int]:
     """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6).
 
     Returns
@@ -104,7 +92,7 @@ def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSol
     """
     samples, best = model.full_samples, None
     for _ in range(MOST_DOUBLINGS + 1):
-        found = _allowed(problem, model, samples, initial, cones)
+        found = _allowed(problem, model, samples, initial)
         if found is None:
             # fewer angles ask for less: what they cannot meet, all cannot
             return best if best is not None and best.excess <= KEPT else None, samples
@@ -118,27 +106,25 @@ def _refine(problem: Problem, model: AffineModel, initial: float, cones: ConeSol
     return best, samples
 
 
-def _allowed(problem: Problem, model: AffineModel, samples: int, initial: float, cones: ConeSolver) -> _Optimum | None:
+def _allowed(problem: Problem, model: AffineModel, samples: int, initial: float) -> _Optimum | None:
     """An optimum at `samples` angles that keeps its limits between them too.
 
     A peak between the angles breaks its limit by a little; the next attempt asks for
     that little less at the angles.
     """
-    found = _attempt(problem, model, samples, initial, 0.0, cones)
+    found = _attempt(problem, model, samples, initial, 0.0)
     margin = 0.0
     for _ in range(MOST_MARGINS):
         if found is None or found.excess <= FEASIBLE:
             break
         margin += 1.05 * found.excess
-        found = _attempt(problem, model, samples, initial, margin, cones) or found
+        found = _attempt(problem, model, samples, initial, margin) or found
     return found
 
 
-def _attempt(
-    problem: Problem, model: AffineModel, samples: int, initial: float, margin: float, cones: ConeSolver
-) -> _Optimum | None:
+def _attempt(problem: Problem, model: AffineModel, samples: int, initial: float, margin: float) -> _Optimum | None:
     coarse, fine = model.at(samples), model.at(2 * samples)
-    solution = cones(_tightened(coarse, margin))
+    solution = solve_cones(_tightened(coarse, margin))
     if solution.x is None:
         return None
     x = _settled(problem, fine, solution.x)
@@ -150,46 +136,32 @@ def _attempt(
     return _Optimum(x, bound, fine, judge, max(gap, 0.0), judge.excess(x), samples)
 
 
-def _stated(affine: AffineProblem) -> ConicSolution:
-    from laufruhe.solvers.conic import ConicProgram
-
-    return ConicProgram(affine).solve()
-
-
 def _has_peaks(problem: Problem) -> bool:
     return any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
 
 
 def _tightened(affine: AffineProblem, margin: float) -> AffineProblem:
-    """Limits a little lower; those that nothing open acts on out of the solver's way, for they hold or nothing does."""
-    limits = tuple(
-        (maximum * (1.0 - margin) if norm.slope.any() else 2.0 * max(maximum, _alone(norm)), norm)
-        for maximum, norm in affine.limits
-    )
-    return replace(affine, limits=limits)
-
-
-def _alone(norm: AffineNorm) -> float:
-    return norm.value(np.zeros(norm.slope.shape[-1]))
+    """Limits a little lower."""
+    return replace(affine, limits=tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits))
 
 
 def _hopeless(problem: Problem, optimum: _Optimum) -> tuple[str, ...]:
     """A limit that is broken and that nothing open acts on; none where there is no such."""
     for limit, (maximum, norm) in zip(problem.load_limits, optimum.judge.limits, strict=True):
-        if not norm.slope.any() and _alone(norm) > maximum * (1.0 + KEPT):
+        if not norm.slope.any() and norm.value(optimum.x) > maximum * (1.0 + KEPT):
             return (limit.name,)
     return ()
 
 
 def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
-    """Of designs that no load can tell apart the lightest, what is negligible in it left out."""
-    from laufruhe.solvers.conic import lightest
-
+    """Of designs that no load can tell apart the lightest, without what is negligible; the one given if it is best."""
     still = _indistinguishable(problem, affine)
     if still.shape[1]:
         sizes = [sum(abs(drive.gain) for drive in domain.decision.rotor_drives) for domain in affine.domains]
         x = lightest(affine, x, still, sizes)
-    return _without_negligible(affine, x)
+    x = _without_negligible(affine, x)
+    better = affine.objective(affine.start) < affine.objective(x) and affine.excess(affine.start) <= FEASIBLE
+    return affine.start if better else x
 
 
 def _without_negligible(affine: AffineProblem, x: Array) -> Array:
@@ -269,12 +241,10 @@ def _shown(optimum: _Optimum, unit: float) -> Shown:
 
 def _conflict(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:
     """A smallest set of limits that no design meets together: each is needed for the contradiction."""
-    from laufruhe.solvers.conic import ConicProgram
-
     kept = list(range(len(affine.limits)))
     for k in range(len(affine.limits)):
         without = [j for j in kept if j != k]
         fewer = replace(affine, terms=(), limits=tuple(affine.limits[j] for j in without))
-        if ConicProgram(fewer).solve().x is None:
+        if solve_cones(fewer).x is None:
             kept = without
     return tuple(names[k] for k in kept)

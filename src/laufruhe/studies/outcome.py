@@ -30,7 +30,7 @@ _ON_MOUNTS = ("mean_given", "maximum_given", "mean", "maximum")
 def decided(problem: Problem) -> tuple[Result, str, str]:
     """A scene as decided, its status and its proof; one without a design as given."""
     try:
-        result = solve(problem, many=True)
+        result = solve(problem)
     except SolverError:
         return state(problem, to_start_from=True), FAILED, "none"
     if result.objective is None:

@@ -25,7 +25,7 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
-from laufruhe.solvers.conic import ConicProgram
+from laufruhe.solvers.conic import solve_cones
 from laufruhe.solvers.result import Status
 from laufruhe.studies.rigid_digits import RigidPart, rigid_part
 
@@ -156,7 +156,7 @@ def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
     try:
         if problem.phasing is None and len(problem.unbalances) == len(problem.decisions):
             model = AffineModel(problem)
-            x = ConicProgram(model.at(samples or model.full_samples)).solve().x
+            x = solve_cones(model.at(samples or model.full_samples)).x
             return None if x is None else problem.design([domain.complex_value(x) for domain in model.domains])
         one = replace(problem, search=replace(problem.search, starts=1))
         if one.phasing is not None and one.mount_decisions:

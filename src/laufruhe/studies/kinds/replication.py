@@ -127,7 +127,7 @@ class Replication(Part):
             if case.computation:
                 found = COMPUTATIONS[case.computation][0](problem, case.numbers)
                 return {name: values.as_dict() for name, values in found.items()}
-            result = solve(problem, many=True)
+            result = solve(problem)
             if result.status in (Status.INFEASIBLE, Status.FAILED):
                 raise ModelError(f"no design meets all limits of '{case.name}'; loosen one")
             return {name: asked(result, what).as_dict() for name, what in self.quantities.items()}
