@@ -115,7 +115,7 @@ def joint(problem: Problem) -> list[str]:
     started = time.perf_counter()
     optima = solve_nonlinear(*_program(problem), max_iterations=ITERATIONS)
     alone = time.perf_counter() - started
-    found = [_by_slsqp(problem, mounts, columns) for mounts, columns in start_points(problem)]
+    found = [_by_slsqp(problem, mounts, columns) for mounts, columns in start_points(problem)[0]]
     values = [value for value, _, kept in found if kept]
     reached = sum(value <= result.objective.value * 1.01 for value in values)
     usable = [optimum.value for optimum in optima if optimum.usable]
@@ -140,8 +140,9 @@ def joint(problem: Problem) -> list[str]:
 
 
 def _program(problem: Problem) -> tuple[NonlinearProgram, list[np.ndarray]]:
-    program = SmoothProgram(problem)
-    return program.program, [program.start(mounts, columns) for mounts, columns in start_points(problem)]
+    points, size = start_points(problem)
+    program = SmoothProgram(problem, size)
+    return program.program, [program.start(mounts, columns) for mounts, columns in points]
 
 
 class _LateError(Exception):

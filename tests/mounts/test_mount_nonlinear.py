@@ -68,7 +68,7 @@ def at(joint: SmoothProgram, point, softness: float = 1e-9):
 @pytest.mark.parametrize("measure", ["mean", "maximum", "rms"])
 def test_the_program_says_what_the_exact_model_says(measure, tmp_path):
     problem = joint_problem(tmp_path, measure)
-    joint = SmoothProgram(problem)
+    joint = SmoothProgram(problem, objective_value(problem, evaluate(problem)))
     generator = np.random.default_rng(2)
     for _ in range(3):
         mounts = [generator.uniform(d.lower, d.upper) for d in problem.mount_decisions]
@@ -95,7 +95,7 @@ def test_the_program_says_what_the_exact_model_says(measure, tmp_path):
 
 
 def test_derivatives_agree_with_finite_differences(tmp_path):
-    joint = SmoothProgram(joint_problem(tmp_path))
+    joint = SmoothProgram(joint_problem(tmp_path), 50.0)
     program = joint.program
     weights = np.random.default_rng(0).normal(size=len(program.constraint_names))
     scale = program.variable_scales

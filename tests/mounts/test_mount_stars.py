@@ -160,7 +160,7 @@ def test_the_program_of_moved_throws_says_what_the_exact_model_says(quantity, tm
     star = Candidate((0.0, math.pi, math.pi, 0.0), (1, 3, 4, 2))
     own = replace(phasing.realise(star), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout(None, None), star, phasing.intervals)
-    joint = SmoothProgram(own, moves=moves)
+    joint = SmoothProgram(own, 100.0, moves=moves)
     value = ca.Function("f", [joint.program.x, joint.program.parameters], [joint.program.objective])
     generator = np.random.default_rng(5)
     for _ in range(3):
@@ -186,7 +186,7 @@ def test_the_program_of_moved_throws_has_the_gas_of_the_exact_model(quantity, tm
     star = Candidate((0.0, math.pi, math.pi, 0.0), (1, 3, 4, 2))
     own = replace(phasing.realise(star), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout(None, None), star, phasing.intervals)
-    joint = SmoothProgram(own, moves=moves)
+    joint = SmoothProgram(own, 100.0, moves=moves)
     value = ca.Function("f", [joint.program.x, joint.program.parameters], [joint.program.objective])
     generator = np.random.default_rng(6)
     for _ in range(2):

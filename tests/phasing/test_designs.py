@@ -8,7 +8,8 @@ import pytest
 from laufruhe.errors import InputError, SolverError
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.prove.certificate import Multipliers, Proof, lower_bound
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.prove.certificate import Multipliers, Proof, gap_of, lower_bound
 from laufruhe.solvers import solve
 from laufruhe.solvers.mixed_conic import solve_program
 from laufruhe.solvers.result import Status
@@ -44,13 +45,13 @@ def test_search_equals_solving_every_design(tmp_path, cylinders, name):
     choice = "most_shafts = 1" if name == "shafts" else ""
     problem = engines.problem(tmp_path, cylinders, phasing=choice, rest=CASES[name])
     model, stars = model_of(problem)
-    scale = objective_value(problem, evaluate(problem))
-    every = search_designs(model, stars, 10**9, 1e-4, floor=1e-3 * scale)
-    found = search_designs(model, stars, 1, 1e-4, floor=1e-3 * scale)
+    nothing = nothing_of(problem)
+    every = search_designs(model, stars, 10**9, 1e-4, nothing=nothing)
+    found = search_designs(model, stars, 1, 1e-4, nothing=nothing)
     assert len(every.solved) == every.designs
-    assert found.solved[0].value == pytest.approx(every.solved[0].value, rel=2e-4, abs=2e-7 * scale)
+    assert found.solved[0].value == pytest.approx(every.solved[0].value, rel=2e-4, abs=nothing)
     assert found.lower_bound <= every.solved[0].value * (1.0 + 1e-9)
-    assert found.solved[0].value - found.lower_bound <= 2e-4 * max(found.solved[0].value, 1e-3 * scale)
+    assert gap_of(found.solved[0].value, found.lower_bound, nothing) <= 2e-4
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,10 +15,29 @@ from numpy.typing import NDArray
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.norms import NORMS, Grid, Norm
 from laufruhe.problem.decision import Decision, Domain, domains_of
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.nothing import ROUNDING, nothing_of
 from laufruhe.problem.sets import Interval, Sector
-from laufruhe.prove.certificate import Multipliers, best_bound, kkt_residual, lower_bound
+from laufruhe.prove.certificate import Multipliers, Proof, Reach, best_bound, certified, kkt_residual, lower_bound
+from mounts.files import problem_of
 
 Array = NDArray[np.float64]
+SIX = """
+title = "six"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+stroke = "90 mm"
+rod_ratio = 0.27
+reciprocating_mass = "0.8 kg"
+cylinder_spacing = "100 mm"
+throws = [0, 120, 240, 240, 120, 0]
+[[operating_points]]
+speed = "3000 rpm"
+[objective]
+minimise = "rms shaking force"
+orders = [1, 2]
+"""
 SEEDS = st.integers(0, 2**32 - 1)
 EVERY = tuple(NORMS.values())
 
@@ -75,6 +95,26 @@ def random_multipliers(rng: np.random.Generator, problem: AffineProblem, x: Arra
         tuple(rows(norm) for _, norm in problem.terms),
         tuple(10.0 ** rng.uniform(-4, 2) * rows(norm) for _, norm in problem.limits),
     )
+
+
+class TestGap:
+    def test_is_a_share_of_the_value(self) -> None:
+        found = certified(2.0, 1.5, 1e-9, 1e-4, Reach.WHOLE, 0.0, "")
+        assert found.gap == pytest.approx(0.25)
+        assert found.kind is Proof.WITHIN_GAP
+
+    def test_what_is_nothing_beside_the_loads_counts_as_zero(self) -> None:
+        assert certified(1e-10, 0.0, 1e-9, 1e-4, Reach.ASIDE, 0.0, "").kind is Proof.GLOBAL
+        assert certified(0.0, 0.0, 0.0, 1e-4, Reach.ASIDE, 0.0, "").kind is Proof.GLOBAL
+        assert certified(1e-6, 0.0, 1e-9, 1e-4, Reach.ASIDE, 0.0, "").kind is Proof.LOCAL
+
+    def test_nothing_is_a_rounding_of_the_parts_and_not_of_the_sum(self, tmp_path: Path) -> None:
+        """A balanced six has the parts of a single cylinder six times; soft mounts have no resonance of their own."""
+        six = problem_of(tmp_path, SIX)
+        assert objective_value(six, evaluate(six)) < nothing_of(six)
+        single = problem_of(tmp_path, SIX.replace("[0, 120, 240, 240, 120, 0]", "[0]"))
+        parts = objective_value(single, evaluate(single))
+        assert nothing_of(six) == pytest.approx(6.0 * ROUNDING * parts, rel=1e-9)
 
 
 class TestBound:

@@ -82,6 +82,8 @@ class Channel:
         That a limit may have.
     minimised
         Whether it may be an objective.
+    size
+        Of what cancels in it where it is zero; zero where loads, masses or nothing do.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Channel:
     needs: Needs = Needs.NOTHING
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
+    size: float = 0.0
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
     is_mounting: ClassVar[bool] = False
@@ -221,7 +224,7 @@ DECOUPLING = MountChannel(
     values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
 )  # fmt: skip
 TORQUE_ROLL = MountChannel(
-    "torque-roll residual", "", ("frequency",),
+    "torque-roll residual", "", ("frequency",), size=1.0,
     values=_of_mounting(lambda mounting, m: mount_numbers.torque_roll_residual(mounting, m.frequency)),
 )  # fmt: skip
 TOTAL_STIFFNESS = MountChannel(

@@ -10,7 +10,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
 
@@ -67,9 +67,3 @@ def off_resonance(problem: Problem) -> Problem:
         else:
             return moved
     raise last
-
-
-def objective_size(problem: Problem) -> float:
-    """Size of what is minimised, for scales: that of the design as given if it has one; never zero."""
-    moved = off_resonance(problem)
-    return abs(objective_value(moved, evaluate(moved))) or 1.0

@@ -19,18 +19,25 @@ from laufruhe.load_models.affine import AffineNorm, AffineProblem
 
 Array = NDArray[np.float64]
 
-FLOOR = 1e-3
-"""Share of the objective as given beside which a gap is counted: a balanced engine has none of its own."""
+
+def gap_of(value: float, bound: float, nothing: float) -> float:
+    """Share of a value by which a bound lies under it, what counts as zero left out.
+
+    Gaps are counted here and nowhere else.
+    """
+    if not 0.0 < value < math.inf:
+        return value
+    return (value - bound) / value if value - bound > nothing else 0.0
+
 
 ROUNDING = 1e-12
 # rounds of levelling, and the share of a bound from which it is worth one
 LEVELLINGS, LEVEL = 2, 1e-6
 
 
-def gap_unit(value: float, given: float) -> float:
-    """What a gap of an objective is counted in, beside that of the design as given; never zero."""
-    # a design as given that stands on a resonance has no size
-    return max(value, FLOOR * given if math.isfinite(given) else 0.0) or 1.0
+def room_of(value: float, tolerance: float, nothing: float) -> float:
+    """By how much another design has to be better than one of this value: less is a gap within the tolerance."""
+    return tolerance * value + nothing
 
 
 class Proof(StrEnum):
@@ -55,14 +62,11 @@ NEAR = 0.05
 
 
 def certified(
-    value: float, bound: float, given: float, tolerance: float, reach: Reach, kkt_residual: float, method: str
+    value: float, bound: float, nothing: float, tolerance: float, reach: Reach, kkt_residual: float, method: str
 ) -> Certificate:
-    """The certificate of a value by a bound, for the design as given has `given`.
-
-    Gaps are counted here and nowhere else.
-    """
+    """The certificate of a value by a bound, where `nothing` counts as zero."""
     value, bound = float(value), float(min(max(bound, 0.0), value))
-    gap = (value - bound) / gap_unit(value, given)
+    gap = gap_of(value, bound, nothing)
     if gap <= tolerance:
         kind = Proof.GLOBAL
     elif reach is Reach.WHOLE or (reach is Reach.NEAR and gap <= NEAR):
@@ -83,8 +87,7 @@ class Certificate:
     lower_bound
         No design allowed has a smaller objective [SI].
     gap
-        Objective less lower bound, over the larger of the objective and a thousandth
-        of that of the design as given.
+        Objective less lower bound, over the objective; what loads that cancel leave as a rounding counts as zero.
     kkt_residual
         Largest violation of stationarity, feasibility and complementarity, each
         relative to its own scale.

@@ -14,6 +14,7 @@ from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
@@ -103,7 +104,13 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
     given = objective_value(problem, initial)
     met = design.excess <= KEPT
     certificate = certified(
-        design.value, shown.bound, given, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
+        design.value,
+        shown.bound,
+        nothing_of(problem, design.evaluation.engine),
+        problem.tolerance,
+        shown.reach,
+        shown.kkt_residual,
+        shown.method,
     )
     limits = limit_values(problem, design.evaluation, shown.prices, design.value)
     proven = certificate.kind is Proof.GLOBAL

@@ -13,13 +13,14 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.problem import channels
 from laufruhe.problem.decision import domains_of
-from laufruhe.problem.evaluation import Evaluation, objective_value
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Reach, gap_unit
+from laufruhe.prove.certificate import Reach, room_of
 from laufruhe.prove.subdivision import Divided, divided_bound, divides
 from laufruhe.prove.transmitted_bound import transmitted_bound
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Design, Shown, concluded, judged, none_within
@@ -37,6 +38,9 @@ WORTH_SAYING = 1.01
 MOST_MARGINS = 3
 ITERATIONS = 150
 MOST_AROUND = 3
+# share of the size that a search counted in from which it is done again in a smaller one, and how often
+SMALL = 1e-2
+MOST_SIZES = 3
 SPREAD = 0.4
 # of the throws that a search starts from, about their star [rad]
 NUDGE = 0.02
@@ -93,14 +97,24 @@ def _solved(
     """Result, and deviations of the throws."""
     started = time.perf_counter()
     initial = evaluate_start(problem)
-    points = start_points(problem)
+    points, size = start_points(problem)
     points = points if first is None else [first, *points[1:]]
-    joint = SmoothProgram(problem, moves=moves)
+    joint = SmoothProgram(problem, size, moves=moves)
     modelled = time.perf_counter()
     optima = _searched(problem, joint, points, workers)
     best, design = _first_allowed(joint, optima)
+    nothing = nothing_of(problem)
+    for _ in range(MOST_SIZES):
+        if best is None or design is None or design.value >= SMALL * size or size <= nothing:
+            break
+        # a search ends at a share of the size that it counts in: again, beside what was found
+        size = max(design.value, nothing)
+        joint = SmoothProgram(problem, size, moves=moves)
+        mounts, _ = joint.split(best.x)
+        optima = _searched(problem, joint, [(mounts, _columns(joint, best.x)), *points[1:]], workers)
+        best, design = _first_allowed(joint, optima)
     if design is not None and design.excess > FEASIBLE:
-        best, design = _tightened(problem, moves, best, design)
+        best, design = _tightened(problem, joint, best, design)
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
     if best is None or design is None:
         return _none(problem, joint, initial, optima, timing), np.zeros(0 if moves is None else moves.size)
@@ -126,11 +140,16 @@ def _searched(
         x = around[k % len(around)].x
         found = np.array(joint.split(x)[0])
         mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
-        columns = x[len(low) : len(low) + joint.columns]
-        again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
+        again.append(joint.start(np.clip(mounts, low, high).tolist(), _columns(joint, x), joint.turns(x)))
     more = solve_nonlinear(joint.program, again, workers, ITERATIONS)
     moved = [replace(optimum, start=optimum.start + len(points)) for optimum in more]
     return tuple(sorted((*optima, *moved), key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
+
+
+def _columns(joint: SmoothProgram, x: Array) -> Array:
+    """Of the unbalances, as the program has them."""
+    first = len(joint.problem.mount_decisions)
+    return x[first : first + joint.columns]
 
 
 def _nudged(joint: SmoothProgram, generator: np.random.Generator, k: int) -> Array:
@@ -170,7 +189,7 @@ def _first_allowed(joint: SmoothProgram, optima: Sequence[LocalOptimum]) -> tupl
 
 
 def _tightened(
-    problem: Problem, moves: ThrowMoves | None, best: LocalOptimum | None, design: Design
+    problem: Problem, loose: SmoothProgram, best: LocalOptimum | None, design: Design
 ) -> tuple[LocalOptimum | None, Design | None]:
     """Again with limits a little tighter: a peak between the samples breaks its limit by a little."""
     margin = 0.0
@@ -178,7 +197,7 @@ def _tightened(
         if best is None or design.excess <= FEASIBLE or design.excess > 0.05:
             break
         margin += 1.05 * design.excess
-        joint = SmoothProgram(problem, margin, moves)
+        joint = SmoothProgram(problem, loose.unit, margin, loose.moves)
         again = solve_nonlinear(joint.program, [best.x], workers=1)
         better, allowed = _first_allowed(joint, again)
         if better is None or allowed is None:
@@ -240,16 +259,17 @@ def _result(
     proven: tuple[Design, float] | None,
     timing: dict[str, float],
 ) -> Result:
-    scale = gap_unit(design.value, objective_value(problem, initial))
+    nothing = nothing_of(problem, design.evaluation.engine)
     # throws that move are not in the bound
     divided = Divided(_bound(problem) if joint.moves is None else 0.0, 0)
     if joint.moves is None and design.excess <= KEPT and divides(problem):
-        divided = divided_bound(problem, design.value, problem.tolerance * scale, divided.bound)
+        room = room_of(design.value, problem.tolerance, nothing)
+        divided = divided_bound(problem, design.value, room, divided.bound)
     shown = Shown(
         bound=divided.bound,
         reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
         kkt_residual=best.kkt_residual,
-        method=_method(optima, scale, proven, divided),
+        method=_method(optima, max(design.value, nothing), proven, divided),
         prices=[joint.price(limit.name, best.multipliers) for limit in problem.limits],
     )
     return concluded(design, initial, shown, timing)

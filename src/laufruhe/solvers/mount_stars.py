@@ -20,11 +20,12 @@ from laufruhe.load_models.star_model import StarModel
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.norms import RMS
 from laufruhe.problem import channels
-from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import FLOOR, Certificate, Proof, Reach, certified
+from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
 from laufruhe.solvers.conclusion import no_star, with_star
 from laufruhe.solvers.mount_nonlinear import solve_mounts, solve_moved
 from laufruhe.solvers.ranking import RankedStar, ranked_orders, ranked_star, ranking_result
@@ -109,8 +110,9 @@ def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> t
     """Stars of one geometry with their least objective on the mounts as given (S15)."""
     model = StarModel(phasing, family.space, family.geometry, family.fixed)
     given = model.problem
-    floor = FLOOR * objective_value(given, evaluate(given))
-    found = search_designs(model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, floor)
+    found = search_designs(
+        model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, nothing_of(given)
+    )
     stars: list[tuple[float, Star]] = [
         (s.value, (family.candidate(phasing, s.star, phasing.without(s.built)), s.star)) for s in found.solved
     ]
@@ -190,12 +192,14 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
     whole = len(found) == designs and not phasing.continuous
     ranking = [_entry(phasing, each, whole and each is best) for each in found if not _rank(each)[0]]
     details = ranking_result(phasing, best.candidate, ranking, designs, len(found), _method(found, designs))
-    certificate = _certificate(found, whole, details.method, objective_value(problem, given), problem.tolerance)
+    certificate = _certificate(
+        found, whole, details.method, nothing_of(problem, best.result.final.engine), problem.tolerance
+    )
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
 def _certificate(
-    found: list[StarDesign], whole: bool, method: str, given: float, tolerance: float
+    found: list[StarDesign], whole: bool, method: str, nothing: float, tolerance: float
 ) -> Certificate | None:  # fmt: skip
     """By the least of the bounds of all stars; by zero where some were left out."""
     own = [each.result.certificate for each in found]
@@ -205,7 +209,7 @@ def _certificate(
     bounds = [c.lower_bound for c in own if c is not None]
     bound = min(bounds) if whole and len(bounds) == len(own) else 0.0
     text = f"{method}; of the best: {best.method}"
-    return certified(found[0].value, bound, given, tolerance, Reach.ASIDE, best.kkt_residual, text)
+    return certified(found[0].value, bound, nothing, tolerance, Reach.ASIDE, best.kkt_residual, text)
 
 
 def _method(found: list[StarDesign], designs: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
-from laufruhe.problem.mount_resonance import evaluate_start, objective_size, off_resonance
+from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.nonlinear import spread_starts
@@ -35,11 +36,12 @@ def _balanced(problem: Problem) -> list[complex] | None:
     return unbalances_of(problem, result) if result.decisions else None
 
 
-def start_points(problem: Problem) -> list[tuple[list[float], Array]]:
-    """Mounts and columns of unbalances that a search starts from.
+def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], float]:
+    """Mounts and columns of unbalances that a search starts from, and a size of the objective.
 
     The design as given, then points spread over all bounds: stiffness by ratio,
-    unbalances in their sets.
+    unbalances in their sets. The size is the least of all that were looked at, so that no
+    start on a flank of a resonance hides what is small beside it; never zero.
     """
     domains, balanced, search = domains_of(problem.unbalances), _balanced(problem), problem.search
     decisions = problem.mount_decisions
@@ -60,17 +62,21 @@ def start_points(problem: Problem) -> list[tuple[list[float], Array]]:
     found = [] if initial.resonance else [(given.tolist(), best)]
     spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
     spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
-    for k, row in enumerate(_promising(problem, initial, spread, len(low), search.starts - len(found))):
+    rows, size = _promising(problem, initial, spread, len(low), search.starts - len(found))
+    for k, row in enumerate(rows):
         mounts = row[: len(low)]
         own = row[len(low) :].copy()
         for domain in domains:
             own[domain.columns] = domain.project(own)
         found.append((mounts.tolist(), own if k % 2 else best))
-    return found
+    return found, size
 
 
-def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, wanted: int) -> Array:
-    """Points of the pool that break limits on mounts least and are worth most; a third taken as they come."""
+def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, wanted: int) -> tuple[Array, float]:
+    """Points of the pool that break limits on mounts least and are worth most; a third taken as they come.
+
+    With them the least objective of the pool and of the design as given.
+    """
     given = replace(initial, samples=POOL_SAMPLES, resonance="")
     misses, values = np.full(len(pool), np.inf), np.full(len(pool), np.inf)
     for k, row in enumerate(pool):
@@ -80,10 +86,14 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, w
             continue
         misses[k] = sum(max(design.standing(limit).excess, 0.0) for limit in problem.mount_limits)
         values[k] = objective_value(problem, design)
-    best = np.argsort(misses + values / objective_size(problem), kind="stable")
+    known = values[np.isfinite(values)]
+    middle = float(np.median(known)) if len(known) else 0.0
+    best = np.argsort(misses + values / (middle or 1.0), kind="stable")
     chosen = list(best[: wanted - wanted // 3])
     chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
-    return pool[chosen]
+    given_value = math.inf if initial.resonance else objective_value(problem, initial)
+    least = min((float(v) for v in (*known, given_value) if 0.0 < v < math.inf), default=1.0)
+    return pool[chosen], least
 
 
 def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> Array:

@@ -9,10 +9,10 @@ from dataclasses import replace
 
 from laufruhe.errors import SolverError
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import FLOOR, Reach, certified, gap_unit
+from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.solvers.conclusion import no_star, with_star
 from laufruhe.solvers.ranking import ORDERS_LISTED, ranked_orders, ranked_star, ranking_result
 from laufruhe.solvers.result import Result, Status
@@ -87,10 +87,10 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     solved, complete = _solved(problem, phasing, designs)
     if not solved:
         return no_star(problem, "no firing order and no set of shafts that may be built keeps the limits")
-    initial = objective_value(problem, evaluate(problem))
+    nothing = nothing_of(problem)
     best = solved[0]
     for design in solved[1:]:
-        if design.value < best.value - _share(problem) * gap_unit(best.value, initial):
+        if design.value < best.value - room_of(best.value, _share(problem), nothing):
             best = design
     bound = min(design.bound for design in solved) if complete else 0.0
     entry = ranked_star(phasing, best.candidate, None, best.value, bound, complete)
@@ -100,7 +100,7 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     method = f"{len(told)} of {len(orders)} firing order(s), {len(sets)} set(s) of shafts looked at"
     proof = best.result.certificate
     how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
-    certificate = certified(best.value, bound, initial, problem.tolerance, Reach.WHOLE, residual, how)
+    certificate = certified(best.value, bound, nothing, problem.tolerance, Reach.WHOLE, residual, how)
     details = ranking_result(phasing, best.candidate, [entry], len(orders) * len(sets), len(solved), method)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
@@ -137,7 +137,7 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     value = result.objective.value if result.objective else best.value
     # a star's own tolerance, and that by which another has to be better
     certificate = certified(
-        value, answer.bound, objective_value(problem, evaluate(problem)), 2.0 * problem.tolerance, Reach.WHOLE,
+        value, answer.bound, nothing_of(problem), 2.0 * problem.tolerance, Reach.WHOLE,
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in fired[1:])]
@@ -153,11 +153,11 @@ def _needed(problem: Problem, phasing: Phasing, best: Decided) -> tuple[int, ...
         return kept
     model = StarModel(phasing, best.family.space, best.family.geometry, best.family.fixed)
     owners = owners_of(model)
-    floor = FLOOR * objective_value(problem, evaluate(problem))
+    nothing = nothing_of(problem)
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
         fewer = tuple(j for j in kept if j != k)
-        again = solve_design(model, best.steps, fewer, owners, problem.tolerance, floor)
-        if again is not None and again[0].value <= best.value + problem.tolerance * max(best.value, floor):
+        again = solve_design(model, best.steps, fewer, owners, problem.tolerance, nothing)
+        if again is not None and again[0].value <= best.value + room_of(best.value, problem.tolerance, nothing):
             kept = fewer
     return kept
 

@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 from laufruhe.machine import Role, Rotor
 from laufruhe.problem.channels import ADDED_MASS
 from laufruhe.problem.decision import Decision, Kind, RotorDrive
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Set, Value
-from laufruhe.prove.certificate import Reach, gap_unit
+from laufruhe.prove.certificate import Reach, gap_of
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged, none_within
 from laufruhe.solvers.mount_starts import unbalances_of
 from laufruhe.solvers.result import Result, Status
@@ -94,12 +95,11 @@ def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) 
     """
     started = time.perf_counter()
     search, initial = _Search(problem), evaluate(problem)
-    best, bound, boxes = _divided(search, objective_value(problem, initial), say)
+    best, bound, boxes = _divided(search, nothing_of(problem), say)
     timing = {"solve": time.perf_counter() - started}
     if best is None:
         return none_within(problem, initial, search.conflict, timing)
-    own, design = best.result, best.design
-    certificate = own.certificate if own is not None else None
+    own, design, certificate = best.result, best.design, best.result.certificate if best.result else None
     shown = Shown(
         bound=min(bound, design.value),
         reach=Reach.WHOLE,
@@ -110,7 +110,7 @@ def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) 
     return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
 
 
-def _divided(search: _Search, given: float, say: Callable[[str], None]) -> tuple[_Found | None, float, int]:
+def _divided(search: _Search, nothing: float, say: Callable[[str], None]) -> tuple[_Found | None, float, int]:
     """Divide the boxes until their least bound meets the best design, or as often as is worth it.
 
     Returns
@@ -124,7 +124,7 @@ def _divided(search: _Search, given: float, say: Callable[[str], None]) -> tuple
         return None, np.inf, seen
     heap, best = [(root.bound, next(number), root)], search.better(None, root.middle)
     while heap and seen < most:
-        gap = (best.value - heap[0][0]) / gap_unit(best.design.value, given)
+        gap = gap_of(best.value, heap[0][0], nothing)
         # a box that left nothing out has no better design, only a bound as near as its program came
         if gap <= NEARLY * problem.tolerance or (gap < np.inf and heap[0][2].spread.max() <= EXACT):
             break

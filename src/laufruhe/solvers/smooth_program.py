@@ -39,7 +39,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import motion_indices, mounting_in
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.problem.mount_resonance import objective_size, off_resonance
+from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.gathered import Gathered
 from laufruhe.solvers.nonlinear import NonlinearProgram
@@ -62,12 +62,12 @@ class SmoothProgram:
     ----------
     problem
         With one star and one firing order.
+    unit
+        Size of the objective.
     margin
         Share by which limits on largest values are tightened, for they are kept at samples.
     moves
         Throws that may leave the star of the problem; none when left out.
-    unit
-        Size of the objective; that of the design as given when left out.
     slack
         Share by which all limits are tightened.
     softest
@@ -75,7 +75,7 @@ class SmoothProgram:
     """
 
     def __init__(
-        self, problem: Problem, margin: float = 0.0, moves: ThrowMoves | None = None, unit: float | None = None,
+        self, problem: Problem, unit: float, margin: float = 0.0, moves: ThrowMoves | None = None,
         slack: float = 0.0, softest: float = SOFTEST,
     ) -> None:  # fmt: skip
         self.problem, self._margin, self._slack, self.moves = problem, margin, slack, moves
@@ -96,7 +96,7 @@ class SmoothProgram:
             limit.measure.channel in (channels.FREQUENCIES, channels.DECOUPLING) for limit in problem.limits
         )
         self._vectors, self._squares = ca.MX.sym("V", 36 * self._modal), ca.MX.sym("l", 6 * self._modal)
-        self._unit = objective_size(problem) if unit is None else unit
+        self.unit = unit
         self._points: list[PointResponse] = []
         if problem.asks_mounts:
             self._mounting = mounting_in(problem.engine)
@@ -140,7 +140,7 @@ class SmoothProgram:
             constraint_upper=np.array(self._held.upper),
             constraint_names=tuple(self._held.names),
             scales=self._scales(lower, upper),
-            objective_scale=self._unit,
+            objective_scale=self.unit,
             parameters=self._e,
             stages=tuple((share,) for share in (*SOFTNESS, self._softest)),
             expand=True,
@@ -195,7 +195,7 @@ class SmoothProgram:
         if measure.is_mounting:
             return self._mount_number(measure)
         rows, grid = self._rows(measure)
-        return measure.norm.least(self._held.named(measure.name), grid, rows, self._unit, self._e)
+        return measure.norm.least(self._held.named(measure.name), grid, rows, self.unit, self._e)
 
     def _limit(self, limit: Limit) -> None:
         measure = limit.measure
@@ -204,7 +204,7 @@ class SmoothProgram:
             return
         tight = 1.0 - self._slack - self._margin * (measure.norm.refinement > 1)
         rows, grid = self._rows(measure)
-        unit = limit.maximum * tight or self._unit
+        unit = limit.maximum * tight or self.unit
         held = self._held.named(limit.name)
         value, most, slope = measure.norm.limited(held, grid, rows / unit, limit.maximum * tight / unit, self._softest)
         self._held.add(value, -np.inf, most, limit.name, slope / unit)

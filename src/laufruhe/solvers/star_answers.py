@@ -11,10 +11,10 @@ import numpy as np
 from laufruhe.errors import SolverError
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import FLOOR
+from laufruhe.prove.certificate import gap_of
 from laufruhe.solvers.star_cuts import CutsFound, owners_of, search_designs, solve_design
 from laufruhe.solvers.star_families import Family
 from laufruhe.solvers.star_search import StarsFound, enumerate_stars, search_stars
@@ -96,12 +96,12 @@ def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     """Everything else is decided by cone programs: cuts where the stars can be listed, else the program."""
     if phasing.method is Method.PROGRAM or sum(family.size for family in families) > MOST_LISTED:
         return _by_program(problem, phasing, families)
-    floor = FLOOR * objective_value(problem, evaluate(problem))
+    nothing = nothing_of(problem)
     count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
     answers = []
     for family in families:
         model = StarModel(phasing, family.space, family.geometry, family.fixed)
-        found = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, floor)
+        found = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, nothing)
         designs = tuple(
             _decided(
                 phasing,
@@ -116,22 +116,20 @@ def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         )
         method = f"cone programs of {len(found.solved)} of {found.designs} designs, dual cuts for the others"
         # what is proven of the best does not need the whole ranking
-        closed = found.complete or _is_closed(found, problem.tolerance, floor)
+        closed = found.complete or _is_closed(found, problem.tolerance, nothing)
         answers.append(Answer(designs, found.lower_bound, closed, len(found.solved), method, found.infeasible))
     return _joined(answers, phasing.best)
 
 
-def _is_closed(found: CutsFound, tolerance: float, floor: float) -> bool:
-    return bool(found.solved) and found.solved[0].value - found.lower_bound <= tolerance * max(
-        found.solved[0].value, floor
-    )
+def _is_closed(found: CutsFound, tolerance: float, nothing: float) -> bool:
+    return bool(found.solved) and gap_of(found.solved[0].value, found.lower_bound, nothing) <= tolerance
 
 
 def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
     """The mixed-integer program by SCIP, its design solved again and bounded by the exact model."""
     from laufruhe.solvers.mixed_conic import solve_program
 
-    floor = FLOOR * objective_value(problem, evaluate(problem))
+    nothing = nothing_of(problem)
     answers = []
     for family in families:
         simple = _amplitudes(phasing, family) is not None
@@ -144,12 +142,12 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         if program.star is None:
             answers.append(Answer((), math.inf, program.status == "infeasible", 0, "SCIP"))
             continue
-        again = solve_design(model, program.star, program.built, owners, problem.tolerance, floor)
+        again = solve_design(model, program.star, program.built, owners, problem.tolerance, nothing)
         if again is None:
             raise SolverError("the design that SCIP returned breaks a limit between the angles it was solved at")
         found, cut = again
         bound = max(program.bound if exact else 0.0, cut.least(space))
-        done = program.status == "optimal" and found.value - bound <= 2.0 * problem.tolerance * max(found.value, floor)
+        done = program.status == "optimal" and gap_of(found.value, bound, nothing) <= 2.0 * problem.tolerance
         method = f"mixed-integer cone program (SCIP: {program.status}) at {samples} angles, design solved again"
         design = _decided(phasing, family, found.star, found.built, found.value, found.bound, done)
         answers.append(Answer((design,), bound, done, 1, method))

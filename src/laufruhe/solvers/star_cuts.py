@@ -20,7 +20,7 @@ from laufruhe.physics.crank_stars import Array, Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import ShaftChoice
-from laufruhe.prove.certificate import Multipliers, best_bound
+from laufruhe.prove.certificate import Multipliers, best_bound, gap_of, room_of
 from laufruhe.prove.star_cut import Cut, cut_of
 from laufruhe.solvers.conic import solve_cones
 
@@ -114,7 +114,7 @@ def search_designs(
     count: int,
     tolerance: float,
     time_limit: float = float("inf"),
-    floor: float = 0.0,
+    nothing: float = 0.0,
 ) -> CutsFound:
     """The best `count` designs of stars and shafts, proven (S15).
 
@@ -130,11 +130,11 @@ def search_designs(
         Relative gap at which a value counts as met by a bound.
     time_limit
         [s].
-    floor
-        Value beside which a gap is relative when the best is smaller [SI].
+    nothing
+        Value that counts as zero [SI].
     """
     started = time.perf_counter()
-    search = _Search(model, stars, tolerance, floor)
+    search = _Search(model, stars, tolerance, nothing)
     complete = True
     while (place := search.nearest(count)) is not None:
         if time.perf_counter() - started > time_limit:
@@ -151,8 +151,8 @@ def search_designs(
 class _Search:
     """Bounds of every star and set of shafts, and what has been solved of them."""
 
-    def __init__(self, model: StarModel, stars: Stars, tolerance: float, floor: float) -> None:
-        self._model, self._stars, self._tolerance, self._floor = model, stars, tolerance, floor
+    def __init__(self, model: StarModel, stars: Stars, tolerance: float, nothing: float) -> None:
+        self._model, self._stars, self._tolerance, self._nothing = model, stars, tolerance, nothing
         self._owners = owners_of(model)
         self._sets = allowed_sets(model.phasing.shafts, model.domains, self._owners)
         self.bounds = np.zeros((len(stars), len(self._sets)))
@@ -172,13 +172,13 @@ class _Search:
         values = distinct_values(self._model.space, self.solved)
         target = values[count - 1] if len(values) >= count else float("inf")
         row, column = divmod(int(np.argmin(np.where(self._open, self.bounds, np.inf))), len(self._sets))
-        met = self.bounds[row, column] >= target - self._tolerance * max(target, self._floor)
+        met = self.bounds[row, column] >= target - room_of(target, self._tolerance, self._nothing)
         return None if met else (row, column)
 
     def solve(self, row: int, column: int) -> None:
         """One design, and what it proves of all others."""
         star, built = tuple(int(p) for p in self._stars[row]), self._sets[column]
-        answer = solve_design(self._model, star, built, self._owners, self._tolerance, self._floor)
+        answer = solve_design(self._model, star, built, self._owners, self._tolerance, self._nothing)
         self._open[row, column] = False
         if answer is None:
             self.infeasible += 1
@@ -213,7 +213,7 @@ def solve_design(
     built: tuple[int, ...],
     owners: Sequence[int],
     tolerance: float,
-    floor: float = 0.0,
+    nothing: float = 0.0,
 ) -> tuple[Solved, Cut] | None:
     """The optimum of one star with one set of shafts, and what it proves of all others; None if there is none."""
     full = model.samples
@@ -233,7 +233,7 @@ def solve_design(
         met = judged.excess(solution.x) <= FEASIBLE
         found = Solved(star, built, value, bound.value, _spread(solution.x, whole, kept))
         best = (found, bound.multipliers)
-        if met and value - bound.value <= 0.25 * tolerance * max(value, floor):
+        if met and gap_of(value, bound.value, nothing) <= 0.25 * tolerance:
             break
     if best is None:
         return None

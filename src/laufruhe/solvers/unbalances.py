@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
-from laufruhe.problem.evaluation import BETWEEN, evaluate, objective_value
+from laufruhe.problem.evaluation import BETWEEN, evaluate
+from laufruhe.problem.nothing import ROUNDING, nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_unit, kkt_residual
+from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
 from laufruhe.solvers.conic import lightest, solve_cones
 from laufruhe.solvers.result import Result
@@ -38,6 +39,8 @@ class _Optimum:
         Rows at the angles that its limits are judged at.
     excess
         Largest relative excess over a limit, sought between the angles too.
+    nothing
+        Objective that counts as zero.
     """
 
     x: Array
@@ -47,6 +50,7 @@ class _Optimum:
     gap: float
     excess: float
     samples: int
+    nothing: float
 
 
 def solve_unbalances(problem: Problem) -> Result:
@@ -66,7 +70,7 @@ def solve_unbalances(problem: Problem) -> Result:
     broken = broken_limits(problem.mount_limits, initial)
     if broken:
         return none_within(problem, initial, broken, {"model": modelled - started})
-    optimum, samples = _refine(problem, model, objective_value(problem, initial))
+    optimum, samples = _refine(problem, model, nothing_of(problem))
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
@@ -79,11 +83,12 @@ def solve_unbalances(problem: Problem) -> Result:
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     design = judged(problem, values, cycle_samples)
     initial = replace(initial, samples=cycle_samples)
-    shown = _shown(optimum, gap_unit(design.value, objective_value(problem, initial)))
-    return concluded(design, initial, shown, {**timing, "evaluate": time.perf_counter() - solved})
+    return concluded(
+        design, initial, _shown(optimum, design.value), {**timing, "evaluate": time.perf_counter() - solved}
+    )
 
 
-def _refine(problem: Problem, model: AffineModel, initial: float) -> tuple[_Optimum | None, int]:
+def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[_Optimum | None, int]:
     """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6).
 
     Returns
@@ -92,7 +97,7 @@ def _refine(problem: Problem, model: AffineModel, initial: float) -> tuple[_Opti
     """
     samples, best = model.full_samples, None
     for _ in range(MOST_DOUBLINGS + 1):
-        found = _allowed(problem, model, samples, initial)
+        found = _allowed(problem, model, samples, nothing)
         if found is None:
             # fewer angles ask for less: what they cannot meet, all cannot
             return best if best is not None and best.excess <= KEPT else None, samples
@@ -106,23 +111,23 @@ def _refine(problem: Problem, model: AffineModel, initial: float) -> tuple[_Opti
     return best, samples
 
 
-def _allowed(problem: Problem, model: AffineModel, samples: int, initial: float) -> _Optimum | None:
+def _allowed(problem: Problem, model: AffineModel, samples: int, nothing: float) -> _Optimum | None:
     """An optimum at `samples` angles that keeps its limits between them too.
 
     A peak between the angles breaks its limit by a little; the next attempt asks for
     that little less at the angles.
     """
-    found = _attempt(problem, model, samples, initial, 0.0)
+    found = _attempt(problem, model, samples, nothing, 0.0)
     margin = 0.0
     for _ in range(MOST_MARGINS):
         if found is None or found.excess <= FEASIBLE:
             break
         margin += 1.05 * found.excess
-        found = _attempt(problem, model, samples, initial, margin) or found
+        found = _attempt(problem, model, samples, nothing, margin) or found
     return found
 
 
-def _attempt(problem: Problem, model: AffineModel, samples: int, initial: float, margin: float) -> _Optimum | None:
+def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float, margin: float) -> _Optimum | None:
     coarse, fine = model.at(samples), model.at(2 * samples)
     solution = solve_cones(_tightened(coarse, margin))
     if solution.x is None:
@@ -132,8 +137,7 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, initial: float,
     # peaks where the result will be measured
     judge = model.at(BETWEEN * fine.samples) if _has_peaks(problem) else fine
     value = judge.objective(x)
-    gap = (value - bound.value) / gap_unit(value, initial)
-    return _Optimum(x, bound, fine, judge, max(gap, 0.0), judge.excess(x), samples)
+    return _Optimum(x, bound, fine, judge, gap_of(value, bound.value, nothing), judge.excess(x), samples, nothing)
 
 
 def _has_peaks(problem: Problem) -> bool:
@@ -227,8 +231,9 @@ def _triangle(slope: Array) -> Array:
     return triangle / (float(np.abs(triangle).max()) or 1.0)
 
 
-def _shown(optimum: _Optimum, unit: float) -> Shown:
+def _shown(optimum: _Optimum, value: float) -> Shown:
     bound = optimum.bound
+    unit = value if value > optimum.nothing else optimum.nothing / ROUNDING
     return Shown(
         bound=bound.value,
         reach=Reach.WHOLE,

@@ -21,9 +21,10 @@ from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.machine.firing import firing_turns, intervals_of
 from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, bounded_stars
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import Reach, certified, gap_unit
+from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.uneven_bound import steady_bound, uneven_bound
 from laufruhe.solvers.conclusion import FEASIBLE, no_star, with_star
 from laufruhe.solvers.mount_starts import columns_of, unbalances_of
@@ -38,8 +39,8 @@ Array = NDArray[np.float64]
 
 STARTS = 6
 ORDERS_WITH_GAS = 2
-# share of the objective as given that is a rounding
-NOTHING = 1e-12
+# share of the objective as given that a search counts in at least
+LEAST_UNIT = 1e-3
 # share that keeps a design that stands on a limit from breaking it by a rounding
 SOFT_LIMIT = 1e-7
 SOFTEST = 1e-6
@@ -84,7 +85,7 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> S
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, intervals)
     if not moves.size or _is_nothing(best):
         return best
-    smooth = SmoothProgram(problem, moves=moves, unit=_size(problem, best), slack=SOFT_LIMIT, softest=SOFTEST)
+    smooth = SmoothProgram(problem, _size(problem, best), moves=moves, slack=SOFT_LIMIT, softest=SOFTEST)
     for optimum in solve_nonlinear(smooth.program, _points(smooth, best), workers=1, max_seconds=30.0):
         if not optimum.usable:
             continue
@@ -101,14 +102,14 @@ def _is_nothing(best: StarDesign | None) -> bool:
     """Whether there is nothing to gain: no norm lies under zero."""
     if best is None or best.result.objective is None:
         return False
-    return best.value <= NOTHING * best.result.objective.initial
+    return best.value <= nothing_of(best.result.problem, best.result.final.engine)
 
 
 def _size(problem: Problem, best: StarDesign | None) -> float:
     """What the objective is measured in: its value in the design as given, never far below it."""
     if best is None or best.result.objective is None:
         return objective_value(problem, evaluate(problem)) or 1.0
-    return gap_unit(best.value, best.result.objective.initial)
+    return max(best.value, LEAST_UNIT * best.result.objective.initial) or 1.0
 
 
 def _points(smooth: SmoothProgram, best: StarDesign | None) -> list[Array]:
@@ -256,11 +257,12 @@ def _result(
     problem: Problem, phasing: Phasing, even: Result | None, found: Sequence[StarDesign], trade: tuple[TradePoint, ...]
 ) -> Result:
     best = found[0]
-    initial = objective_value(problem, even.initial if even is not None else evaluate(problem))
     bound, source = _bound(problem, phasing, phasing.intervals)
     method = f"IPOPT from {len(found)} start(s), firing orders kept; bound from {source}"
     # no norm lies under zero: who reaches it is done
-    certificate = certified(best.value, bound, initial, problem.tolerance, Reach.ASIDE, best.kkt_residual, method)
+    certificate = certified(
+        best.value, bound, nothing_of(problem), problem.tolerance, Reach.ASIDE, best.kkt_residual, method
+    )
     ranking = [
         ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)
         for d in found
