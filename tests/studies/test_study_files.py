@@ -57,6 +57,8 @@ value = "mean['given']"
 is = 1
 within = "5 %"
 """.replace("tractor-single.toml", str(PROBLEMS / "tractor-single.toml"))
+BY_PLACE = "counterweights.1.balance_factor"
+MANY = "from = 0\nto = 1\npoints = 100000"
 LONGER = case("T", str(FOUR), 'set = { "engine.stroke" = "100 mm" }')
 BAD = [
     (study("counterweight fracton"), "did you mean 'counterweight fraction'?"),
@@ -99,7 +101,25 @@ BAD = [
     (REPLICA.replace('problem = "one"', 'problem = "two"'), "does not exist"),
     (REPLICA.replace('problem = "one"', 'problem = "one", sweep = { m = { from = 1 } }'), "is no grid; give values"),
     (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "cubic"')), "use one of: linear, log"),
+    (study(sweep=swept(FRACTION, f"values = [0, 1{400 * '0'}]")), "is not finite"),
+    (study(sweep=swept(FRACTION, "from = -1e308\nto = 1e308\npoints = 3")), "is too far from the other end"),
+    (study(sweep=swept(FRACTION, f"from = 0\nto = 1{400 * '0'}\npoints = 3")), "is not finite"),
+    (study(sweep=swept("title", "values = [1, 2]")), "title = 1: must be text"),
+    (study(sweep=swept("engine", 'values = ["a", "b"]')), "engine = \"a\""),
+    (study(sweep=swept("engine.throws.9", "values = [0, 1]")), "engine.throws.9: is no quantity of this scene"),
+    (study(sweep=swept("operating_points..speed", "values = [0, 1]")), "is no quantity of this scene"),
     (study(sweep=2 * swept(FRACTION, "values = [0, 1]")), "is swept twice"),
+    (study(sweep=swept(FRACTION, "values = [0, 1]") + swept(BY_PLACE, "values = [0, 1]")), "is swept twice"),
+    (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{BY_PLACE}" = 0.5 }}', "is swept, and set by"),
+    (study(sweep=swept(FRACTION, MANY) + swept(SPEED, 'from = "6 m/s"\nto = "7 m/s"\npoints = 100000')),
+     "makes 10000000000 points; a study takes 100000"),
+    (study("layout comparison", sweep=swept(FRACTION, MANY)) + case("b", "x.toml"), "makes 200000 points"),
+    (study(sweep=swept(FRACTION, MANY)) + study(sweep=swept(FRACTION, MANY)).partition("[study]")[2].replace('"p"', '"q"'),
+     "make 200000 points"),
+    (study("balancer sizing", swept("gas.imep", 'from = "5 bar"\nto = "6 bar"\npoints = 40000'),
+           "tractor-four-lanchester-and-moment"), "makes 160000 points"),
+    (REPLICA.replace('problem = "one"', f'problem = "one", sweep = {{ m = {{ {MANY.replace(chr(10), ", ")} }}, '
+     'k = { values = [1, 2] } }'), "makes 200000 points"),
     (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{FRACTION}" = 0.5 }}', "is swept, and set by"),
     (study(sweep=swept("engine.rod_ration", "values = [0.2, 0.3]")), "did you mean 'rod_ratio'?"),
     (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "is no quantity of this scene"),

@@ -20,7 +20,7 @@ def at(tables: dict[str, Any], where: str) -> Any:
         If the scene has no such quantity.
     """
     here: Any = tables
-    for key in _keys(tables, where):
+    for key in keys_of(tables, where):
         here = here[key]
     return here
 
@@ -33,7 +33,7 @@ def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
     Refused
         If the scene has no such quantity.
     """
-    keys = _keys(tables, where)
+    keys = keys_of(tables, where)
     whole = here = dict(tables)
     for key in keys[:-1]:
         here[key] = here[key].copy()
@@ -48,8 +48,14 @@ def joined(tables: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     return {**tables, **own, **within}
 
 
-def _keys(tables: dict[str, Any], where: str) -> list[Any]:
-    """The keys and places that a path goes through."""
+def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
+    """The keys and places that a path goes through.
+
+    Raises
+    ------
+    Refused
+        If the scene has no such quantity.
+    """
     here: Any = tables
     keys = []
     parts = where.split(".")
@@ -60,7 +66,7 @@ def _keys(tables: dict[str, Any], where: str) -> list[Any]:
             raise Refused(".".join(parts[: k + 1]), None, "is no quantity of this scene", remedy)
         keys.append(options[part])
         here = here[options[part]]
-    return keys
+    return tuple(keys)
 
 
 def _options(here: Any) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -92,7 +93,10 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
             raise Refused("from", sweep.first, "is not above zero, so it has no logarithm", 'leave spacing = "log" out')
         numbers = np.geomspace(low, high, sweep.points)
     else:
-        numbers = np.linspace(low, high, sweep.points)
+        with np.errstate(all="ignore"):
+            numbers = np.linspace(low, high, sweep.points)
+    if not np.isfinite(numbers).all():
+        raise Refused("to", sweep.last, "is too far from the other end", "narrow the sweep")
     texts = [f"{number:.{_DIGITS}g}" for number in numbers]
     if not isinstance(sweep.first, str) or (unit == "1" and not _is_limit(sweep.quantity)):
         return tuple(float(text) for text in texts)
@@ -109,9 +113,11 @@ def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, .
 def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str, tuple[float, ...] | None]:
     """Unit of the first value, and all values in it; no numbers where they are labels."""
     field = field_at(quantity)
-    if any(isinstance(value, float) and not math.isfinite(value) for value in values):
+    bare = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+    # a whole number may be beyond all floats
+    plain = [float(value) if abs(value) <= sys.float_info.max else math.inf for value in bare]
+    if not all(map(math.isfinite, plain)):
         raise Refused(given, list(values), "is not finite", "give numbers")
-    plain = [float(value) for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
     texts = [value for value in values if isinstance(value, str)]
     wanted = field.unit if field is not None else _limited_unit(quantity, texts)
     if wanted is None or len(plain) + len(texts) < len(values):
@@ -128,8 +134,8 @@ def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str
 
 def _is_limit(quantity: str) -> bool:
     """Whether a path is that of a side of a limit, whose dimension is told by its text alone."""
-    first, *_, last = quantity.split(".")
-    return first == "constraints" and last in _SIDES
+    parts = quantity.split(".")
+    return parts[0] == "constraints" and parts[-1] in _SIDES
 
 
 def _limited_unit(quantity: str, texts: Sequence[str]) -> str | None:

@@ -33,6 +33,10 @@ class Part(Table):
         """What is asked of every point: all but words, cases, and what is swept."""
         return self.model_dump(exclude={"name", "title", "source", "cases", "sweep"})
 
+    def size(self) -> int:
+        """How many points it makes at least, counted before any is made."""
+        return len(self.cases)
+
     def points(self, scenes: Scenes) -> list[Point]:
         """The pieces of work. What is wrong with the part is refused here, before any is done."""
         raise NotImplementedError

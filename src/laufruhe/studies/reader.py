@@ -15,7 +15,7 @@ from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
 from laufruhe.files.reader import tables_of
 from laufruhe.files.study_paths import joined
-from laufruhe.files.study_sweeps import axis_of
+from laufruhe.files.study_sweeps import MOST_POINTS, axis_of
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.part import Part
 from laufruhe.studies.swept import SweptPart
@@ -88,24 +88,23 @@ def load_study(path: Path) -> StudyFile:
             raise _refused(path, f"{where}.cases", "", "has two cases of one name", "give each its own")
         if isinstance(part, SweptPart):
             _check_sweeps(part, path, where)
+        if part.size() > MOST_POINTS:
+            raise _refused(path, where, "", f"makes {part.size()} points; a study takes {MOST_POINTS}", "ask for fewer")
+    whole = sum(part.size() for part in file.study.parts)
+    if whole > MOST_POINTS:
+        rule = f"make {whole} points; a study takes {MOST_POINTS}"
+        raise _refused(path, "study.parts", "", rule, "make two studies of them")
     return file
 
 
 def _check_sweeps(part: SweptPart, path: Path, where: str) -> None:
-    paths = [sweep.quantity for sweep in part.sweep]
     for k, sweep in enumerate(part.sweep):
-        at = f"{where}.sweep[{k + 1}]"
-        if paths.count(sweep.quantity) > 1:
-            raise _refused(path, f"{at}.quantity", sweep.quantity, "is swept twice", "sweep it once")
-        for j, case in enumerate(part.cases):
-            if sweep.quantity in case.set:
-                rule = f"is swept, and set by cases[{j + 1}] too"
-                raise _refused(path, f"{at}.quantity", sweep.quantity, rule, "leave out one of the two")
         try:
             axis_of(sweep)
         except Refused as refused:
             found = refused.complaint
-            raise _refused(path, f"{at}.{found.where}", found.value, found.rule, found.remedy) from None
+            at = f"{where}.sweep[{k + 1}].{found.where}"
+            raise _refused(path, at, found.value, found.rule, found.remedy) from None
 
 
 def _refused(path: Path, where: str, value: str, rule: str, remedy: str) -> InputError:

@@ -56,18 +56,16 @@ class Scenes:
         InputError
             If the problem file has no such table or quantity.
         """
-        path, case = self.folder / point.case.problem, point.case
+        case = point.case
         tables = dict(self.file(case.problem) if point.base is None else point.base)
         for name in case.without:
             if name not in tables:
                 rule = "is left out by the study and is not there"
                 raise self.refused(case, name, rule, nearest(name, list(tables)))
             del tables[name]
-        try:
+        with self.named(case):
             for where, value in {**case.set, **point.changes}.items():
                 tables = changed(tables, where, value)
-        except Refused as refused:
-            raise InputError(str(path), (refused.complaint,)) from None
         if point.metric is not None:
             tables["objective"] = {"minimise": point.metric}
         return tables
@@ -97,6 +95,14 @@ class Scenes:
             return problem
         with self.blamed(point, "equal_power_to"):
             return at_equal_power(problem, reference)
+
+    @contextmanager
+    def named(self, case: CaseTable) -> Iterator[None]:
+        """What is refused in the scene of a case is led by the name of its problem file."""
+        try:
+            yield
+        except Refused as refused:
+            raise InputError(str(self.folder / case.problem), (refused.complaint,)) from None
 
     @contextmanager
     def blamed(self, point: Point, where: str = "point") -> Iterator[None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +11,8 @@ import xarray as xr
 from pydantic import Field
 
 from laufruhe.files.asked import QuantityName
-from laufruhe.files.study_parts import SweepTable
+from laufruhe.files.study_parts import CaseTable, SweepTable
+from laufruhe.files.study_paths import keys_of
 from laufruhe.files.study_sweeps import Axis, axis_of
 from laufruhe.problem import channels
 from laufruhe.problem.problem import Problem
@@ -26,6 +28,10 @@ class SweptPart(Part):
 
     metric: QuantityName | None = Field(default=None, description="In place of the objective of the problem files.")
     sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
+
+    def size(self) -> int:
+        """Every case at every combination."""
+        return len(self.cases) * math.prod(len(axis.values) for axis in self.axes())
 
     def axes(self) -> list[Axis]:
         """What is swept."""
@@ -61,12 +67,13 @@ class SweptPart(Part):
         Raises
         ------
         InputError
-            If a scene cannot be made, or the cases' metrics are of different dimensions.
+            If a scene cannot be made, a number is told twice, or the cases' metrics are of different dimensions.
         """
         axes = self.axes()
         first = {axis.quantity: axis.values[0] for axis in axes}
         found = []
         for case in self.cases:
+            self._check_apart(case, scenes)
             found.append(scenes.problem(Point(case, first, self.metric)))
             for axis in axes:
                 scenes.problem(Point(case, {**first, axis.quantity: axis.values[-1]}, self.metric))
@@ -80,6 +87,19 @@ class SweptPart(Part):
             rule = f"minimises in {said[0]} in '{first_case.name}' and in {said[1]} in '{second_case.name}'"
             raise scenes.refused(self.cases[0], "objective", rule, "give the part one metric")
         return found
+
+    def _check_apart(self, case: CaseTable, scenes: Scenes) -> None:
+        """Whether every number is told once, however its path is written."""
+        tables, told = scenes.tables(Point(case)), {}
+        for path in case.set:
+            told[keys_of(tables, path)] = f"is swept, and set by '{case.name}' too"
+        for sweep in self.sweep:
+            with scenes.named(case):
+                keys = keys_of(tables, sweep.quantity)
+            for other, rule in told.items():
+                if keys[: len(other)] == other[: len(keys)]:
+                    raise scenes.refused(case, sweep.quantity, rule, "leave out one of the two")
+            told[keys] = "is swept twice"
 
     def check_moved_by_loads(self, problems: Sequence[Problem], scenes: Scenes, what: str) -> None:
         """Whether balancing can change what is minimised: sag and stiffness know no loads.

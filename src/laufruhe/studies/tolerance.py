@@ -100,17 +100,17 @@ def random_forces(engine: Engine, speed: float, tolerances: Tolerances, builds: 
     random = np.random.default_rng(seed)
     unit = _unit_forces(engine, speed)
     samples = unit.shape[1]
-    masses = random.uniform(-1.0, 1.0, (builds, len(unit))) * tolerances.reciprocating_mass
-    rotating = tolerances.unbalances(random, builds).sum(axis=1) * speed**2
     crank = np.exp(2j * np.pi * engine.cycle.turns * np.arange(samples) / samples)
-    peaks = np.empty(builds)
+    peaks = []
     # in pieces: all engines at once would take gigabytes
     for start in range(0, builds, PIECE):
-        piece = slice(start, start + PIECE)
-        moved = np.tensordot(masses[piece], unit, axes=1)
-        zeta = rotating[piece, None] * crank
-        peaks[piece] = np.hypot(moved[..., 0] + zeta.imag, moved[..., 1] + zeta.real).max(axis=1)
-    return peaks
+        count = min(PIECE, builds - start)
+        masses = random.uniform(-1.0, 1.0, (count, len(unit))) * tolerances.reciprocating_mass
+        rotating = tolerances.unbalances(random, count).sum(axis=1) * speed**2
+        moved = np.tensordot(masses, unit, axes=1)
+        zeta = rotating[:, None] * crank
+        peaks.append(np.hypot(moved[..., 0] + zeta.imag, moved[..., 1] + zeta.real).max(axis=1))
+    return np.concatenate(peaks)
 
 
 def built(engine: Engine, tolerances: Tolerances, random: np.random.Generator) -> Engine:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from laufruhe.files.study_sweeps import MOST_POINTS
 from laufruhe.problem.measure import Measure, counted_rotors
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.outcome import solved
@@ -55,6 +56,10 @@ class BalancerSizing(SweptPart):
             if len(groups) > MOST_GROUPS:
                 rule = f"makes {len(groups)} independent shafts, {2 ** len(groups)} sets of them"
                 raise scenes.refused(case, "balancer_shafts", rule, f"study {MOST_GROUPS} or fewer")
+            count = 2 ** len(groups) * self.size()
+            if count > MOST_POINTS:
+                rule = f"makes {count} points; a study takes {MOST_POINTS}"
+                raise scenes.refused(case, "balancer_shafts", rule, "ask for fewer")
             sets = [chosen for k in range(len(groups) + 1) for chosen in itertools.combinations(groups, k)]
             for changes in self.combinations():
                 points += [Point(case, changes, self.metric, tuple(itertools.chain(*chosen))) for chosen in sets]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -89,6 +90,10 @@ class Replication(Part):
     def settings(self) -> dict[str, Any]:
         """What is asked of every case; numbers and problems stand in the scenes."""
         return {"kind": self.kind, "quantities": {k: str(what) for k, what in self.quantities.items()}}
+
+    def size(self) -> int:
+        """Every case at every combination of its swept numbers."""
+        return sum(math.prod(len(g.values or ()) or g.points or 1 for g in c.sweep.values()) for c in self.cases)
 
     @property
     def ends(self) -> tuple[str, ...]:

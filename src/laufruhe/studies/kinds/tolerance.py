@@ -34,7 +34,7 @@ class TolerancesTable(Table):
     planes: Annotated[int, Field(ge=1, le=48)] = 2
     alignment: f.NonNegativeLength = Field(default=0.0, description="Eccentricity of each aligned mass.")
     aligned_masses: list[f.Mass] = Field(
-        default_factory=list, description="Flywheel, clutch and whatever else is centred on the crank."
+        default_factory=list, max_length=48, description="Flywheel, clutch and whatever else is centred on the crank."
     )
 
     @model_validator(mode="after")
