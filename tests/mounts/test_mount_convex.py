@@ -149,4 +149,5 @@ def test_a_solver_that_lies_is_found_out(tmp_path, monkeypatch):
     assert result.certificate.kind is not Proof.GLOBAL
     assert result.status is Status.FEASIBLE
     monkeypatch.setattr(mount_convex, "solve_cones", lambda program: (1.1 * honest(program)[0], honest(program)[1]))
-    assert solve_convex_mounts(problem).status is Status.FAILED
+    # what breaks a limit is not taken: the design as given is left
+    assert solve_convex_mounts(problem).objective.value == result.objective.initial

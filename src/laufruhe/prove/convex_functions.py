@@ -16,13 +16,16 @@ objective that holds whatever a solver says.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+FELT = 1e-6
+"""Share of the limits by which they have to miss each other to be a contradiction."""
 
 
 class ConvexFunction(Protocol):
@@ -171,6 +174,12 @@ class ConvexDuals:
     prices: tuple[float, ...]
     limits: tuple[Array | None, ...]
 
+    @classmethod
+    def none(cls, program: ConvexProgram) -> ConvexDuals:
+        """Nothing proposed: the best linear functions at a design itself, and no price."""
+        limits = len(program.limits)
+        return cls((None,) * len(program.terms), (0.0,) * limits, (None,) * limits)
+
 
 def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[float, Array]:
     """Least objective that these duals leave possible, and the gradient of the bound's function (E16-E19)."""
@@ -183,3 +192,10 @@ def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[fl
         constant, gradient = constant + price * (c - limit.maximum), gradient + price * g
     least = np.minimum(gradient * program.lower, gradient * program.upper)
     return constant + float(least.sum()), gradient
+
+
+def excludes(program: ConvexProgram, x: Array, duals: ConvexDuals) -> bool:
+    """Whether these duals of the limits show that no stiffness in the box keeps all of them."""
+    proof, _ = dual_bound(replace(program, terms=()), x, replace(duals, terms=()))
+    whole = sum(price * abs(limit.maximum) for limit, price in zip(program.limits, duals.prices, strict=True))
+    return proof > FELT * whole

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 # designs count as allowed when they break a limit by less
-SLACK = 3e-5
+SLACK = 1e-6
 # open numbers that are divided without being asked for, and what all boxes may cost together
 MOST_OPEN = 4
 WORK = 4e6
@@ -62,7 +62,7 @@ def divides(problem: Problem) -> bool:
     return bool(problem.decisions) and stiffness and known
 
 
-def divided_bound(problem: Problem, value: float, room: float, floor: float = 0.0) -> Divided:
+def divided_bound(problem: Problem, value: float, room: float) -> Divided:
     """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
 
     Parameters
@@ -73,17 +73,15 @@ def divided_bound(problem: Problem, value: float, room: float, floor: float = 0.
         Objective of the best design known.
     room
         Difference that counts as none [SI].
-    floor
-        A bound that is known already.
     """
     search = _Search(problem, LEFT_OUT * room)
     most = search.most_boxes
     if not most or not search.is_sampled_fully:
-        return Divided(floor, 0)
+        return Divided(0.0, 0)
     enough = value - NEARLY * room
     lower, upper = search.model.lower, search.model.upper
     bounds, sides = search.bounds(lower[None], upper[None])
-    heap = [(max(float(bounds[0]), floor), 0, lower, upper, int(sides[0]))]
+    heap = [(float(bounds[0]), 0, lower, upper, int(sides[0]))]
     seen = 1
     while heap and heap[0][0] < enough and seen < most:
         halves: list[tuple[Array, Array, float]] = []
@@ -99,7 +97,7 @@ def divided_bound(problem: Problem, value: float, room: float, floor: float = 0.
             seen += 1
             if max(known, float(bound)) < enough:
                 heapq.heappush(heap, (max(known, float(bound)), seen, low, high, int(side)))
-    return Divided(max(min(heap[0][0] if heap else enough, enough), floor), seen)
+    return Divided(min(heap[0][0] if heap else enough, enough), seen)
 
 
 class _Search:

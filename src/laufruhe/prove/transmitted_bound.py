@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 # designs are taken as feasible when they break a limit by less
-SLACK = 3e-5
+SLACK = 1e-6
 ROUNDS = 2
 # share of a square that is spent on the arms of mounts whose places are open
 STRETCH = 0.2

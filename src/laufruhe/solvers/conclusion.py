@@ -98,6 +98,21 @@ def judged(problem: Problem, values: Sequence[Value], samples: int | None = None
     return Design(problem, tuple(values), evaluation, value, evaluation.excess(problem.limits))
 
 
+def given_design(problem: Problem, initial: Evaluation) -> Design | None:
+    """The design as given; None where it has no loads."""
+    if initial.resonance:
+        return None
+    value = objective_value(problem, initial)
+    return Design(problem, problem.start, initial, value, initial.excess(problem.limits))
+
+
+def better(design: Design, other: Design | None) -> Design:
+    """Of two designs the one that breaks limits least, then the one with less."""
+    if other is None:
+        return design
+    return min((design, other), key=lambda each: (max(each.excess, KEPT), each.value))
+
+
 def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[str, float]) -> Result:
     """The result of a design."""
     problem = design.problem

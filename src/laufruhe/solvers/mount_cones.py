@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import cvxpy as cp
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import SolverError
 from laufruhe.prove.convex_functions import (
     Compliance,
     ConvexDuals,
@@ -18,83 +19,108 @@ from laufruhe.prove.convex_functions import (
     Eigenvalue,
     Linear,
     Residual,
+    excludes,
 )
+from laufruhe.solvers.conic import ATTEMPTS
 
 Array = NDArray[np.float64]
 
-_TIGHT = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
-
 
 def solve_cones(program: ConvexProgram) -> tuple[Array, ConvexDuals] | None:
-    """Stiffnesses and duals that Clarabel proposes; None where the limits cannot be met together.
+    """Stiffnesses and duals that Clarabel proposes; None where duals prove that the limits cannot be met together.
 
-    Raises
-    ------
-    SolverError
-        If the solver stops without telling optimal from infeasible.
+    Where it stops without an answer it is asked again with other settings, and then how near the limits
+    can be met: that has an answer always, which is a design or the proof that there is none. The middle of
+    the box is all that is left to propose where the solver loses its numbers there too.
     """
-    scale = np.maximum(np.abs(program.lower), np.abs(program.upper))
-    scale = np.where(scale > 0.0, scale, 1.0)
-    middle = 0.5 * (program.lower + program.upper)
-    unit = float(np.trace(program.matrices.at(middle))) / 6.0 or 1.0
-    y = cp.Variable(len(scale))
-    slopes = (program.matrices.slopes * scale[:, None, None] / unit).reshape(len(scale), 36)
-    matrix = cp.reshape(slopes.T @ y, (6, 6), order="C") + program.matrices.base / unit
-    matrix = 0.5 * (matrix + matrix.T)
-    size = max((abs(term.value(middle)) for _, term in program.terms), default=1.0)
-    size = size if np.isfinite(size) and size > 0.0 else 1.0
-    held: list[Any] = [y >= program.lower / scale, y <= program.upper / scale]
-    tops, cones = [], []
-    for weight, term in program.terms:
-        top, cone = _over(term, y, scale, matrix, unit, held)
-        tops.append(weight * top / size)
-        cones.append(cone)
-    limits = [_limited(each.function, each.maximum, y, scale, matrix, unit, held) for each in program.limits]
-    least = cp.Problem(cp.Minimize(sum(tops) if tops else 0), held)
-    with warnings.catch_warnings():
-        # an inaccurate answer is judged by its certificate, not by a warning
-        warnings.simplefilter("ignore")
-        try:
-            least.solve(solver=cp.CLARABEL, **_TIGHT)
-        except cp.error.SolverError as error:
-            raise SolverError(f"the cone solver gave up ({error})") from None
-    if least.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
-        return None
-    if y.value is None:
-        raise SolverError(f"the cone solver stopped with status '{least.status}'")
-    x = np.clip(np.asarray(y.value) * scale, program.lower, program.upper)
-    duals = [_dual(constraint, factor, size) for constraint, factor in limits]
-    vectors = tuple(_vector(cone) for cone in cones)
-    return x, ConvexDuals(vectors, tuple(price for price, _ in duals), tuple(dual for _, dual in duals))
+    stated = _Stated(program)
+    if stated.solve():
+        return stated.x, stated.duals
+    nearest = _Stated(replace(program, terms=()), relaxed=True)
+    if not nearest.solve():
+        return 0.5 * (program.lower + program.upper), ConvexDuals.none(program)
+    return None if excludes(program, nearest.x, nearest.duals) else (nearest.x, ConvexDuals.none(program))
 
 
-def _over(function: ConvexFunction, y: Any, scale: Array, matrix: Any, unit: float, held: list[Any]) -> tuple[Any, Any]:
-    """An expression that is the function at the optimum, and the cone whose dual proves it."""
-    if isinstance(function, Linear):
-        return function.constant + (function.gradient * scale) @ y, None
-    if isinstance(function, Compliance):
-        return (function.factor / unit) * cp.matrix_frac(function.load, matrix), None
-    if isinstance(function, Residual):
-        top = cp.Variable()
-        cone = cp.SOC(top, (unit / function.square) * (matrix @ function.along) - function.along)
-        held.append(cone)
-        return top, cone
-    raise TypeError(f"{type(function).__name__} is limited, not minimised")
+class _Stated:
+    """A program in cvxpy, everything of size one.
 
+    Parameters
+    ----------
+    relaxed
+        Whether the limits may be missed by a share that is to be least.
+    """
 
-def _limited(
-    function: ConvexFunction, maximum: float, y: Any, scale: Array, matrix: Any, unit: float, held: list[Any]
-) -> tuple[Any, float]:
-    """The constraint, and what its dual is to be multiplied by."""
-    if isinstance(function, Eigenvalue):
-        constraint = (maximum / unit) * np.eye(6) - function.sign * matrix >> 0
-        factor = 1.0 / unit
-    else:
+    def __init__(self, program: ConvexProgram, relaxed: bool = False) -> None:
+        self.program, self._relaxed = program, relaxed
+        lower, upper = program.lower, program.upper
+        scale = np.maximum(np.abs(lower), np.abs(upper))
+        self.scale = np.where(scale > 0.0, scale, 1.0)
+        middle = 0.5 * (lower + upper)
+        self.unit = float(np.trace(program.matrices.at(middle))) / 6.0 or 1.0
+        self.y = cp.Variable(len(lower))
+        slopes = (program.matrices.slopes * self.scale[:, None, None] / self.unit).reshape(len(lower), 36)
+        matrix = cp.reshape(slopes.T @ self.y, (6, 6), order="C") + program.matrices.base / self.unit
+        self.matrix = 0.5 * (matrix + matrix.T)
+        size = max((abs(term.value(middle)) for _, term in program.terms), default=1.0)
+        self.size = size if np.isfinite(size) and size > 0.0 else 1.0
+        self.held: list[Any] = [self.y >= lower / self.scale, self.y <= upper / self.scale]
+        tops, self._cones = [], []
+        for weight, term in program.terms:
+            top, cone = self._over(term)
+            tops.append(weight * top / self.size)
+            self._cones.append(cone)
+        missed = cp.Variable(nonneg=True) if relaxed else 0.0
+        self._limits = [self._limited(each.function, each.maximum, missed) for each in program.limits]
+        self._least = cp.Problem(cp.Minimize(sum(tops) + missed if tops or relaxed else 0), self.held)
+
+    def solve(self) -> bool:
+        """Whether the solver stands by its answer."""
+        for settings in ATTEMPTS:
+            with warnings.catch_warnings():
+                # an inaccurate answer is judged by its certificate, not by a warning
+                warnings.simplefilter("ignore")
+                with suppress(cp.error.SolverError):
+                    self._least.solve(solver=cp.CLARABEL, **settings)
+            if self._least.status == cp.OPTIMAL:
+                return True
+        return False
+
+    @property
+    def x(self) -> Array:
+        """Stiffnesses, within their bounds."""
+        return np.asarray(np.clip(np.asarray(self.y.value) * self.scale, self.program.lower, self.program.upper))
+
+    @property
+    def duals(self) -> ConvexDuals:
+        """Of the solution, in the units of the program."""
+        found = [_dual(constraint, factor, self.size) for constraint, factor in self._limits]
+        vectors = tuple(_vector(cone) for cone in self._cones)
+        return ConvexDuals(vectors, tuple(price for price, _ in found), tuple(dual for _, dual in found))
+
+    def _over(self, function: ConvexFunction) -> tuple[Any, Any]:
+        """An expression that is the function at the optimum, and the cone whose dual proves it."""
+        if isinstance(function, Linear):
+            return function.constant + (function.gradient * self.scale) @ self.y, None
+        if isinstance(function, Compliance):
+            return (function.factor / self.unit) * cp.matrix_frac(function.load, self.matrix), None
+        if isinstance(function, Residual):
+            top = cp.Variable()
+            cone = cp.SOC(top, (self.unit / function.square) * (self.matrix @ function.along) - function.along)
+            self.held.append(cone)
+            return top, cone
+        raise TypeError(f"{type(function).__name__} is limited, not minimised")
+
+    def _limited(self, function: ConvexFunction, maximum: float, missed: Any) -> tuple[Any, float]:
+        """The constraint, and what its dual is to be multiplied by."""
         whole = abs(maximum) or 1.0
-        constraint = _over(function, y, scale, matrix, unit, held)[0] / whole <= maximum / whole
-        factor = 1.0 / whole
-    held.append(constraint)
-    return constraint, factor
+        if isinstance(function, Eigenvalue):
+            room = (maximum + missed * whole) / self.unit
+            constraint, factor = room * np.eye(6) - function.sign * self.matrix >> 0, 1.0 / self.unit
+        else:
+            constraint, factor = self._over(function)[0] / whole <= maximum / whole + missed, 1.0 / whole
+        self.held.append(constraint)
+        return constraint, factor
 
 
 def _dual(constraint: Any, factor: float, size: float) -> tuple[float, Array | None]:

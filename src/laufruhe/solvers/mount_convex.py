@@ -32,7 +32,7 @@ from laufruhe.prove.convex_functions import (
     Residual,
     dual_bound,
 )
-from laufruhe.solvers.conclusion import Shown, concluded, judged, none_within
+from laufruhe.solvers.conclusion import Shown, better, concluded, given_design, judged, none_within
 from laufruhe.solvers.mount_cones import solve_cones
 from laufruhe.solvers.result import Result
 
@@ -134,7 +134,7 @@ def solve_convex_mounts(problem: Problem) -> Result:
         prices=_prices(problem, program, duals),
         slopes={decision.name: gradient[k : k + 1] for k, decision in enumerate(problem.decisions)},
     )
-    design = judged(problem, [float(v) for v in x])
+    design = better(judged(problem, [float(v) for v in x]), given_design(problem, initial))
     return concluded(design, initial, shown, {**timing, "evaluate": time.perf_counter() - solved})
 
 

@@ -259,12 +259,13 @@ def _result(
     proven: tuple[Design, float] | None,
     timing: dict[str, float],
 ) -> Result:
-    nothing = nothing_of(problem, design.evaluation.engine)
-    # throws that move are not in the bound
-    divided = Divided(_bound(problem) if joint.moves is None else 0.0, 0)
+    nothing, divided = nothing_of(problem, design.evaluation.engine), Divided(0.0, 0)
+    room = room_of(design.value, problem.tolerance, nothing)
     if joint.moves is None and design.excess <= KEPT and divides(problem):
-        room = room_of(design.value, problem.tolerance, nothing)
-        divided = divided_bound(problem, design.value, room, divided.bound)
+        divided = divided_bound(problem, design.value, room)
+    # throws that move are not in the bound
+    if joint.moves is None and design.value - divided.bound > room:
+        divided = replace(divided, bound=max(divided.bound, _bound(problem)))
     shown = Shown(
         bound=divided.bound,
         reach=Reach.NEAR if divided.boxes else Reach.ASIDE,

@@ -22,9 +22,9 @@ from laufruhe.solvers.unbalances import solve_unbalances
 
 Array = NDArray[np.float64]
 
-# candidates for each start: their modes cost a thousandth of a search
+# starts at most for each open number, and candidates for each start: their modes cost a thousandth of a search
+STARTS = 4
 POOL = 40
-LEAST_POOL = 640
 POOL_SAMPLES = 72
 
 
@@ -45,6 +45,7 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     """
     domains, balanced, search = domains_of(problem.unbalances), _balanced(problem), problem.search
     decisions = problem.mount_decisions
+    starts = min(search.starts, STARTS * (len(decisions) + sum(domain.width for domain in domains)))
     ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
     low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
     given = np.array([d.start_number for d in decisions])
@@ -53,7 +54,7 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     spread = spread_starts(
         np.concatenate([low_log, -wide]),
         np.concatenate([high_log, wide]),
-        max(POOL * search.starts, LEAST_POOL),
+        POOL * (starts + 1),
         search.seed,
     )
     best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
@@ -62,7 +63,7 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     found = [] if initial.resonance else [(given.tolist(), best)]
     spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
     spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
-    rows, size = _promising(problem, initial, spread, len(low), search.starts - len(found))
+    rows, size = _promising(problem, initial, spread, len(low), starts - len(found))
     for k, row in enumerate(rows):
         mounts = row[: len(low)]
         own = row[len(low) :].copy()

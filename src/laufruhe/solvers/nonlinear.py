@@ -39,6 +39,8 @@ Array = NDArray[np.float64]
 
 _NEAR = 1e-6
 WORTH_EXPANDING = 3
+# seconds of work that pay for starting processes
+WORTH_PROCESSES = 4.0
 _QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False}
 _OPTIONS = {
     "print_level": 0,
@@ -228,7 +230,7 @@ def solve_nonlinear(
     starts
         Points, each of shape (n,); those outside the bounds are brought in.
     workers
-        Processes; as many as processors when left out, none for a single start.
+        Processes at most; as many as processors when left out, and none where the work is over sooner.
     max_iterations, max_seconds
         Of every start and stage.
 
@@ -237,10 +239,14 @@ def solve_nonlinear(
     SolverError
         If a process dies.
     """
-    task = _task(program, max_iterations, max_seconds)
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
-    count = min(len(points), workers if workers is not None else processors())
-    found = _run(task, points) if count <= 1 else apart("laufruhe.solvers.nonlinear", task, points, count)
+    task = _task(program, max_iterations, max_seconds, len(points) >= WORTH_EXPANDING)
+    # one start tells whether the others are worth processes of their own
+    began = time.perf_counter()
+    found, rest = _run(task, points[:1]), points[1:]
+    count = min(len(rest), workers if workers is not None else processors())
+    shared = count > 1 and (time.perf_counter() - began) * len(rest) > WORTH_PROCESSES
+    found += apart("laufruhe.solvers.nonlinear", task, rest, count) if shared else _run(task, rest)
     return tuple(sorted(found, key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
 
 
@@ -253,7 +259,7 @@ def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = 1e
     return tuple(kept)
 
 
-def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float) -> _Task:
+def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, many: bool) -> _Task:
     symbol = type(program.x)
     scales = program.variable_scales
     constraints = symbol(0, 1) if program.constraints is None else program.constraints
@@ -267,13 +273,15 @@ def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float) ->
     return _Task(
         oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower / heights,
         program.constraint_upper / heights, scales, program.objective_scale, heights, program.stages,
-        max_iterations, max_seconds, program.expand,
+        max_iterations, max_seconds, program.expand and many,
     )  # fmt: skip
 
 
 def _run(task: _Task, points: Sequence[tuple[int, Array]]) -> list[LocalOptimum]:
+    if not points:
+        return []
     oracle = ca.Function.deserialize(task.oracle)
-    if task.expand and len(points) >= WORTH_EXPANDING:
+    if task.expand:
         oracle = oracle.expand()
     limits = {"max_iter": task.max_iterations, "max_wall_time": task.max_seconds}
     options: dict[str, Any] = {**_QUIET, "ipopt": {**_OPTIONS, **limits}}
