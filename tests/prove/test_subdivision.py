@@ -179,11 +179,11 @@ def test_how_often_bounds_are_divided_may_be_said(tmp_path: Path) -> None:
     parts = (ENGINE, BLOCK, MOUNTS, "[objective]", ASKED["rms"])
     none, few = (problem_of(tmp_path, *parts, f"[search]\nboxes = {count}") for count in (0, 40))
     value = 1.17
-    assert divided_bound(none, value, 1e-4, 0.5).boxes == 0
-    assert divided_bound(none, value, 1e-4, 0.5).bound == 0.5
-    found = divided_bound(few, value, 1e-4, 0.5)
+    assert divided_bound(none, value, 1e-4).boxes == 0
+    assert divided_bound(none, value, 1e-4).bound == 0.0
+    found = divided_bound(few, value, 1e-4)
     assert 40 <= found.boxes < 40 + 2 * 64
-    assert 0.5 <= found.bound < 1.16
+    assert 0.0 <= found.bound < 1.16
     with pytest.raises(InputError, match=r"search\.boxes"):
         problem_of(tmp_path, *parts, "[search]\nboxes = -1")
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from laufruhe.numerics.norms import softened_lengths
+from laufruhe.solvers.mount_starts import spread_starts
 from laufruhe.solvers.nonlinear import (
     Ending,
     NonlinearProgram,
     distinct,
-    softened_lengths,
     solve_nonlinear,
-    spread_starts,
 )
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor
-from laufruhe.numerics.norms import Grid, Norm
+from laufruhe.numerics.norms import MEAN, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_rotor_loads
@@ -191,7 +191,7 @@ class AffineModel:
         whole cycle (P7).
         """
         problem = self.problem
-        terms = tuple((term.weight, self.norm(term.measure, samples, averaged)) for term in problem.load_terms)
+        terms = tuple((term.weight, self.norm(term.measure, samples, averaged)) for term in problem.objective)
         limits = tuple((limit.maximum, self.norm(limit.measure, samples, averaged)) for limit in problem.load_limits)
         return AffineProblem(terms, limits, self.domains, samples)
 
@@ -205,6 +205,10 @@ class AffineModel:
     def norm(self, measure: Measure, samples: int, averaged: bool = False) -> AffineNorm:
         """A measure at `samples` steps over the common period, a mean averaged about them where asked."""
         channel = measure.channel
+        if measure.is_mounting:
+            # a number of mounts that stay: the same for every design
+            only = Rows(MEAN, np.array([[self.bare.value(measure)]]), Grid(np.ones(1), 1))
+            return _stacked(only, [np.zeros((1, 1))] * len(self._changes), self._keep_all)
         if not isinstance(channel, LoadChannel):
             bare = mass_rows(measure, self.bare.engine.rotors)
             slopes = [mass_rows(measure, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]

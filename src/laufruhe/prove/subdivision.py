@@ -105,8 +105,12 @@ class _Search:
 
     def __init__(self, problem: Problem, left_out: float) -> None:
         self.problem = problem
-        self.model = BoxModel(problem, evaluate_start(problem))
-        terms = [term for term in problem.objective if term.measure.on_mounts]
+        evaluation = evaluate_start(problem)
+        self.model = BoxModel(problem, evaluation)
+        terms = [term for term in problem.load_terms if term.measure.on_mounts]
+        # loads of the block and masses are the same on all mounts
+        rest = [term for term in problem.load_terms if not term.measure.on_mounts]
+        self._constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         share = left_out / max(sum(term.weight for term in terms), 1e-300)
         self._terms = [(term.weight, term.measure, *_felt(self.model, term.measure, share)) for term in terms]
         self._limits = [
@@ -157,7 +161,7 @@ class _Search:
             total += weight * (under.value - under.rest - left_out)
             slopes += weight * under.slopes
             pull = np.maximum(pull, _pull(at))
-        found = _known(total - np.abs(slopes).sum(axis=1))
+        found = self._constant + _known(total - np.abs(slopes).sum(axis=1))
         for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
             if _is_ratio(asked):
                 ratio, pulled = self._ratio(asked, lower, upper)

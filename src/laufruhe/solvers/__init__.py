@@ -106,8 +106,8 @@ def _places(problem: Problem, say: Say) -> Result:
 
 def _asks_loads(problem: Problem) -> bool:
     """Whether nothing that is asked of the mounts depends on loads: it holds for every design, or for none."""
-    asked = [limit.measure.channel for limit in problem.mount_limits]
-    return not problem.mount_terms and not any(isinstance(c, MountChannel) and c.of_loads for c in asked)
+    asked = [measure.channel for measure in problem.measures]
+    return not any(isinstance(channel, MountChannel) and channel.of_loads for channel in asked)
 
 
 _U, _P, _K, _M, _S = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR

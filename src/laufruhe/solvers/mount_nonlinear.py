@@ -13,9 +13,9 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.problem import channels
 from laufruhe.problem.decision import domains_of
-from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
-from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
@@ -241,12 +241,24 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
 
 
 def _bound(problem: Problem) -> float:
-    """What no design goes under: by least transmitted forces (E34), or by the convex part alone; zero for neither."""
+    """What no design goes under: each kind of terms alone, for none is under zero.
+
+    Mount forces by what is transmitted at least (E34), numbers of the mounts by what of them is convex (E16-E19),
+    loads of the block and masses by the unbalances alone, whatever the mounts (P4).
+    """
+    found, parts = transmitted_bound(problem), []
+    block = tuple(term for term in problem.load_terms if not term.measure.on_mounts)
+    if block:
+        limits = tuple(limit for limit in problem.load_limits if not limit.measure.on_mounts)
+        alone = replace(off_resonance(problem).balance, objective=block, limits=limits)
+        if alone.decisions:
+            parts.append(solve_unbalances(alone))
+        else:
+            found += objective_value(alone, evaluate(alone))
     convex = _convex_part(problem)
-    if convex is None or convex.objective != problem.objective:
-        return transmitted_bound(problem)
-    certificate = solve_convex_mounts(convex).certificate
-    return certificate.lower_bound if certificate is not None else 0.0
+    if convex is not None and set(convex.objective) <= set(problem.objective):
+        parts.append(solve_convex_mounts(convex))
+    return found + sum(part.certificate.lower_bound for part in parts if part.certificate is not None)
 
 
 def _result(

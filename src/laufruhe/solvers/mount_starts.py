@@ -16,7 +16,6 @@ from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.nonlinear import spread_starts
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.unbalances import solve_unbalances
 
@@ -26,6 +25,13 @@ Array = NDArray[np.float64]
 STARTS = 4
 POOL = 40
 POOL_SAMPLES = 72
+
+
+def spread_starts(lower: Array, upper: Array, count: int, seed: int = 0) -> Array:
+    """Starts that divide the range of every variable evenly (a Latin hypercube), shape (count, n)."""
+    generator = np.random.default_rng(seed)
+    cells = np.array([generator.permutation(count) for _ in lower]).T.reshape(count, len(lower))
+    return lower + (cells + generator.random(cells.shape)) / count * (upper - lower)
 
 
 def _balanced(problem: Problem) -> list[complex] | None:

@@ -202,18 +202,6 @@ class _Task:
     expand: bool
 
 
-def softened_lengths(rows: Any, softness: Any) -> Any:
-    """|v|_e of each row of a CasADi matrix (k, d), shape (k, 1) (N3)."""
-    return ca.sqrt(ca.sum2(rows * rows) + softness * softness) - softness
-
-
-def spread_starts(lower: Array, upper: Array, count: int, seed: int = 0) -> Array:
-    """Starts that divide the range of every variable evenly (a Latin hypercube), shape (count, n)."""
-    generator = np.random.default_rng(seed)
-    cells = np.array([generator.permutation(count) for _ in lower]).T.reshape(count, len(lower))
-    return lower + (cells + generator.random(cells.shape)) / count * (upper - lower)
-
-
 def solve_nonlinear(
     program: NonlinearProgram,
     starts: Sequence[Array] | Array,

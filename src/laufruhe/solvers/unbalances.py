@@ -104,7 +104,7 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[_Opti
         best = found
         if _hopeless(problem, best):
             break
-        rows = len(best.problem.terms[0][1].grid.weights)
+        rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
         if (best.gap <= problem.tolerance and best.excess <= FEASIBLE) or rows > MOST_ROWS:
             break
         samples *= 2
