@@ -9,7 +9,8 @@ import pytest
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import SOONEST, Candidate, bounded_stars
 from laufruhe.solvers import solve
-from laufruhe.solvers.uneven import _turning_back, firing_intervals
+from laufruhe.solvers.result import Status
+from laufruhe.solvers.uneven_starts import firing_intervals, turning_back
 from phasing import engines
 
 OPEN = 'throws = "open"\nfiring_order = "open"'
@@ -31,7 +32,7 @@ def test_a_star_turned_back(tmp_path, layout):
     angles = (0.0, 4.1, 2.0) if vee else (0.0, 4.1, 2.0, 2.2, 4.3, 0.1)
     order = (1, 6, 3, 5, 2, 4) if vee else (1, 5, 3, 6, 2, 4)
     star = Candidate(tuple((first + angle) % math.tau for angle in angles), order, *geometry)
-    back = _turning_back(phasing, star)
+    back = turning_back(phasing, star)
 
     intervals, turned = firing_intervals(phasing, star), firing_intervals(phasing, back)
     assert min(intervals) > SOONEST
@@ -41,7 +42,7 @@ def test_a_star_turned_back(tmp_path, layout):
     values = [objective_value(problem, evaluate(problem)) for problem in problems]
     # the samples stand elsewhere in the cycle
     assert values[0] == pytest.approx(values[1], rel=1e-6)
-    twice = _turning_back(phasing, back)
+    twice = turning_back(phasing, back)
     assert twice.firing_order == order
     np.testing.assert_allclose(np.exp(1j * np.array(twice.throws)), np.exp(1j * np.array(star.throws)), atol=1e-12)
 
@@ -67,3 +68,41 @@ def test_a_throw_between_bounds_needs_nothing_beside_it(tmp_path):
     )
     assert result.objective.value <= objective_value(even, evaluate(even)) * (1.0 + 1e-6)
     assert min(result.final.engine.firing_intervals) > SOONEST
+
+
+def crooked_vee(folder, cylinders, bank, deviation, rest=engines.COUPLE, keys=""):
+    engine = f"{OPEN}\nbank_angle = {bank}\n{keys}"
+    allowed = f'intervals = {{ largest_deviation = "{deviation} deg" }}'
+    return solve(engines.problem(folder, cylinders, "four-stroke", engine, allowed, rest, "vee"))
+
+
+@pytest.mark.parametrize("deviation", [5, 10])
+def test_banks_that_no_even_star_fits_start_from_every_crank_that_fires(tmp_path, deviation):
+    """A V12 at 65 degrees: the star of an in-line six fires 55 and 65 degrees apart, and is balanced."""
+    result = crooked_vee(tmp_path, 12, 65, deviation)
+    assert result.objective.value == pytest.approx(0.0, abs=1e-6 * result.objective.initial)
+
+
+def test_more_freedom_is_never_worse(tmp_path):
+    """A V10 at 90 degrees fires 54 and 90 degrees apart at best."""
+    found = [crooked_vee(tmp_path, 10, 90, deviation).objective for deviation in (18, 20, 25)]
+    values = [objective.value for objective in found]
+    assert values == sorted(values, reverse=True)
+    assert values[0] < 0.2 * found[0].initial
+
+
+def test_intervals_that_no_crank_keeps_are_told_what_is_needed(tmp_path):
+    result = crooked_vee(tmp_path, 10, 90, 17)
+    assert result.status is Status.INFEASIBLE
+    assert "from 54 to 90 deg" in result.message
+    assert "multiple of 72 deg" in result.message
+
+
+def test_shafts_that_may_not_be_built_are_not(tmp_path):
+    rest = engines.shaft("against", -1) + engines.shaft("second", 2) + engines.COUPLE
+    text = 'intervals = { largest_deviation = "20 deg" }\nmost_shafts = 1'
+    engine = f"{OPEN}\nbank_angle = 65"
+    result = solve(
+        engines.problem(tmp_path, 4, "four-stroke", engine.replace("65", "100"), text.replace("20", "85"), rest, "vee")
+    )
+    assert sum(d.value for d in result.decisions if d.name.endswith("built")) <= 1

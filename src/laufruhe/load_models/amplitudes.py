@@ -48,9 +48,18 @@ class AmplitudeObjective:
 
     def values(self, space: StarSpace, stars: Stars) -> Array:
         """Of many stars, shape (n,)."""
-        sums = star_sums(stars, space.phases, space.places, self.orders)
+        return self._of_sums(star_sums(stars, space.phases, space.places, self.orders))
+
+    def of_angles(self, places: Sequence[float], throws: Array) -> Array:
+        """Of many cranks with throws at any angles [rad], shapes (n,) and (n, throws)."""
+        weights = np.stack([np.ones(len(places)), places], axis=-1)
+        waves = np.exp(1j * throws[:, None, :] * np.array(self.orders)[:, None])
+        return self._of_sums(waves @ weights)
+
+    def _of_sums(self, sums: NDArray[np.complex128]) -> Array:
+        """Of F_h and C_h, shape (n, orders, 2)."""
         squares = np.square(sums.real) + np.square(sums.imag)
-        out = np.zeros(len(stars))
+        out = np.zeros(len(sums))
         for term in self.terms:
             factors = np.stack([np.square(term.force), np.square(term.couple)], axis=-1)
             out += term.weight * np.sqrt(np.einsum("nhc,hc->n", squares, factors))

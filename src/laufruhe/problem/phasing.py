@@ -110,6 +110,11 @@ class ShaftChoice:
         every = (tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count))
         return tuple(built for built in every if self.allows(built))
 
+    @property
+    def largest(self) -> tuple[tuple[int, ...], ...]:
+        """Those of the allowed choices that nothing can be added to: a shaft that is built may carry nothing."""
+        return tuple(b for b in self.allowed if not any(set(b) < set(other) for other in self.allowed))
+
     def allows(self, built: Sequence[int]) -> bool:
         """Whether these sets keep the limits on number and mass."""
         number = sum(len(self.optional[k]) for k in built)

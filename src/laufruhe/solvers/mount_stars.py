@@ -34,7 +34,7 @@ from laufruhe.solvers.star_answers import MOST_LISTED
 from laufruhe.solvers.star_cuts import search_designs
 from laufruhe.solvers.star_design import StarDesign
 from laufruhe.solvers.star_families import Family, families_of
-from laufruhe.solvers.uneven import firing_intervals, starts_of
+from laufruhe.solvers.uneven_starts import firing_intervals, starts_of
 
 Say: TypeAlias = Callable[[str], None]
 

@@ -66,6 +66,8 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
         )
     answer = searched(problem, phasing, families)
     if not answer.designs:
+        if phasing.continuous:
+            return _uneven(problem, phasing, None)
         if answer.complete:
             return _none(problem, answer)
         why = f"no feasible design was found in phasing.time_limit = {phasing.time_limit:g} s; raise it"

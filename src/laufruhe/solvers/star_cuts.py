@@ -94,7 +94,7 @@ def allowed_sets(choice: ShaftChoice, domains: Sequence[Domain], owners: Sequenc
     """
     if any(own >= 0 and d.set.lower > 0.0 for d, own in zip(domains, owners, strict=True)):
         return choice.allowed
-    return tuple(b for b in choice.allowed if not any(set(b) < set(other) for other in choice.allowed))
+    return choice.largest
 
 
 def owners_of(model: StarModel) -> tuple[int, ...]:

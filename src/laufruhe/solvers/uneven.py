@@ -7,7 +7,6 @@ the even star it started from, because the exact model compares the two.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,36 +14,36 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import ModelError, SolverError
+from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.machine.firing import firing_turns, intervals_of
-from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Term
 from laufruhe.problem.nothing import nothing_of
-from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, bounded_stars
+from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.uneven_bound import steady_bound, uneven_bound
-from laufruhe.solvers.conclusion import FEASIBLE, no_star, with_star
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, no_star, with_star
 from laufruhe.solvers.mount_starts import columns_of, unbalances_of
 from laufruhe.solvers.nonlinear import solve_nonlinear
-from laufruhe.solvers.ranking import TradePoint, ranked_orders, ranked_star, ranking_result
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.ranking import TradePoint, ranked_star, ranking_result
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth_program import TURN, SmoothProgram
 from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.star_families import families_of
+from laufruhe.solvers.uneven_starts import firing_intervals, needed, starts_of
 
 Array = NDArray[np.float64]
 
 STARTS = 6
-ORDERS_WITH_GAS = 2
 # share of the objective as given that a search counts in at least
 LEAST_UNIT = 1e-3
 # share that keeps a design that stands on a limit from breaking it by a rounding
 SOFT_LIMIT = 1e-7
 SOFTEST = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
+TRADE_STARTS = 3
 
 
 def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
@@ -57,21 +56,58 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     even
         Result of the even stars, ranked; None where none exists or throws have bounds of
         their own.
-
-    Raises
-    ------
-    SolverError
-        If no start leads anywhere.
     """
     starts = starts_of(phasing, even, problem.feels_gas)
     if not starts:
-        return no_star(problem, "no star and firing order to start from keeps the firing intervals allowed")
-    found = [answer for start in starts[:STARTS] if (answer := local_optimum(phasing, start, phasing.intervals))]
+        return _no_crank(problem, phasing)
+    steps = TRADE_STEPS if even is not None and phasing.intervals.most < math.inf else (1.0,)
+    found: list[StarDesign] = []
+    trade = []
+    for share in steps:
+        allowed = _narrowed(phasing, share)
+        # what is best with less freedom is a start, so that more of it is never worse
+        own = [design.candidate for design in found[:1]] + starts[: STARTS if share == 1.0 else TRADE_STARTS]
+        answers = [answer for start in own if (answer := local_optimum(phasing, start, allowed)) is not None]
+        found = sorted(answers, key=lambda answer: answer.value)
+        if found and len(steps) > 1:
+            trade.append(_trade_point(problem, phasing, allowed, found[0]))
     if not found:
-        raise SolverError("no start of the nonlinear program ended at a design that keeps the limits")
-    found.sort(key=lambda answer: answer.value)
-    trade = _trade(problem, phasing, starts, found) if even is not None else ()
-    return _result(problem, phasing, even, found, trade)
+        return _none(problem, phasing)
+    return _result(problem, phasing, even, found, tuple(trade))
+
+
+def _narrowed(phasing: Phasing, share: float) -> Intervals:
+    """A share of the unevenness that is allowed."""
+    even, allowed = phasing.even_interval, phasing.intervals
+    return Intervals(even - share * (even - allowed.least), even + share * (allowed.most - even))
+
+
+def _trade_point(problem: Problem, phasing: Phasing, allowed: Intervals, best: StarDesign) -> TradePoint:
+    even = phasing.even_interval
+    deviation = max(abs(i - even) for i in firing_intervals(phasing, best.candidate))
+    freedom = max(even - allowed.least, allowed.most - even)
+    deviation = deviation if deviation > 1e-9 else 0.0
+    bound, _ = _bound(problem, phasing, allowed)
+    return TradePoint(freedom, deviation, best.value, best.candidate.throws, best.kkt_residual, bound)
+
+
+def _none(problem: Problem, phasing: Phasing) -> Result:
+    """No start led to a design: infeasible only where a bound of what is limited proves it."""
+    for limit in problem.load_limits:
+        alone = replace(problem, objective=(Term(limit.measure),))
+        if _bound(alone, phasing, phasing.intervals)[0] > limit.maximum * (1.0 + KEPT):
+            why = f"no crank keeps '{limit.name}', whatever else is decided"
+            return no_star(problem, why, conflict=(limit.name,))
+    names = " and ".join(f"'{limit.name}'" for limit in problem.limits) or "the bounds"
+    return no_star(problem, f"no crank was found that keeps {names}; relax them, or open more", Status.FAILED)
+
+
+def _no_crank(problem: Problem, phasing: Phasing) -> Result:
+    """No crank fires within the intervals, and what would."""
+    low, high = math.degrees(phasing.intervals.least), math.degrees(phasing.intervals.most)
+    why = f"no crank and firing order keeps the firing intervals allowed, {low:g} to {high:g} deg"
+    text, complete = needed(phasing) if phasing.throw_bounds is None else ("", False)
+    return no_star(problem, why + text, Status.INFEASIBLE if complete else Status.FAILED)
 
 
 def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> StarDesign | None:
@@ -135,81 +171,6 @@ def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: b
     return design if math.isfinite(design.value) and excess <= FEASIBLE else None
 
 
-def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...]:
-    """Crank angles from firing to firing of a design [rad]."""
-    turns = firing_turns(phasing.layout_of(candidate), candidate.throws, candidate.firing_order or ())
-    return intervals_of(phasing.cycle, turns)
-
-
-def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> list[Candidate]:
-    """Designs to start from: the ranked even stars, or throws within their own bounds.
-
-    Parameters
-    ----------
-    with_gas
-        Whether gas is felt: firing orders of one star then differ, and so does the star that
-        turns the other way, which inertia alone cannot tell from it.
-    """
-    optional = [name for names in phasing.shafts.optional for name in names]
-    if even is not None and even.phasing is not None:
-        candidates = [
-            Candidate(
-                s.throws, firing.order, s.bank_angle, s.split_pin, tuple(n for n in optional if n not in s.shafts)
-            )
-            for s in even.phasing.ranking
-            for firing in s.firing_orders[: ORDERS_WITH_GAS if with_gas else 1]
-        ]
-    else:
-        geometries = itertools.product(_ends(phasing.bank), _ends(phasing.split))
-        candidates = [candidate for geometry in geometries for candidate in _unranked(phasing, *geometry)]
-    if with_gas and phasing.throw_bounds is None and phasing.firing_order is None:
-        candidates = [image for candidate in candidates for image in (candidate, _turning_back(phasing, candidate))]
-    return candidates
-
-
-def _unranked(phasing: Phasing, bank: float | None, split: float | None) -> list[Candidate]:
-    """Throws within their bounds, or spread evenly, in firing orders that they can keep."""
-    layout = phasing.layout(bank, split)
-    if phasing.throw_bounds is None:
-        count = len(layout.throw_positions)
-        stars = [tuple(layout.banks[0] - layout.pin_offsets[0] + math.tau * k / count for k in range(count))]
-    else:
-        stars = bounded_stars(phasing, layout)
-    free = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
-    found = []
-    for throws in stars:
-        orders = ranked_orders(free, Candidate(throws, None, bank, split))
-        kept = [order for order in orders if min(order.intervals) > SOONEST]
-        # the orders whose intervals are nearest to those allowed
-        kept.sort(key=lambda order: _outside(phasing.intervals, order.intervals))
-        found += [Candidate(throws, order.order, bank, split) for order in kept[:2]]
-    return found
-
-
-def _turning_back(phasing: Phasing, candidate: Candidate) -> Candidate:
-    """The star of a crank that turns the other way: banks change sides, firings follow each other backwards."""
-    layout = phasing.layout_of(candidate)
-    number = {(pin, bank): k + 1 for k, (pin, bank) in enumerate(zip(layout.pins, layout.banks, strict=True))}
-    partners = [number[pin, -bank] for pin, bank in zip(layout.pins, layout.banks, strict=True)]
-    order = [partners[k - 1] for k in reversed(candidate.firing_order or ())]
-    first = order.index(1) if order else 0
-    throws = [-angle for angle in candidate.throws]
-    # cylinder 1 at its dead centre when phi = 0 (C5)
-    shift = angle_of(layout.own_turn(0)) - throws[layout.pins[0]]
-    turned = tuple((angle + shift) % math.tau for angle in throws)
-    return replace(candidate, throws=turned, firing_order=(*order[first:], *order[:first]) or None)
-
-
-def _outside(allowed: Intervals, intervals: Sequence[float]) -> float:
-    return round(sum(max(allowed.least - i, 0.0) + max(i - allowed.most, 0.0) for i in intervals), 9)
-
-
-def _ends(bounds: tuple[float, float] | None) -> list[float | None]:
-    if bounds is None:
-        return [None]
-    return [bounds[0]] if bounds[0] == bounds[1] else [bounds[0], 0.5 * (bounds[0] + bounds[1]), bounds[1]]
-
-
 def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[float, str]:
     """What no design with these intervals goes under, and where that is from (S22, S24)."""
     families = families_of(phasing)[0] if phasing.throw_bounds is None else ()
@@ -220,37 +181,6 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
         if objective is not None:
             return uneven_bound(phasing, families[0].space, objective, intervals), "windows around the even steps"
     return steady_bound(problem), "the steady part of the loads"
-
-
-def _trade(
-    problem: Problem, phasing: Phasing, starts: Sequence[Candidate], found: Sequence[StarDesign]
-) -> tuple[TradePoint, ...]:
-    """The least objective found for less and less unevenness; never worse for more of it."""
-    even = phasing.even_interval
-    allowed = max(even - phasing.intervals.least, phasing.intervals.most - even)
-    if not math.isfinite(allowed):
-        return ()
-    out: list[TradePoint] = []
-    for share in TRADE_STEPS:
-        low = even - share * (even - phasing.intervals.least)
-        high = even + share * (phasing.intervals.most - even)
-        answers = (
-            list(found)
-            if share == 1.0
-            else [answer for s in starts[:3] if (answer := local_optimum(phasing, s, Intervals(low, high))) is not None]
-        )
-        if not answers:
-            continue
-        best = min(answers, key=lambda answer: answer.value)
-        bound, _ = _bound(problem, phasing, Intervals(low, high))
-        if out and out[-1].value < best.value:
-            out.append(replace(out[-1], allowed=share * allowed, lower_bound=bound))
-            continue
-        intervals = firing_intervals(phasing, best.candidate)
-        deviation = max(abs(i - even) for i in intervals)
-        deviation = deviation if deviation > 1e-9 else 0.0
-        out.append(TradePoint(share * allowed, deviation, best.value, best.candidate.throws, best.kkt_residual, bound))
-    return tuple(out)
 
 
 def _result(

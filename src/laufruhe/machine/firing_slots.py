@@ -1,0 +1,230 @@
+"""Which firings of a cycle the cylinders of one throw may take when intervals are bounded (S25).
+
+Cylinders of one throw fire as far apart as their banks and pins stand, give or take whole turns, whatever
+the throw does. Firings are numbered from 0 to n - 1: a throw takes a set of them, all throws
+together take each once, and the moments of the firings are then a linear program.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+from scipy.optimize import linprog
+
+from laufruhe.machine.engine import Cycle
+
+Shape: TypeAlias = tuple[tuple[int, float, float], ...]
+Cover: TypeAlias = tuple[tuple[int, Shape], ...]
+
+_MOST_COVERS = 500
+_MOST_BROKEN = 40
+_MOST_LOOKED_AT = 20_000
+# of the unevenness allowed
+_SHARES = (0.25, 0.5, 0.75, 1.0)
+_SLACK = 1e-9
+# a broken interval counts this often as much as one that is merely uneven
+_BROKEN = 1e3
+
+
+@dataclass(frozen=True)
+class FiringPattern:
+    """Firings that throws share out between them.
+
+    Attributes
+    ----------
+    moments
+        Crank angle of every firing after the first [rad].
+    members
+        Of every throw the firings of its cylinders, in the order of the cylinders; the throw is any of them.
+    angle
+        Bank angle plus split pin [rad].
+    broken
+        By how much intervals are outside of what is allowed [rad].
+    """
+
+    moments: tuple[float, ...]
+    members: tuple[tuple[int, ...], ...]
+    angle: float
+    broken: float
+
+    def intervals(self, cycle: Cycle) -> tuple[float, ...]:
+        """Crank angles from firing to firing [rad]."""
+        return tuple(b - a for a, b in itertools.pairwise((*self.moments, cycle.angle)))
+
+
+@dataclass
+class _Budget:
+    """How much is still looked at."""
+
+    left: int
+
+
+@dataclass(frozen=True)
+class FiringSlots:
+    """What throws may share out between them.
+
+    Attributes
+    ----------
+    cycle
+        Two- or four-stroke.
+    throws
+        How many there are.
+    sides
+        Share of bank angle plus split pin by which the dead centre of each cylinder of a throw is late.
+    angle
+        Least and largest bank angle plus split pin [rad].
+    least, most
+        Bounds of an interval [rad].
+    """
+
+    cycle: Cycle
+    throws: int
+    sides: tuple[float, ...]
+    angle: tuple[float, float]
+    least: float
+    most: float
+
+    @property
+    def count(self) -> int:
+        """Firings of a cycle."""
+        return self.throws * len(self.sides)
+
+    def patterns(self, given: Sequence[Sequence[int]] | None = None) -> tuple[list[FiringPattern], bool]:
+        """Every way to fire within the bounds, and whether none was left out; the least broken ones where none is.
+
+        Parameters
+        ----------
+        given
+            Firings of the cylinders of every throw, where the firing order is given.
+        """
+        even, slack, complete = self.cycle.angle / self.count, 0.0, True
+        while True:
+            covers, all_of = self._first_covers(slack, given)
+            complete = complete and (slack > 0.0 or all_of)
+            found = [pattern for cover in covers if (pattern := self._timed(cover)) is not None]
+            found.sort(key=lambda pattern: (round(pattern.broken, 9), self._unevenness(pattern)))
+            least = found[0].broken if found else math.inf
+            if least <= max(slack, 1e-7) or slack > self.cycle.angle:
+                kept = [pattern for pattern in found if pattern.broken <= least + 1e-7]
+                return kept, complete
+            slack = max(0.05 * even, 1.3 * slack)
+
+    def _first_covers(self, slack: float, given: Sequence[Sequence[int]] | None) -> tuple[list[Cover], bool]:
+        """Those of little unevenness before others, as many as are worth a program; and whether these are all."""
+        even, found = self.cycle.angle / self.count, dict[Cover, None]()
+        most = min(_MOST_COVERS, 300_000 // self.count**2) if slack == 0.0 else _MOST_BROKEN
+        complete = False
+        for share in _SHARES:
+            low, high = self.least - slack, self.most + slack
+            own = replace(self, least=even - share * (even - low), most=even + share * (high - even))
+            budget = _Budget(_MOST_LOOKED_AT)
+            found |= dict.fromkeys(itertools.islice(own._covers(given, budget), most + 1))
+            if len(found) > most or budget.left <= 0:
+                return list(found)[:most], False
+            complete = share == 1.0
+        return list(found), complete
+
+    def _unevenness(self, pattern: FiringPattern) -> float:
+        """Largest deviation from equal intervals, rounded so that equals stay in their order [rad]."""
+        even = self.cycle.angle / self.count
+        return round(max(abs(interval - even) for interval in pattern.intervals(self.cycle)), 9)
+
+    def _shapes(self) -> list[Shape]:
+        """Of the other cylinders of a throw: firings after its first one's, whole turns, share of the angle."""
+        whole, count = self.cycle.angle, self.count
+        low, high = max(self.least, 0.0), self.most
+        choices = []
+        for side in self.sides[1:]:
+            apart = side - self.sides[0]
+            ends = sorted(apart * angle for angle in self.angle)
+            own = []
+            for turns in range(math.floor(-ends[1] / math.tau), math.ceil((whole - ends[0]) / math.tau) + 1):
+                first, last = ends[0] + math.tau * turns, ends[1] + math.tau * turns
+                own += [
+                    (d, math.tau * turns, apart)
+                    for d in range(1, count)
+                    if max(d * low, whole - (count - d) * high) <= last + _SLACK
+                    and min(d * high, whole - (count - d) * low) >= first - _SLACK
+                ]
+            # those that hardly bend the intervals come first
+            own.sort(key=lambda part: abs(0.5 * sum(ends) + part[1] - part[0] * whole / count))
+            choices.append(own)
+        return [shape for shape in itertools.product(*choices) if len({d for d, _, _ in shape}) == len(shape)]
+
+    def _covers(self, given: Sequence[Sequence[int]] | None, budget: _Budget) -> Iterator[Cover]:
+        """Throws by the firing of their first cylinder and their shape, every firing taken once."""
+        count, shapes = self.count, self._shapes()
+        if given is not None:
+            own = [
+                [
+                    (slots[0], shape)
+                    for shape in shapes
+                    if all((slots[0] + d) % count == s for (d, _, _), s in zip(shape, slots[1:], strict=True))
+                ]
+                for slots in given
+            ]
+            yield from itertools.product(*own)
+            return
+        offsets = [(0, *(d for d, _, _ in shape)) for shape in shapes]
+
+        def grow(taken: frozenset[int], placed: tuple[tuple[int, int], ...]) -> Iterator[tuple[tuple[int, int], ...]]:
+            free = next((slot for slot in range(count) if slot not in taken), None)
+            if free is None:
+                yield placed
+                return
+            budget.left -= 1
+            if budget.left <= 0:
+                return
+            for number, own in enumerate(offsets):
+                for member in own:
+                    first = (free - member) % count
+                    slots = frozenset((first + d) % count for d in own)
+                    if not slots & taken:
+                        yield from grow(taken | slots, (*placed, (first, number)))
+
+        seen = set()
+        for placed in grow(frozenset(), ()):
+            turned = min(tuple(sorted(((f - first) % count, number) for f, number in placed)) for first, _ in placed)
+            if turned not in seen:
+                seen.add(turned)
+                yield tuple((first, shapes[number]) for first, number in turned)
+
+    def _timed(self, cover: Cover) -> FiringPattern | None:
+        """The moments that break the bounds least, and then are the most even."""
+        count, whole = self.count, self.cycle.angle
+        even = whole / count
+        # moments of the firings, angle between the banks, unevenness, what is broken
+        size = count + 3
+        steps = np.zeros((count, size))
+        for k in range(count):
+            steps[k, k] -= 1.0
+            steps[k, (k + 1) % count] += 1.0
+        turn = np.zeros(count)
+        turn[-1] = whole
+        uneven, broken = np.zeros((2, count, size))
+        uneven[:, count + 1] = 1.0
+        broken[:, count + 2] = 1.0
+        rows = np.concatenate([steps - uneven, -steps - uneven, steps - broken, -steps - broken])
+        most = np.concatenate([even - turn, turn - even, self.most - turn, turn - self.least])
+        fixed, values, members = [], [], []
+        for first, shape in cover:
+            members.append((first, *((first + d) % count for d, _, _ in shape)))
+            for slot, (_, turns, apart) in zip(members[-1][1:], shape, strict=True):
+                row = np.zeros(size)
+                row[slot], row[first], row[count] = 1.0, -1.0, -apart
+                fixed.append(row)
+                values.append(turns - (whole if slot < first else 0.0))
+        bounds = [(0.0, 0.0), *([(None, None)] * (count - 1)), self.angle, (0.0, None), (0.0, None)]
+        cost = np.zeros(size)
+        cost[count + 1 :] = 1.0, _BROKEN
+        answer = linprog(cost, rows, most, np.array(fixed) if fixed else None, values or None, bounds, method="highs")
+        if answer.x is None:
+            return None
+        return FiringPattern(
+            tuple(float(t) for t in answer.x[:count]), tuple(members), float(answer.x[count]), float(answer.x[-1])
+        )
