@@ -222,7 +222,7 @@ BAD = [
     bad("mass without a unit", 'max = "4 kg"', "max = 4",
         'constraints[1].max = "4": has no unit, a mass needs one; write for example "1.25 kg"'),
     bad("weights of a moment", '"mean mount force"', "\"mean roll moment\"\ndirection_weights = [1, 1, 0]",
-        "objective.direction_weights: goes with mount forces and travels only; leave it out"),
+        "objective.direction_weights: goes with forces and travels at places, not with a roll moment; leave it out"),
     bad("gas without bore", "bore = \"100 mm\"\n", "",
         "engine.bore: is missing, and gas acts on it; add it"),
     bad("unknown gas model", '"seiliger"', '"seliger"',

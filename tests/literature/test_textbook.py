@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from laufruhe.machine import Cycle, Engine, Rod, SliderCrank
+from laufruhe.machine import Cycle, Engine, OperatingPoint, PressureTrace, Rod, SliderCrank
 from laufruhe.machine import kinematics as slider_crank
+from laufruhe.machine.gas import AMBIENT_PRESSURE
 from laufruhe.machine.layouts import Mechanism, build, even_throws, inline
+from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import reciprocating_loads, rotating_loads
 
@@ -103,6 +105,24 @@ class TestCrankPinLoad:
         assert resultant == pytest.approx(3517, abs=by_angle + by_rod_force + 0.5)
         assert abs(resultant / (25 * 50) - 2.81) < 0.005 + (by_angle + by_rod_force) / 1250
         assert abs(abs(f - s) - 3517) > 10 * (by_angle + by_rod_force + 0.5)
+
+    def test_crank_pin_force(self) -> None:
+        """The same R = 3517 N from the loads of the pin, order by order, the gas held at 20 bar over the crankcase."""
+        steps = tuple(np.arange(0.0, 4.0 * math.pi, 0.1 * math.pi).tolist())
+        gas = PressureTrace(steps, (AMBIENT_PRESSURE + 20e5,) * len(steps))
+        part = SliderCrank(
+            "cylinder 1", 0.0, self.radius, self.length, 0.5 + self.rod.reciprocating_mass,
+            rotating_mass=self.rod.rotating_mass, bore=0.080,
+        )  # fmt: skip
+        engine = Engine("single", Cycle.FOUR_STROKE, (part,))
+        found = pin_forces(engine, OperatingPoint("example 3", self.speed, gas), TWO_ORDER)
+        pin = found.values(np.array([self.alpha]))[0, 0]
+        # the drawing and the chain of three digits, as above
+        assert float(np.linalg.norm(pin)) == pytest.approx(3517, abs=20.0)
+        f, s = self.rod_centrifugal_force(), self.rod_force()
+        beta = math.asin(float(slider_crank.sin_psi(np, self.alpha, self.ratio, 0.0)))
+        exact = f * np.exp(1j * self.alpha) - s * np.exp(-1j * beta)
+        assert pin[2] + 1j * pin[1] == pytest.approx(exact, rel=1e-6)
 
 
 class TestFiveCylinders:

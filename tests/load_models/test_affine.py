@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
-from laufruhe.machine import OperatingPoint
+from laufruhe.machine import Bearing, OperatingPoint
 from laufruhe.numerics.norms import NORMS, lengths
 from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel, MassChannel
@@ -24,14 +24,16 @@ from laufruhe.problem.sets import Interval, Sector
 from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 
 # travel needs elastic mounts, and is tested with them
-LOADS = tuple(c for c in channels.CHANNELS.values() if isinstance(c, LoadChannel) and c is not channels.MOUNT_TRAVEL)
+ALL_LOADS = tuple(c for c in channels.CHANNELS.values() if isinstance(c, LoadChannel))
+LOADS = tuple(c for c in ALL_LOADS if c is not channels.MOUNT_TRAVEL and not c.is_inside)
+INSIDE = tuple(Measure(c, norm) for c in ALL_LOADS if c.is_inside for norm in NORMS.values())
 MASSES = tuple(c for c in channels.CHANNELS.values() if isinstance(c, MassChannel))
 HALF_ORDERS = Measure(channels.ROLL_MOMENT, NORMS["rms"], orders=(0.5, 1.5), points=("slow",))
 QUANTITIES = (
     *(Measure(subject, norm) for subject in LOADS for norm in NORMS.values()),
     *(Measure(subject, NORMS["mean"]) for subject in MASSES),
     Measure(channels.ADDED_MASS, NORMS["mean"], rotors=("rear", "left")),
-    Measure(channels.MOUNT_FORCE, NORMS["mean"], mounts=("rear left", "front right")),
+    Measure(channels.MOUNT_FORCE, NORMS["mean"], at=("rear left", "front right")),
     Measure(channels.MOUNT_FORCE, NORMS["rms"], direction_weights=(1.0, 1.0, 0.5)),
     Measure(channels.MOUNT_FORCE, NORMS["mean"], orders=(1.0,)),
     Measure(channels.SHAKING_FORCE, NORMS["maximum"], orders=(2.0, 4.0)),
@@ -129,6 +131,35 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
                 np.testing.assert_allclose(found, one[:, used], rtol=0.0, atol=1e-12 * size)
         assert norm.grid.weights.sum() == pytest.approx(expected.grid.weights.sum(), rel=1e-12)
         assert norm.value(x) == pytest.approx(expected.value, rel=1e-11, abs=1e-11 * size)
+
+
+@settings(max_examples=12)
+@given(x=COLUMNS)
+def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) -> None:
+    """As above; a bearing feels the cylinders beside it alone, so that its period is the whole cycle."""
+    p, m = inside()
+    assert m.base == p.engine.cycle.base_order
+    affine = m.at(96)
+    x = x * affine.scales
+    exact = evaluate(p, p.design([d.complex_value(x) for d in m.domains]), 96)
+    for measure, (_, norm) in zip(INSIDE, affine.terms, strict=True):
+        expected, found = exact.rows(measure), norm.rows(x)
+        used = expected.vectors.any(axis=0)
+        size = float(np.abs(expected.vectors).max())
+        np.testing.assert_allclose(found, expected.vectors[:, used], rtol=0.0, atol=1e-12 * size)
+    acts = [np.abs(norm.slope).max() for measure, (_, norm) in zip(INSIDE, affine.terms, strict=True)
+            if measure.channel is channels.MAIN_BEARING_FORCE]  # fmt: skip
+    assert min(acts) > 0.0
+
+
+@lru_cache(maxsize=1)
+def inside() -> tuple[Problem, AffineModel]:
+    """Five bearings between and beside the throws."""
+    whole = scene(4)
+    bearings = tuple(Bearing(str(k), 0.25 - 0.12 * k, 0.06, 0.025) for k in range(5))
+    engine = replace(whole.engine, bearings=bearings)
+    own = replace(whole, engine=engine, objective=tuple(Term(measure) for measure in INSIDE))
+    return own, AffineModel(own)
 
 
 def test_the_scenes_test_what_they_should() -> None:

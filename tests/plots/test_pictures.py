@@ -19,7 +19,7 @@ from laufruhe.plots import draw
 from laufruhe.plots.results import bars, cycle, polar, spectrum
 from laufruhe.plots.style import AFTER, BEFORE, DPI, fitted
 from laufruhe.present.measures import mount_orders
-from laufruhe.problem.evaluation import measured, mount_samples
+from laufruhe.problem.evaluation import measured, samples_of
 from laufruhe.solvers import Result
 from problem_files import written
 
@@ -69,7 +69,7 @@ def test_polar_diagrams_are_the_samples() -> None:
     for m, axes in enumerate(figure.axes):
         lines = {line.get_label(): line.get_xydata() for line in axes.lines}
         for label, design in (("as given", result.initial), ("as decided", result.final)):
-            samples = mount_samples(design, 0)[:, m, 1:]
+            samples = samples_of(design, 0)[:, m, 1:]
             assert np.array_equal(np.asarray(lines[label])[:-1], samples)
             assert np.array_equal(np.asarray(lines[label])[-1], samples[0])
 

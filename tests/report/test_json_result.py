@@ -71,7 +71,7 @@ def test_mounts_agree_with_the_model() -> None:
     assert [mount["name"] for mount in mounts] == result.final.mount_names
     for mount in mounts:
         for measure, key in (("mean", "mean"), ("maximum", "max"), ("rms", "rms")):
-            quantity = Measure(channels.MOUNT_FORCE, NORMS[measure], mounts=(mount["name"],))
+            quantity = Measure(channels.MOUNT_FORCE, NORMS[measure], at=(mount["name"],))
             assert mount[key] == pytest.approx(result.final.value(quantity), rel=1e-12)
             assert mount["initial"][key] == pytest.approx(result.initial.value(quantity), rel=1e-12)
 

@@ -157,11 +157,14 @@ class Loads:
         From the forces in bearings and at cylinder walls, and the gas on the heads, shape (n, 6).
     momentum
         From the accelerations of the bodies, shape (n, 6).
+    bearings
+        Force of every turning body on its bearing, z + i y, shape (n, bodies) [N].
     """
 
     angles: FloatArray
     reactions: FloatArray
     momentum: FloatArray
+    bearings: ComplexArray
 
 
 @dataclass(frozen=True)
@@ -263,7 +266,10 @@ def simulate(
     # a multiplier is what its constraint exerts on the first of two markers, here the ground
     torques = [(ratio, -_read(model, sensor, kept)[:, 0]) for ratio, sensor in model.drives]
     reactions = _reactions(model, torques, kept) + _gas_wrench(machine, angles)
-    return Loads(angles, reactions, _momentum(model, torques, kept))
+    # what a bearing holds does not move; a wall does, with its piston
+    held = [support for support in model.supports if isinstance(support.place, complex)]
+    bearings = [support.frame * _plane(model, support.sensor, kept) for support in held]
+    return Loads(angles, reactions, _momentum(model, torques, kept), np.stack(bearings, axis=1))
 
 
 def build(machine: Machine, start: float) -> _Model:

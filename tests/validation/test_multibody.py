@@ -20,8 +20,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from laufruhe.machine import Cycle, Engine, OperatingPoint, PressureTrace, Rod, Role, Rotor, Shaft, SliderCrank
+from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, PressureTrace, Rod, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.rotor import CRANKSHAFT
+from laufruhe.physics.bearing_loads import main_bearing_forces
 from laufruhe.physics.shaking_loads import shaking_loads
 from validation import multibody
 from validation.multibody import ConnectingRod, Cylinder, Loads, Machine, Turning
@@ -298,3 +299,30 @@ def test_rod_of_two_masses_gets_the_roll_moment_wrong(name: str, share: float) -
     assert wrong[3] > share * np.abs(reference[:, 3]).max()
     others = [0, 1, 2, 4, 5]
     assert np.all(wrong[others] < 1e-5 * unit_loads(name)[others])
+
+
+def in_bearings(case: Case, steps: int) -> NDArray[np.complex128]:
+    """Force of every turning body on its bearing, z + i y: the shaft held on both sides of each throw."""
+    forces = []
+    angles = math.tau * np.arange(case.turns * steps) / steps
+    for k, body in enumerate(case.machine.turning):
+        shaft = _shaft(k, body)
+        here = [part for part in case.engine.slider_cranks if (part.shaft, part.x) == (shaft, body.x)]
+        rotors = tuple(r for r in case.engine.rotors if (r.shaft, r.x) == (shaft, body.x))
+        bearings = tuple(Bearing(str(side), body.x + 0.03 * side, shaft=shaft) for side in (-1, 1))
+        alone = replace(case.engine, slider_cranks=tuple(here), rotors=rotors, bearings=bearings)
+        values = main_bearing_forces(alone, case.point).values(angles).sum(axis=1)
+        forces.append(values[:, 2] + 1j * values[:, 1])
+    return np.stack(forces, axis=1)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_bearing_forces_agree_within_the_error_of_the_simulation(name: str) -> None:
+    """Forces in the joints of crank and block, which `reactions` adds up, here one at a time."""
+    case, coarse, fine = case_of(name), simulated(name, COARSE).bearings, simulated(name, FINE).bearings
+    size = np.abs(fine).max()
+    assert np.abs(in_bearings(case, FINE) - fine).max() < np.abs(coarse - fine[::2]).max() / 3.0 + ROUNDING * size
+    extrapolated = (4.0 * fine[::2] - coarse) / 3.0
+    assert np.abs(in_bearings(case, COARSE) - extrapolated).max() < 3.0 * ROUNDING * size
+    # the loads of the cylinders alone are far from it
+    assert size > 1e3

@@ -34,13 +34,14 @@ ROUNDING = 2e-13
 
 def reference(problem: Problem, engine: Engine | None = None, samples: int = REFERENCE_SAMPLES) -> Evaluation:
     """The highest fidelity: every order, rigid rod, gas at many steps, every mode; uneven speed where it was asked."""
-    best = replace(EXACT, samples=samples, crank_inertia=problem.fidelity.crank_inertia)
+    own = problem.fidelity
+    best = replace(EXACT, samples=samples, crank_inertia=own.crank_inertia, crankshaft=own.crankshaft)
     return evaluate(replace(problem, fidelity=best), engine)
 
 
 def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
     """What counts of a load at every operating point, (n, places, d), on a common lowest order."""
-    found = [measure.signal(loads, evaluation.mount_names) for loads in evaluation.loads]
+    found = [measure.signal(loads, evaluation.engine) for loads in evaluation.loads]
     return over(evaluation.engine.cycle.base_order, found)
 
 
@@ -122,7 +123,8 @@ class Scale:
             for rotor in self.problem.engine.rotors
             if rotor.unbalance != 0 or rotor.name in self.open_rotors
         )
-        bases = [loads.wrench.reduced(ratios).base for loads in self.best.loads]
+        inside = [s for term in self.terms if term.measure.is_inside for s in signals(term.measure, self.best)]
+        bases = [s.reduced(ratios).base for s in (*(loads.wrench for loads in self.best.loads), *inside)]
         return int(min(bases) / self.problem.engine.cycle.base_order) if bases else 1
 
     @property

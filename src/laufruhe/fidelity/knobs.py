@@ -15,7 +15,7 @@ from laufruhe.errors import UncarriedLoadError
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale
 from laufruhe.fidelity.knob import Knob, LeftOut, Rungs, first_enough, part_left_out
 from laufruhe.physics.elastic_mounts import ElasticMounting
-from laufruhe.physics.fidelity import EXACT, Fidelity, Kinematics, MountModel, RodModel
+from laufruhe.physics.fidelity import EXACT, CrankshaftModel, Fidelity, Kinematics, MountModel, RodModel
 from laufruhe.physics.mechanism import rod_effects
 from laufruhe.physics.wrench import WRENCH
 from laufruhe.problem.problem import Problem
@@ -177,6 +177,22 @@ class _GasOrders(Knob):
         return [(f"exact, gas to order {GAS_ORDERS}, 720 steps", cut)] if GAS.is_there(scale.problem) else []
 
 
+class _Crankshaft(Knob):
+    """A choice by hand: neither is the truth, and what a crank of throws does lies nearer to one or the other."""
+
+    key, kind, is_decided = "crankshaft", CrankshaftModel, False
+    told: ClassVar = {"description": "How main bearings share its loads: cut in its journals, or a continuous beam."}
+
+    def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
+        return None if problem.engine.bearings else ("is a choice of main bearings", "leave it out, or list them")
+
+    def rungs(self, scale: Scale) -> Rungs:
+        if not any(term.measure.is_inside for term in scale.terms):
+            return []
+        is_beam = scale.problem.fidelity.crankshaft == "beam"
+        return [("crankshaft cut", Fidelity())] if is_beam else [("crankshaft as a beam", Fidelity(crankshaft="beam"))]
+
+
 class _CrankInertia(Knob):
     key, kind, unit = "crank_inertia", float, "kg m^2"
     told: ClassVar = {"description": "Of all that turns with the crank: its speed varies within the cycle."}
@@ -314,8 +330,8 @@ class _Samples(Knob):
 
 GAS = _Gas()
 KNOBS: tuple[Knob, ...] = (
-    _Kinematics(), _Rod(), GAS, _GasSamples(), _GasOrders(), _Orders(), _CrankInertia(), _Mounts(), _Modes(),
-    _Samples(),
+    _Kinematics(), _Rod(), GAS, _GasSamples(), _GasOrders(), _Orders(), _CrankInertia(), _Crankshaft(), _Mounts(),
+    _Modes(), _Samples(),
 )  # fmt: skip
 
 

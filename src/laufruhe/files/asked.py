@@ -15,7 +15,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, measured, nearest, one_of
 from laufruhe.files.fields import Name, Table
 from laufruhe.machine import Engine, OperatingPoint
-from laufruhe.problem.channels import ON_PLACES, Channel, Needs
+from laufruhe.problem.channels import Channel, LoadChannel, Needs
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Term, counted_rotors, radius_of
 
 T = TypeVar("T")
@@ -24,8 +24,10 @@ QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": list(M
 _NEEDS = {
     Needs.MOUNTS: ("needs mounts", "add [mounts], or ask for a shaking force"),
     Needs.ELASTIC: ("needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]'),
+    Needs.BEARINGS: ("needs main bearings", "list them in [[main_bearings]]"),
 }
-_KEYS = ("operating_points", "orders", "mounts", "direction_weights", "motions", "frequency", "of")
+_PLACES = {"mounts": "mount", "bearings": "main bearing", "cylinders": "cylinder"}
+_KEYS = ("operating_points", "orders", *_PLACES, "direction_weights", "motions", "frequency", "of")
 _ROUNDING = 1e-9
 _SIDES = ("min", "max", "outside")
 
@@ -34,6 +36,8 @@ class QuantityTable(Table):
     """What part of a quantity counts."""
 
     mounts: list[str] | None = None
+    bearings: list[str] | None = None
+    cylinders: list[str] | None = None
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     direction_weights: f.Three[f.NonNegative] | None = None
@@ -81,15 +85,15 @@ class Scene:
             raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
         channel, norm = MEASURES[name]
         at, of = where.rsplit(".", 1)[0], getattr(table, "of", None)
-        lacking = {Needs.MOUNTS: not self.engine.mounts, Needs.ELASTIC: self.engine.block is None}
-        if lacking.get(channel.needs):
+        has = {Needs.MOUNTS: self.engine.mounts, Needs.ELASTIC: self.engine.block, Needs.BEARINGS: self.engine.bearings}
+        if channel.needs in has and not has[channel.needs]:
             raise Refused(where, name, *_NEEDS[channel.needs])
         self._check_keys(channel, table, at)
         weights = table.direction_weights
         found = Measure(
-            channel, norm, _tuple(table.mounts), _tuple(table.operating_points), _tuple(of), _tuple(table.orders),
-            None if weights is None else (weights[0], weights[1], weights[2]), _tuple(table.motions),
-            table.frequency or 0.0,
+            channel, norm, self._places(channel, table, at), _tuple(table.operating_points), _tuple(of),
+            _tuple(table.orders), None if weights is None else (weights[0], weights[1], weights[2]),
+            _tuple(table.motions), table.frequency or 0.0,
         )  # fmt: skip
         if found.is_mass:
             self._counts(found, of, at)
@@ -101,13 +105,21 @@ class Scene:
         for key in _KEYS:
             if getattr(table, key, None) is not None and key not in channel.keys:
                 raise Refused(f"{at}.{key}", of if key == "of" else None, _stray(key, channel), "leave it out")
-        mounts, points = [mount.name for mount in self.engine.mounts], [point.name for point in self.points]
-        _known(table.mounts, mounts, f"{at}.mounts", "mount")
+        points = [point.name for point in self.points]
         _known(table.operating_points, points, f"{at}.operating_points", "operating point")
         if "frequency" in channel.keys and table.frequency is None:
             remedy = "say which natural frequency about the axis is wanted"
             raise Refused(f"{at}.frequency", None, "is missing", remedy)
         self._orders(table.orders, f"{at}.orders")
+
+    def _places(self, channel: Channel, table: QuantityTable, at: str) -> tuple[str, ...] | None:
+        """Names of the places that count; all where none are named."""
+        for key, what in _PLACES.items():
+            if isinstance(channel, LoadChannel) and key in channel.keys:
+                names = getattr(table, key)
+                _known(names, channel.places(self.engine), f"{at}.{key}", what)
+                return _tuple(names)
+        return None
 
     def _orders(self, orders: list[float] | None, where: str) -> None:
         """Refuse what no load can have: all that turns returns within the cycle (C6)."""
@@ -139,8 +151,10 @@ def _stray(key: str, channel: Channel) -> str:
         return "goes with masses only"
     if channel.is_mass:
         return "means nothing for a mass"
-    if channel.is_load and key in ON_PLACES:
-        return "goes with mount forces and travels only"
+    if channel.is_load and key in _PLACES:
+        return f"means nothing for a {channel}, which has no {_PLACES[key]} of its own"
+    if channel.is_load and key == "direction_weights":
+        return f"goes with forces and travels at places, not with a {channel}"
     return f"means nothing for {channel}" if channel.is_mounting else f"means nothing for a {channel}"
 
 

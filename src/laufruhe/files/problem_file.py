@@ -9,6 +9,7 @@ from pydantic import Field
 
 from laufruhe.files import fields as f
 from laufruhe.files.asked import ConstraintTable, ObjectiveTable
+from laufruhe.files.bearings import MainBearingTable
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.fields import Table
@@ -44,6 +45,7 @@ class ProblemFile(Table):
     gas: GasTable | None = None
     mounts: MountsTable | None = None
     block: BlockTable | None = None
+    main_bearings: list[MainBearingTable] = Field(default_factory=list)
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
     objective: ObjectiveTable | None = None

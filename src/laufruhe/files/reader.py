@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.files.asked import Scene, limits_of, objective_of
+from laufruhe.files.bearings import bearings_of
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
@@ -92,7 +93,8 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     balancer_shafts(file.balancer_shafts, collected)
     found = mounts_of(file.mounts, file.block)
     cycle = cycle_of(table)
-    engine = Engine(file.title, cycle, cylinders, tuple(collected.rotors), found.mounts, found.block)
+    bearings = bearings_of(file.main_bearings, cylinders)
+    engine = Engine(file.title, cycle, cylinders, tuple(collected.rotors), found.mounts, found.block, bearings)
     points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke)
     scene, decisions = Scene(engine, points), (*collected.decisions, *found.decisions)
     objective = objective_of(file.objective, scene)

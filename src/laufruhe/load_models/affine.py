@@ -171,12 +171,15 @@ class AffineModel:
         self.bare, self._changes = bare, changes
         orders = [as_order(abs(r.shaft.ratio)) for rotors in changes for r in rotors]
         # loads of every column alone, at every operating point
-        self._slopes = [[_loads(rotors, point, problem, mounting) for rotors in changes] for point in problem.points]
+        alone = [_alone(problem.engine, rotors) for rotors in changes]
+        self._slopes = [[_loads(each, point, problem, mounting) for each in alone] for point in problem.points]
         self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
 
     def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
-        used = [loads.wrench.reduced(tuple(orders)).base for loads in bare.loads]
-        return common_base(used)
+        """Of the wrench, and of loads inside the crankcase: a bearing feels each cylinder beside it alone."""
+        inside = {measure.load for measure in self.problem.measures if measure.is_load and measure.load.is_inside}
+        signals = [*(loads.wrench for loads in bare.loads), *(s for channel in inside for s in bare.signals(channel))]
+        return common_base([signal.reduced(tuple(orders)).base for signal in signals])
 
     @property
     def full_samples(self) -> int:
@@ -227,8 +230,7 @@ class AffineModel:
         period = [Spectrum(self.base, s.rebased(finest).coefficients[::step]) for s in signals]
         if averaged:
             period = [_averaged(signal, samples) for signal in period]
-        names = [mount.name for mount in self.problem.engine.mounts]
-        return load_rows(measure, self.problem.points, period, names, samples)
+        return load_rows(measure, self.problem.points, period, self.problem.engine, samples)
 
 
 def _averaged(signal: Spectrum, samples: int) -> Spectrum:
@@ -250,13 +252,20 @@ def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
     return tuple(replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors)
 
 
-def _loads(
-    rotors: Sequence[Rotor], point: OperatingPoint, problem: Problem, mounting: Mounting | None
-) -> PointLoads:  # fmt: skip
-    """What these rotors alone make at an operating point."""
-    wrench = added_rotor_loads(rotors, problem.engine, point, problem.fidelity)
+def _alone(engine: Engine, rotors: Sequence[Rotor]) -> Engine:
+    """What these rotors load by themselves: the engine without any other mass."""
+    parts = (replace(part, reciprocating_mass=0.0, rotating_mass=0.0, rod_inertia_deficit=0.0)
+             for part in engine.slider_cranks)  # fmt: skip
+    return replace(engine, slider_cranks=tuple(parts), rotors=tuple(rotors))
+
+
+def _loads(alone: Engine, point: OperatingPoint, problem: Problem, mounting: Mounting | None) -> PointLoads:
+    """What some rotors alone make at an operating point; an uneven speed is that of the whole engine."""
+    wrench = added_rotor_loads(alone.rotors, problem.engine, point, problem.fidelity)
     forces = mounting.forces(wrench, point.speed) if mounting else None
-    return PointLoads(point, wrench, forces, travel_of(problem.engine, mounting, wrench, point.speed))
+    travel = travel_of(problem.engine, mounting, wrench, point.speed)
+    without_gas = replace(problem.fidelity, gas=False, gas_orders=None)
+    return PointLoads(point, wrench, forces, travel, alone, without_gas)
 
 
 def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:

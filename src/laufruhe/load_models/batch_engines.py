@@ -75,8 +75,8 @@ class EngineFamily:
     """
 
     def __init__(self, template: Engine, measure: Measure, fidelity: Fidelity, gas: GasModel | None = None) -> None:
-        if not measure.is_load:
-            raise ModelError(f"a family measures loads, not {measure.name}")
+        if not measure.is_load or measure.is_inside:
+            raise ModelError(f"a family measures loads on the block and its mounts, not {measure.name}")
         self.template, self.fidelity = template, fidelity
         self._first, self._point = _alike(template), OperatingPoint("all", 1.0, gas)
         self._gas = fidelity.gas_of(self._point)

@@ -1,5 +1,6 @@
 """What the engine is: slider-cranks and rotors on a block on mounts, in SI (C1)."""
 
+from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.gas import Charge, GasModel, PressureTrace, Seiliger, Wiebe
@@ -9,6 +10,7 @@ from laufruhe.machine.slider_crank import Rod, SliderCrank
 
 __all__ = [
     "CRANKSHAFT",
+    "Bearing",
     "Block",
     "Charge",
     "Cycle",

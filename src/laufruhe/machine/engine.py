@@ -9,6 +9,7 @@ from enum import Enum
 from fractions import Fraction
 
 from laufruhe.errors import ModelError
+from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block
 from laufruhe.machine.gas import GasModel
 from laufruhe.machine.mount import Mount
@@ -73,6 +74,8 @@ class Engine:
         Empty for an engine whose shaking loads alone are asked for.
     block
         The body that elastic mounts carry; without one the mounts are rigid.
+    bearings
+        Main bearings of its shafts; empty where nothing is asked of them.
     """
 
     name: str
@@ -81,9 +84,10 @@ class Engine:
     rotors: tuple[Rotor, ...] = ()
     mounts: tuple[Mount, ...] = ()
     block: Block | None = None
+    bearings: tuple[Bearing, ...] = ()
 
     def __post_init__(self) -> None:
-        for kind in ("slider_cranks", "rotors", "mounts"):
+        for kind in ("slider_cranks", "rotors", "mounts", "bearings"):
             names = Counter(part.name for part in getattr(self, kind))
             double = [name for name, count in names.items() if count > 1]
             if double:

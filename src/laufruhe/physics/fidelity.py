@@ -15,6 +15,7 @@ from laufruhe.numerics.spectrum import Spectrum
 
 Kinematics = Literal["exact", "two-order"]
 RodModel = Literal["rigid", "mass-only"]
+CrankshaftModel = Literal["cut", "beam"]
 MountModel = Literal["frequency", "rigid", "time"]
 MODES = 6
 
@@ -51,6 +52,9 @@ class Fidelity:
         way ("rigid"), or by integration in time ("time"), bump stops included.
     modes
         Natural modes that answer, 1 the lowest; all that are excited when None.
+    crankshaft
+        How bearings share its loads: "cut" in the middle of every journal, or as a "beam" of one stiffness
+        along all of them.
     tolerance
         Relative error of the objective that an automatic choice was asked for.
 
@@ -70,6 +74,7 @@ class Fidelity:
     crank_inertia: float = math.inf
     mounts: MountModel = "frequency"
     modes: tuple[int, ...] | None = None
+    crankshaft: CrankshaftModel = "cut"
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
@@ -130,6 +135,7 @@ class Fidelity:
             (self.mounts == "rigid", "mounts that do not give way"),
             (self.mounts == "time", "mounts in the time domain"),
             (self.modes is not None, modes),
+            (self.crankshaft == "beam", "crankshaft as a continuous beam"),
         )
         return ", ".join(text for is_said, text in words if is_said)
 

@@ -7,7 +7,7 @@ slider-crank, they are taken in place of a transform.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
@@ -167,20 +167,47 @@ def momentum_orders(part: SliderCrank) -> ComplexArray:
     ModelError
         If steps that fine do not resolve it: the crank all but locks.
     """
-    scale = np.array([1.0, 1.0, part.crank_radius, part.crank_radius])[:, None]
+    radius = part.crank_radius
+
+    def rows(alpha: NDArray[np.float64]) -> tuple[Any, ...]:
+        force, roll, rods = momentum_loads(part, part.motion(np, alpha), 1.0)
+        return np.real(force), np.imag(force), roll, rods
+
+    table = resolved_orders(rows, np.array([1.0, 1.0, radius, radius])[:, None], part.name)
+    # a periodic momentum has no mean derivative
+    table[:, 0] = 0.0
+    table.setflags(write=False)
+    return table
+
+
+def resolved_orders(rows: Callable[[NDArray[np.float64]], Sequence[Any]], scale: Any, name: str) -> ComplexArray:
+    """Coefficients of periodic functions of the crank's own angle, as many orders as matter.
+
+    Parameters
+    ----------
+    rows
+        Values of every function at these angles.
+    scale
+        Size that each is measured by, shape (functions, 1).
+
+    Returns
+    -------
+    Shape (functions, orders).
+
+    Raises
+    ------
+    ModelError
+        If steps that fine do not resolve them: the crank all but locks.
+    """
     steps = 64
     while steps <= _MOST_STEPS:
         alpha = 2.0 * np.pi * np.arange(steps) / steps
-        force, roll, rods = momentum_loads(part, part.motion(np, alpha), 1.0)
-        rows = np.stack([np.broadcast_to(row, alpha.shape) for row in (np.real(force), np.imag(force), roll, rods)])
-        table = 2.0 * np.fft.rfft(rows)[:, :-1] / steps
-        # a periodic momentum has no mean derivative
-        table[:, 0] = 0.0
+        sampled = np.stack([np.broadcast_to(row, alpha.shape) for row in rows(alpha)])
+        table = 2.0 * np.fft.rfft(sampled)[:, :-1] / steps
+        table[:, 0] /= 2.0
         sizes = np.abs(table / scale).max(axis=0)
         if sizes[-steps // 8 :].max() <= _TAIL * sizes.max():
             last = int(np.flatnonzero(sizes > 0.1 * _TAIL * sizes.max()).max(initial=0))
-            kept = np.ascontiguousarray(table[:, : last + 1])
-            kept.setflags(write=False)
-            return kept
+            return np.ascontiguousarray(table[:, : last + 1])
         steps *= 2
-    raise ModelError(f"{part.name}: its motion is too close to locking to be resolved; lengthen the rods")
+    raise ModelError(f"{name}: its motion is too close to locking to be resolved; lengthen the rods")

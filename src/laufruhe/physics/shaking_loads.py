@@ -87,7 +87,7 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
     """
     wrenches: dict[int, list[NDArray[np.complex128]]] = defaultdict(list)
     for rotor in rotors:
-        index = _index(cycle, abs(rotor.shaft.ratio))
+        index = order_index(cycle, abs(rotor.shaft.ratio))
         wrenches[index].append(rotor_wrench(rotor, speed))
     out = np.zeros((max(wrenches, default=0) + 1, 6), dtype=complex)
     for index, parts in wrenches.items():
@@ -173,16 +173,18 @@ def _star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], I
         load = series[:, None] * star
         ratio = first.shaft.ratio
         # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
-        total = total + _spread(load if ratio > 0.0 else load.conj(), _index(cycle, abs(ratio)), cycle)
+        total = total + spread(load if ratio > 0.0 else load.conj(), order_index(cycle, abs(ratio)), cycle)
     return total
 
 
-def _spread(load: NDArray[np.complex128], step: int, cycle: Cycle) -> Spectrum:
-    out = np.zeros(((len(load) - 1) * step + 1, 6), dtype=complex)
+def spread(load: NDArray[np.complex128], step: int, cycle: Cycle) -> Spectrum:
+    """A load by order of its own crank angle, shape (n, d), in orders of the cycle, `step` to one of its own."""
+    out = np.zeros(((len(load) - 1) * step + 1, load.shape[1]), dtype=complex)
     out[::step] = load
     return Spectrum(cycle.base_order, out)
 
 
 @lru_cache(maxsize=1024)
-def _index(cycle: Cycle, order: float) -> int:
+def order_index(cycle: Cycle, order: float) -> int:
+    """Of an order of crank speed among those of a cycle."""
     return int(as_order(order) / cycle.base_order)

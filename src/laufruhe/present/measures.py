@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
+from laufruhe.physics.bearing_loads import has_bearing_loads
+from laufruhe.problem.channels import CRANK_PIN_FORCE, MAIN_BEARING_FORCE, MOUNT_FORCE, LoadChannel
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
@@ -17,6 +21,37 @@ Array = NDArray[np.float64]
 
 # An order counts as present from this share of the largest on.
 PRESENT = 1e-3
+
+
+@dataclass(frozen=True)
+class Places:
+    """A force that tables, files and pictures show place by place.
+
+    Attributes
+    ----------
+    key
+        In `result.json`.
+    title, place
+        In a table.
+    """
+
+    key: str
+    channel: LoadChannel
+    title: str
+    place: str
+
+
+MOUNTS = Places("mounts", MOUNT_FORCE, "Mount forces", "mount")
+BEARINGS = Places("main_bearings", MAIN_BEARING_FORCE, "Main-bearing forces", "bearing")
+PINS = Places("crank_pins", CRANK_PIN_FORCE, "Crank-pin forces", "pin of")
+
+
+def places_of(result: Result) -> list[Places]:
+    """Forces that this result shows: inside the crankcase those that are asked, and all where bearings are given."""
+    engine, problem = result.problem.engine, result.problem
+    asked, inside = {measure.channel for measure in problem.measures}, has_bearing_loads(engine, problem.fidelity)
+    shown = [MOUNTS] if engine.mounts else []
+    return shown + [places for places in (BEARINGS, PINS) if inside and (engine.bearings or places.channel in asked)]
 
 
 def hardest_point(result: Result) -> int:

@@ -16,6 +16,7 @@ from typing import ClassVar, Protocol
 from laufruhe.machine import Engine, Role
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import mount_numbers
+from laufruhe.physics.bearing_loads import bearing_pressures, main_bearing_forces, pin_forces
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
@@ -55,7 +56,9 @@ class Answered(Protocol):
 
 
 ON_BLOCK = ("operating_points", "orders")
-ON_PLACES = (*ON_BLOCK, "mounts", "direction_weights")
+AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
+    (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
+)
 
 
 class Needs(StrEnum):
@@ -64,6 +67,7 @@ class Needs(StrEnum):
     NOTHING = ""
     MOUNTS = "mounts"
     ELASTIC = "elastic mounts"
+    BEARINGS = "main bearings"
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +119,10 @@ class LoadChannel(Channel):
         Whether the roll moment is in it: gas gives no force (eq. 1).
     lever
         Power of a throw's place that its load grows with; None where loads do not add up by places alone.
+    places
+        Names of the places of its signal, by which a file may narrow it; none where that is the block.
+    is_inside
+        Whether it acts inside the crankcase, so that neither the block nor its mounts feel it.
     """
 
     keys: tuple[str, ...] = ON_BLOCK
@@ -122,6 +130,8 @@ class LoadChannel(Channel):
     part: slice | None = None
     feels_gas: bool = True
     lever: int | None = None
+    places: Callable[[Engine], Sequence[str]] = lambda _: ()
+    is_inside: bool = False
     is_load: ClassVar[bool] = True
 
 
@@ -166,7 +176,33 @@ def _on_mounts(name: str, unit: str, needs: Needs, signal: Callable[[PointLoads]
             raise ValueError(f"this mounting has no {name}")
         return spectrum
 
-    return LoadChannel(name, unit, ON_PLACES, needs, signal=found)
+    return LoadChannel(name, unit, AT_MOUNTS, needs, signal=found, places=_names_of_mounts)
+
+
+def _inside(
+    name: str, unit: str, keys: tuple[str, ...], needs: Needs, places: Callable[[Engine], Sequence[str]],
+    signal: Callable[[Engine, PointLoads], Spectrum],
+) -> LoadChannel:  # fmt: skip
+    """A load inside the crankcase: of what moves, whatever the block stands on."""
+
+    def found(loads: PointLoads) -> Spectrum:
+        if loads.moving is None:
+            raise ValueError(f"of a wrench alone there is no {name}")
+        return signal(loads.moving, loads)
+
+    return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True)
+
+
+def _names_of_mounts(engine: Engine) -> Sequence[str]:
+    return [mount.name for mount in engine.mounts]
+
+
+def _names_of_bearings(engine: Engine) -> Sequence[str]:
+    return [bearing.name for bearing in engine.bearings]
+
+
+def _names_of_cylinders(engine: Engine) -> Sequence[str]:
+    return [part.name for part in engine.slider_cranks]
 
 
 def mounting_in(engine: Engine) -> ElasticMounting:
@@ -206,6 +242,18 @@ MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: load
 SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3), lever=0)
 ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), lever=1)
 ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4))
+MAIN_BEARING_FORCE = _inside(
+    "main-bearing force", "N", AT_BEARINGS, Needs.BEARINGS, _names_of_bearings,
+    lambda moving, at: main_bearing_forces(moving, at.point, at.fidelity),
+)  # fmt: skip
+MAIN_BEARING_PRESSURE = _inside(
+    "main-bearing pressure", "Pa", AT_BEARINGS, Needs.BEARINGS, _names_of_bearings,
+    lambda moving, at: bearing_pressures(moving, main_bearing_forces(moving, at.point, at.fidelity)),
+)  # fmt: skip
+CRANK_PIN_FORCE = _inside(
+    "crank-pin force", "N", AT_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
+    lambda moving, at: pin_forces(moving, at.point, at.fidelity),
+)  # fmt: skip
 
 COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))
 BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
@@ -236,6 +284,7 @@ CHANNELS: Mapping[str, Channel] = {
     channel.name: channel
     for channel in (
         MOUNT_FORCE, MOUNT_TRAVEL, SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT,
+        MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE,
         COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
         TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
     )

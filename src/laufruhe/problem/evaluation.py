@@ -19,7 +19,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.problem.channels import LoadChannel, MountChannel
+from laufruhe.problem.channels import MOUNT_FORCE, LoadChannel, MountChannel
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
@@ -67,7 +67,7 @@ class Evaluation:
             measure,
             [loads.point for loads in self.loads],
             over(self.engine.cycle.base_order, self.signals(measure.load)),
-            self.mount_names,
+            self.engine,
             samples or self.samples,
         )
 
@@ -167,6 +167,8 @@ def _on_mounts(
             wrench,
             mounting.forces(wrench, point.speed) if mounting else None,
             travel_of(engine, mounting, wrench, point.speed),
+            engine,
+            fidelity,
         )
         for point, wrench in wrenches
     )
@@ -177,32 +179,27 @@ def objective_value(problem: Problem, evaluation: Evaluation) -> float:
     return sum(term.weight * evaluation.value(term.measure) for term in problem.objective)
 
 
-def mount_samples(evaluation: Evaluation, k: int, finer: int = 1) -> Array:
-    """Mount forces at operating point k over the whole cycle, shape (samples, mounts, 3) [N]."""
-    forces = evaluation.loads[k].mount_forces
-    if forces is None:
-        raise ValueError("an engine without mounts has no mount forces")
-    return over(evaluation.engine.cycle.base_order, [forces])[0].sample(finer * evaluation.samples)
+def samples_of(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE, finer: int = 1) -> Array:
+    """A channel at operating point k over the whole cycle, shape (samples, places, d)."""
+    signal = channel.signal(evaluation.loads[k])
+    return over(evaluation.engine.cycle.base_order, [signal])[0].sample(finer * evaluation.samples)
 
 
-def measured(evaluation: Evaluation, k: int) -> list[CycleMeasures]:
-    """Of every mount at operating point k; a maximum is sought between the samples too, as limits are."""
-    forces = evaluation.loads[k].mount_forces
-    if forces is not None and not np.all(np.isfinite(forces.coefficients)):
-        return [CycleMeasures(math.inf, math.inf, math.inf)] * len(evaluation.engine.mounts)
-    fine = _one_period(evaluation, k, BETWEEN)
+def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> list[CycleMeasures]:
+    """At every place of a channel at operating point k; a maximum is sought between the samples too, as limits are."""
+    signal = channel.signal(evaluation.loads[k])
+    if not np.all(np.isfinite(signal.coefficients)):
+        return [CycleMeasures(math.inf, math.inf, math.inf)] * signal.coefficients.shape[1]
+    fine = _one_period(evaluation, signal, BETWEEN)
     coarse = fine[::BETWEEN]
     most = lengths(fine).max(axis=0)
     return [replace(cycle_measures(coarse[:, m]), max=float(most[m])) for m in range(fine.shape[1])]
 
 
-def _one_period(evaluation: Evaluation, k: int, finer: int) -> Array:
-    """As `mount_samples`, without the periods in which the forces repeat."""
-    forces = evaluation.loads[k].mount_forces
-    if forces is None:
-        return mount_samples(evaluation, k, finer)
-    once = forces.reduced()
-    periods = once.base / evaluation.engine.cycle.base_order
+def _one_period(evaluation: Evaluation, signal: Spectrum, finer: int) -> Array:
+    """Values over the cycle without the periods in which they repeat."""
+    base, once = evaluation.engine.cycle.base_order, signal.reduced()
+    periods = once.base / base
     if periods.denominator != 1 or evaluation.samples % int(periods):
-        return mount_samples(evaluation, k, finer)
+        return over(base, [signal])[0].sample(finer * evaluation.samples)
     return once.sample(finer * evaluation.samples // int(periods))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import OperatingPoint, Rotor
+from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, orders_equal
 from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel
@@ -35,8 +35,9 @@ class Measure:
     norm
         How a load is put together over angle, places and operating points: the mean
         over all, the largest, or the root mean square over all.
-    mounts, points, rotors
-        Names of those that count; all when None.
+    at, points, rotors
+        Names of the places, operating points and rotors that count; all when None. Places are
+        mounts, bearings or cylinders, as the channel has them.
     orders
         Orders of crank speed that count; all when None.
     direction_weights
@@ -49,7 +50,7 @@ class Measure:
 
     channel: Channel
     norm: Norm = MEAN
-    mounts: tuple[str, ...] | None = None
+    at: tuple[str, ...] | None = None
     points: tuple[str, ...] | None = None
     rotors: tuple[str, ...] | None = None
     orders: tuple[float, ...] | None = None
@@ -65,8 +66,8 @@ class Measure:
             text += " of order " + ", ".join(f"{order:g}" for order in self.orders)
         if self.motions is not None:
             text += " of " + ", ".join(self.motions)
-        if self.mounts is not None:
-            text += " on " + ", ".join(self.mounts)
+        if self.at is not None:
+            text += " on " + ", ".join(self.at)
         if self.points is not None:
             text += " at " + ", ".join(self.points)
         return text
@@ -101,7 +102,12 @@ class Measure:
     @property
     def on_mounts(self) -> bool:
         """Whether it is of a signal at the mounts."""
-        return self.is_load and self.load.part is None
+        return self.is_load and self.load.part is None and not self.load.is_inside
+
+    @property
+    def is_inside(self) -> bool:
+        """Whether it is of a load inside the crankcase."""
+        return self.is_load and self.load.is_inside
 
     @property
     def feels_gas(self) -> bool:
@@ -128,13 +134,13 @@ class Measure:
             return np.ones(np.shape(orders), dtype=bool)
         return orders_equal(orders, self.orders)
 
-    def signal(self, loads: PointLoads, mount_names: Sequence[str]) -> Spectrum:
+    def signal(self, loads: PointLoads, engine: Engine) -> Spectrum:
         """What counts of a load at an operating point, shape (n, places, d)."""
-        return selected(self, self.load.signal(loads), mount_names)
+        return selected(self, self.load.signal(loads), engine)
 
-    def places(self, mount_names: Sequence[str]) -> list[int]:
-        """Of the mounts that count."""
-        return [k for k, name in enumerate(mount_names) if self.mounts is None or name in self.mounts]
+    def places(self, names: Sequence[str]) -> list[int]:
+        """Of the places that count among all of these names."""
+        return [k for k, name in enumerate(names) if self.at is None or name in self.at]
 
 
 @dataclass(frozen=True)
@@ -192,17 +198,16 @@ class Rows:
 
 
 def load_rows(
-    measure: Measure, points: Sequence[OperatingPoint], signals: Sequence[Spectrum], mount_names: Sequence[str],
-    samples: int,
-) -> Rows:  # fmt: skip
+    measure: Measure, points: Sequence[OperatingPoint], signals: Sequence[Spectrum], engine: Engine, samples: int
+) -> Rows:
     """Rows of a load at equal steps of its period.
 
     Parameters
     ----------
     signals
         Per point what the channel measures, shape (n, places, d), all of one base.
-    mount_names
-        In the order of the second axis.
+    engine
+        Whose mounts, bearings or cylinders stand along the second axis.
     samples
         Steps over the period of the signals.
 
@@ -214,18 +219,18 @@ def load_rows(
     for signal, share in zip(signals, measure.shares(points), strict=True):
         if share == 0.0:
             continue
-        values = selected(measure, signal, mount_names).sample(samples)
+        values = selected(measure, signal, engine).sample(samples)
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
         blocks.append(rows)
         weights.append(np.full(len(rows), share / len(rows)))
     return Rows(measure.norm, np.concatenate(blocks), Grid(np.concatenate(weights), samples))
 
 
-def selected(measure: Measure, signal: Spectrum, mount_names: Sequence[str]) -> Spectrum:
+def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
     """The places and orders of a signal (n, places, d) that count, its directions weighted."""
     c = signal.coefficients
-    if measure.mounts is not None:
-        c = c[:, measure.places(mount_names), :]
+    if measure.at is not None:
+        c = c[:, measure.places(measure.load.places(engine)), :]
     if measure.direction_weights is not None:
         c = c * np.array(measure.direction_weights)
     counted = Spectrum(signal.base, c)

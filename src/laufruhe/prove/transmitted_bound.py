@@ -87,7 +87,7 @@ def transmitted_bound(problem: Problem) -> float:
 
 
 def _is_bounded(quantity: Measure) -> bool:
-    return quantity.channel is channels.MOUNT_FORCE and quantity.mounts is None
+    return quantity.channel is channels.MOUNT_FORCE and quantity.at is None
 
 
 def softest_of(problem: Problem) -> Softest:

@@ -11,8 +11,9 @@ import numpy as np
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.wrench import WRENCH
-from laufruhe.present.measures import PRESENT, Array, is_met, limits_of, mount_orders, shaking_orders
+from laufruhe.present.measures import PRESENT, Array, is_met, limits_of, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
@@ -32,12 +33,12 @@ def as_dict(result: Result) -> Record:
     """The contract as plain Python values."""
     problem = result.problem
     points = [
-        {**_of(point, "name speed weight"), "mounts": _mounts(result, k),
-         "shaking": _shaking(result.final.loads[k].wrench)}
+        {**_of(point, "name speed weight"), **_by_place(result, k), "shaking": _shaking(result.final.loads[k].wrench)}
         for k, point in enumerate(problem.points)
     ]  # fmt: skip
     # one operating point stands at the top already
-    own = ("name", "speed", "weight") if len(points) == 1 else ("name", "speed", "weight", "mounts", "shaking")
+    places = {"mounts": None} | {places.key: None for places in places_of(result)}
+    own = ("name", "speed", "weight", *((*places, "shaking") if len(points) > 1 else ()))
     return {
         "problem": problem.name,
         **_of(problem, "title source assumptions"),
@@ -49,7 +50,7 @@ def as_dict(result: Result) -> Record:
             d.name: _of(d, "value unit lower upper at_bound initial shadow_price") for d in result.decisions
         },
         "constraints": _constraints(result),
-        "mounts": _all_points(result, [point["mounts"] for point in points]),
+        **{key: _all_points(result, [point[key] for point in points]) for key in places},
         "shaking": _largest([point["shaking"] for point in points]),
         "points": [{key: point[key] for key in own} for point in points],
         **({"modes": _modes(result.final)} if is_elastic(result) else {}),
@@ -104,11 +105,14 @@ def _constraints(result: Result) -> list[Record]:
     ]
 
 
-def _mounts(result: Result, k: int) -> list[Record]:
-    forces = result.final.loads[k].mount_forces
-    if forces is None:
-        return []
-    before, after = measured(result.initial, k), measured(result.final, k)
+def _by_place(result: Result, k: int) -> Record:
+    """Mounts, main bearings and crank pins at one operating point; mounts are always there."""
+    return {"mounts": []} | {places.key: _places(result, k, places.channel) for places in places_of(result)}
+
+
+def _places(result: Result, k: int, channel: LoadChannel) -> list[Record]:
+    forces = channel.signal(result.final.loads[k])
+    before, after = measured(result.initial, k, channel), measured(result.final, k, channel)
     amplitudes = mount_orders(forces)
     kept = np.flatnonzero(np.any(amplitudes > PRESENT * amplitudes.max(initial=0.0), axis=1))
     return [
@@ -118,7 +122,7 @@ def _mounts(result: Result, k: int) -> list[Record]:
             "orders": [{"order": float(forces.orders[j]), "amplitude": float(amplitudes[j, m])} for j in kept],
             "initial": _of(before[m], "mean max rms"),
         }
-        for m, name in enumerate(result.final.mount_names)
+        for m, name in enumerate(channel.places(result.final.engine))
     ]
 
 

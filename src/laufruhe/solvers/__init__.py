@@ -104,6 +104,15 @@ def _places(problem: Problem, say: Say) -> Result:
     return solve_within(problem, lambda at: solve_places(at, say))
 
 
+def _asks_block(problem: Problem) -> bool:
+    """Whether nothing is asked of loads inside the crankcase, and of the mounts nothing that depends on loads."""
+    return _asks_loads(problem) and _nothing_inside(problem)
+
+
+def _nothing_inside(problem: Problem) -> bool:
+    return not any(measure.is_inside for measure in problem.measures)
+
+
 def _asks_loads(problem: Problem) -> bool:
     """Whether nothing that is asked of the mounts depends on loads: it holds for every design, or for none."""
     asked = [measure.channel for measure in problem.measures]
@@ -115,12 +124,12 @@ METHODS: tuple[Method, ...] = (
     Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, _given),
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem, _: solve_within(problem, solve_unbalances)),
-    Method("cones over boxes of places", frozenset({_U, _P}), _asks_loads, Reach.WHOLE, _places),
-    Method("stars, each with cones", frozenset({_S, _U}), _asks_loads, Reach.WHOLE, _stars),
+    Method("cones over boxes of places", frozenset({_U, _P}), _asks_block, Reach.WHOLE, _places),
+    Method("stars, each with cones", frozenset({_S, _U}), _asks_block, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), lambda _: True, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), lambda _: True, Reach.ASIDE, _smooth),
-    Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), lambda _: True, Reach.ASIDE,
+    Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _nothing_inside, Reach.ASIDE,
            _stars_on_mounts),
 )  # fmt: skip
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""

@@ -82,6 +82,7 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
             ).placed(*(k * along for along in rotor.place))
             for rotor in engine.rotors
         ),
+        bearings=tuple(bearing.scaled(k) for bearing in engine.bearings),
         mounts=tuple(
             replace(mount, position=(mount.position[0] * k, mount.position[1] * k, mount.position[2] * k))
             for mount in engine.mounts

@@ -83,7 +83,7 @@ def rigid_part(problem: Problem) -> RigidPart:
 
 
 def _is_covered(measure: Measure, engine: Engine) -> bool:
-    if not measure.is_load or measure.orders is not None:
+    if not measure.is_load or measure.orders is not None or measure.is_inside:
         return False
     return engine.block is None or not measure.on_mounts
 
@@ -163,6 +163,6 @@ def _vectors(measure: Measure, problem: Problem, wrenches: Sequence[Digits]) -> 
             forces: Any = np.array([wrench @ one.T for one in maps])
             on_mounts = Spectrum(Fraction(1), forces.swapaxes(0, 1)) if maps else None
             loads = PointLoads(point, Spectrum(Fraction(1), steps), on_mounts)
-            values = measure.signal(loads, [mount.name for mount in mounts]).coefficients
+            values = measure.signal(loads, problem.engine).coefficients
             blocks.append(values.swapaxes(0, 1).reshape(-1, values.shape[-1]))
     return np.concatenate(blocks)

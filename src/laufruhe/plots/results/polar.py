@@ -27,7 +27,7 @@ from laufruhe.plots.style import (
 )  # fmt: skip
 from laufruhe.present.measures import Array, hardest_point, has_mount_forces
 from laufruhe.present.numbers import trimmed
-from laufruhe.problem.evaluation import mount_samples
+from laufruhe.problem.evaluation import samples_of
 from laufruhe.solvers.result import Result
 
 MOST_PANELS = 12
@@ -38,7 +38,7 @@ applies = has_mount_forces
 def figure(result: Result) -> Figure:
     """One panel for each mount, all to one scale."""
     k, series = hardest_point(result), series_of(result, loads=True)
-    paths = [_closed(mount_samples(one.design, k)) for one in series]
+    paths = [_closed(samples_of(one.design, k)) for one in series]
     mounts = result.problem.engine.mounts[:MOST_PANELS]
     lateral, vertical = _reach(paths, len(mounts))
     columns = _columns(len(mounts), lateral < 0.7 * vertical)

@@ -1,9 +1,9 @@
-"""Force of every mount over the cycle, before and after."""
+"""Force on every mount, main bearing and crank pin over the cycle, before and after."""
 
 from __future__ import annotations
 
 from laufruhe.physics.metrics import CycleMeasures
-from laufruhe.present.measures import has_mounts, load_designs
+from laufruhe.present.measures import Places, load_designs, places_of
 from laufruhe.present.numbers import DASH, number, percent
 from laufruhe.problem.evaluation import measured
 from laufruhe.report.grid import Grid
@@ -13,22 +13,24 @@ ONE, TWO = ("mean", "max", "rms"), ("mean before", "mean after", "change", "max 
 
 
 def tables(result: Result) -> list[Grid]:
-    """A row a mount, at every operating point."""
-    if not has_mounts(result):
-        return []
+    """A row a place, at every operating point."""
+    return [_table(result, places) for places in places_of(result)]
+
+
+def _table(result: Result, places: Places) -> Grid:
     points, designs = result.problem.points, load_designs(result)
-    names = result.initial.mount_names
+    names = places.channel.places(result.problem.engine)
     found = [
         ((point.name, name) if len(points) > 1 else (name,), each)
         for k, point in enumerate(points)
-        for name, *each in zip(names, *(measured(design, k) for design in designs), strict=True)
+        for name, *each in zip(names, *(measured(design, k, places.channel) for design in designs), strict=True)
     ]
     scale = max((each[0].max for _, each in found), default=0.0)
     rows = tuple((*lead, *_cells(each, scale)) for lead, each in found)
-    at, first = ("", ("at", "mount")) if len(points) > 1 else (f" at {points[0].name}", ("mount",))
+    at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
     note = f"The design as given has none: {result.initial.resonance}." if result.initial.resonance else ""
     head = (*first, *(TWO if len(designs) > 1 else ONE))
-    return [Grid(f"Mount forces{at} [N]", head, rows, note=note, left=len(first))]
+    return Grid(f"{places.title}{at} [N]", head, rows, note=note, left=len(first))
 
 
 def _cells(each: list[CycleMeasures], scale: float) -> list[str]:

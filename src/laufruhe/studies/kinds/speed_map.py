@@ -228,7 +228,7 @@ def _mapped(
             continue
         values[:, k] = [found.value(measure) for measure in measures]
         if by_order and isinstance(channel, LoadChannel):
-            signal = selected(measures[0], channel.signal(found.loads[0]), found.mount_names)
+            signal = selected(measures[0], channel.signal(found.loads[0]), found.engine)
             amplitudes = order_amplitude(signal.coefficients).max(axis=1)
             for order, size in zip(signal.orders, amplitudes, strict=True):
                 sizes.setdefault(float(order), np.zeros(len(speeds)))[k] = size

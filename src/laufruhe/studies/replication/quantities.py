@@ -16,7 +16,7 @@ from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import cycle_measures, turning_parts
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import mount_samples
+from laufruhe.problem.evaluation import samples_of
 from laufruhe.problem.measure import MEASURES
 from laufruhe.solvers.result import Result
 from laufruhe.studies.replication.expressions import check_among
@@ -80,7 +80,7 @@ def asked(result: Result, what: str | AskedTable) -> Labelled:
 
 def _signal(result: Result, _: AskedTable) -> Labelled:
     """Mount forces over the cycle."""
-    values = mount_samples(result.final, 0)[:, :, 1:]
+    values = samples_of(result.final, 0)[:, :, 1:]
     turns = result.final.engine.cycle.turns
     angle = (360.0 * turns * np.arange(len(values)) / len(values)).tolist()
     names = result.final.mount_names
@@ -88,7 +88,7 @@ def _signal(result: Result, _: AskedTable) -> Labelled:
 
 
 def _by_mount(measure: str, result: Result, _: AskedTable) -> Labelled:
-    forces = mount_samples(result.final, 0)
+    forces = samples_of(result.final, 0)
     values = [getattr(cycle_measures(forces[:, m]), measure) for m in range(forces.shape[1])]
     return Labelled(values, {"mount": result.final.mount_names})
 

@@ -1,0 +1,215 @@
+"""Loads inside the crankcase: rods on their crank pins, crankshaft on its main bearings (B1-B6).
+
+Piston and small end are driven along the cylinder axis by gas and inertia, P; the rod leans on
+the cylinder wall with N, so that it turns as it does. Their sum is what the rod presses on its pin:
+
+    P = -m s'' - A (p - p_crankcase)                                        (B1; textbook eqs. 16, 17)
+    N = -P tan psi - dTheta psi'' / (l cos psi)                             (B2; eq. 12)
+    F_pin = (P + i N) e^{i beta} + m_rot r w^2 e^{i (phi + theta)}          (B3; example 3)
+
+Pins, webs and counterweights load the crankshaft, each in its own plane; it is taken as cut in the
+middle of its journals, so that the two bearings beside a load share it by the lever rule (B4). Bearings
+are linear in every unbalance on their shaft. Taken as one beam, the shaft hands some of a load on to farther
+bearings (B6), still linear. What gears and belts add is not modelled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank, kinematics
+from laufruhe.numerics.spectrum import Spectrum, spectrum_of
+from laufruhe.numerics.turns import as_turn, cis
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.gas_cycle import cylinder_pressure
+from laufruhe.physics.mechanism import resolved_orders
+from laufruhe.physics.shaking_loads import order_index, rotor_wrench, spread
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
+    """Whether loads inside the crankcase are modelled: of plain slider-cranks at even crank speed."""
+    return not fidelity.is_uneven and all(type(part) is SliderCrank for part in engine.slider_cranks)
+
+
+def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Force of every rod on its crank pin (B1-B3).
+
+    Returns
+    -------
+    Spectrum of shape (n, cylinders, 3) [N], in the axes of C2.
+
+    Raises
+    ------
+    ModelError
+        If the crank turns unevenly, or a mechanism is no plain slider-crank.
+    """
+    if fidelity.is_uneven:
+        raise ModelError("bearing loads are modelled at even crank speed; leave crank_inertia out")
+    gas, parts = fidelity.gas_of(point), engine.slider_cranks
+    loads = [_of_rod(engine.cycle, part, point.speed, gas, fidelity) for part in parts]
+    return _side_by_side(loads, engine.cycle)
+
+
+def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Force of the shafts on every main bearing, linear in their unbalances (B4).
+
+    Returns
+    -------
+    Spectrum of shape (n, bearings, 3) [N], in the axes of C2.
+
+    Raises
+    ------
+    ModelError
+        As `pin_forces`; if a shaft that is loaded has fewer than two bearings.
+    """
+    bearings, cycle = engine.bearings, engine.cycle
+    pins = pin_forces(engine, point, fidelity)
+    total = Spectrum(cycle.base_order, np.zeros((1, len(bearings), 3), dtype=complex))
+    for shaft in dict.fromkeys(bearing.shaft for bearing in bearings):
+        carried = [k for k, part in enumerate(engine.slider_cranks) if part.shaft == shaft]
+        own = [rotor for rotor in engine.rotors if rotor.shaft == shaft]
+        at_pins = Spectrum(pins.base, pins.coefficients[:, carried])
+        rotors = _side_by_side([_of_rotor(rotor, point.speed, cycle) for rotor in own], cycle)
+        for places, forces in (([engine.slider_cranks[k].x for k in carried], at_pins), ([r.x for r in own], rotors)):
+            shares = np.zeros((len(bearings), len(places)))
+            rows = [k for k, bearing in enumerate(bearings) if bearing.shaft == shaft]
+            shares[rows] = SHARES[fidelity.crankshaft]([bearings[k].x for k in rows], places)
+            total = total + Spectrum(forces.base, np.einsum("bp,npd->nbd", shares, forces.coefficients))
+    return total
+
+
+def lever_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
+    """Share of a load at each place that each bearing carries, shape (bearings, places) (B4).
+
+    A load beside all bearings hangs over: the two nearest carry it, the far one upwards.
+    """
+    order = np.argsort(bearings)
+    x = np.asarray(bearings, dtype=float)[order]
+    shares = np.zeros((len(x), len(places)))
+    if not len(places):
+        return shares
+    if len(x) < 2:
+        raise ModelError("a shaft that is loaded needs two main bearings at least; add one")
+    columns = np.arange(len(places))
+    first = np.clip(np.searchsorted(x, places, side="right") - 1, 0, len(x) - 2)
+    far = (np.asarray(places) - x[first]) / (x[first + 1] - x[first])
+    shares[first, columns], shares[first + 1, columns] = 1.0 - far, far
+    return shares[np.argsort(order)]
+
+
+def beam_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
+    """As `lever_shares`, of a continuous beam of one stiffness on supports that do not give way (B6).
+
+    Bending between bearings and loads is a cubic exactly, so that a beam element each is exact.
+    """
+    shares = lever_shares(bearings, places)
+    if len(bearings) == 2:
+        return shares
+    x = np.unique([*bearings, *places])
+    stiffness = np.zeros((2 * len(x), 2 * len(x)))
+    for k, length in enumerate(np.diff(x) / np.ptp(x)):
+        a, b, c = 12.0 / length**3, 6.0 / length**2, 2.0 / length
+        element = [[a, b, -a, b], [b, 2 * c, -b, c], [-a, -b, a, -b], [b, c, -b, 2 * c]]
+        stiffness[2 * k : 2 * k + 4, 2 * k : 2 * k + 4] += element
+    held, loaded = 2 * np.searchsorted(x, bearings), 2 * np.searchsorted(x, places)
+    free = np.setdiff1d(np.arange(2 * len(x)), held)
+    moved = np.zeros((2 * len(x), len(held)))
+    moved[held, np.arange(len(held))] = 1.0
+    # what a support carries of a load is how far the beam comes down there as that support does (Maxwell, Betti)
+    moved[free] = -np.linalg.solve(stiffness[np.ix_(free, free)], stiffness[np.ix_(free, held)])
+    return np.asarray(moved[loaded].T)
+
+
+SHARES = {"cut": lever_shares, "beam": beam_shares}
+
+
+def bearing_pressures(engine: Engine, forces: Spectrum) -> Spectrum:
+    """Force over projected area of every main bearing [Pa] (B5; textbook, example 3)."""
+    areas = np.array([bearing.area for bearing in engine.bearings])
+    return Spectrum(forces.base, forces.coefficients / areas[:, None])
+
+
+def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
+    index = order_index(cycle, abs(rotor.shaft.ratio))
+    out = np.zeros((index + 1, 3), dtype=complex)
+    out[index] = rotor_wrench(rotor, speed)[:3]
+    return Spectrum(cycle.base_order, out)
+
+
+@lru_cache(maxsize=256)
+def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
+    """Force of one rod on its pin, shape (n, 3) (B3)."""
+    if type(part) is not SliderCrank:
+        raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
+    ratio = part.shaft.ratio
+    series = _inertia_orders(part, fidelity) * (ratio * speed) ** 2
+    phases = np.array([cis(part.star_turn * h) for h in range(len(series))])
+    moved = series * phases[:, None]
+    moved = moved if ratio > 0.0 else moved.conj()
+    load = fidelity.kept(spread(moved, order_index(cycle, abs(ratio)), cycle))
+    if gas is not None:
+        load = load + fidelity.kept(_gas_orders(cycle, part, gas, fidelity))
+    along, across = load.coefficients.T
+    axis = cis(as_turn(part.bank))
+    turned = np.stack([0.0 * along, axis.imag * along + axis.real * across, axis.real * along - axis.imag * across], 1)
+    rod = Rotor("rod", part.x, part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
+    found = Spectrum(load.base, turned) + _of_rotor(rod, speed, cycle)
+    found.coefficients.setflags(write=False)
+    return found
+
+
+@lru_cache(maxsize=256)
+def _inertia_orders(part: SliderCrank, fidelity: Fidelity) -> ComplexArray:
+    """P and N of the masses alone at unit speed of the crank, by order of its own angle, shape (n, 2) (B1, B2)."""
+
+    def loads(alpha: Array) -> tuple[Array, Array]:
+        motion = part.motion(np, alpha)
+        ((mass, (_, _, acceleration)),) = motion.points
+        if fidelity.kinematics == "two-order":
+            acceleration = -part.crank_radius * (np.cos(alpha) + part.rod_ratio * np.cos(2.0 * alpha))
+        along = -mass * acceleration.real
+        across = -along * _tangent(part, alpha)
+        for inertia, (_, turning) in motion.swings if fidelity.rod == "rigid" and part.rod_ratio > 0.0 else ():
+            across += inertia * turning / (part.rod_length * _cosine(part, alpha))
+        return along, across
+
+    table = resolved_orders(loads, np.ones((2, 1)), part.name).T
+    last = fidelity.local_orders(part.shaft.ratio)
+    return table if last is None else table[: last + 1]
+
+
+@lru_cache(maxsize=256)
+def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity) -> Spectrum:
+    """P and N of the gas over the crank angle of the engine, shape (n, 2) (B1, B2)."""
+    steps = fidelity.gas_steps
+    alpha = part.fires_at + part.shaft.ratio * cycle.angle * np.arange(steps) / steps
+    along = -part.piston_area * (cylinder_pressure(gas, part, cycle, steps) - gas.crankcase_pressure)
+    from_firing = spectrum_of(np.stack([along, -along * _tangent(part, alpha)], axis=1), cycle.base_order)
+    delay = as_turn(part.firing_angle) / cycle.turns
+    phases = np.array([cis(-delay * h) for h in range(len(from_firing.coefficients))])
+    return fidelity.kept_of_gas(Spectrum(cycle.base_order, from_firing.coefficients * phases[:, None]))
+
+
+def _cosine(part: SliderCrank, alpha: Array) -> Array:
+    return np.asarray(kinematics.cos_psi(np, alpha, part.rod_ratio, part.offset_ratio))
+
+
+def _tangent(part: SliderCrank, alpha: Array) -> Array:
+    return np.asarray(kinematics.sin_psi(np, alpha, part.rod_ratio, part.offset_ratio) / _cosine(part, alpha))
+
+
+def _side_by_side(loads: list[Spectrum], cycle: Cycle) -> Spectrum:
+    """Forces (n, 3) each as one signal (n, places, 3)."""
+    length = max((len(load.coefficients) for load in loads), default=1)
+    out = np.zeros((length, len(loads), 3), dtype=complex)
+    for k, load in enumerate(loads):
+        out[: len(load.coefficients), k] = load.coefficients
+    return Spectrum(cycle.base_order, out)

@@ -1,0 +1,95 @@
+"""Polar load diagrams of the main bearings, seen from the block and from the crankshaft, with where they wear (B4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from laufruhe.plots.style import FAINT, INK, ORANGE, entry_of_dots, fitted, headed, page, point_name, series_of, thin
+from laufruhe.present.measures import BEARINGS, Array, has_loads, load_designs, places_of
+from laufruhe.problem.evaluation import samples_of
+from laufruhe.solvers.result import Result
+
+MOST_BEARINGS, PANEL, STEPS = 6, 2.3, 180
+# of a panel: where the ring of wear begins, how thick it is at most, and what the paths fill
+RING, THICK, FILLED = 0.86, 0.12, 0.80
+# a load wears its bearing this far to either side
+SIDES = math.radians(60.0)
+Plane = NDArray[np.complex128]
+
+
+def applies(result: Result) -> bool:
+    """Whether there are main bearings with loads to draw."""
+    return BEARINGS in places_of(result) and has_loads(result)
+
+
+def figure(result: Result) -> Figure:
+    """A column a bearing, all to one scale: above as the block feels it, below as the crankshaft does."""
+    k, series = _hardest(result), series_of(result, loads=True)
+    forces = [samples_of(one.design, k, BEARINGS.channel) for one in series]
+    planes = [force[..., 2] + 1j * force[..., 1] for force in forces]
+    names = BEARINGS.channel.places(result.final.engine)
+    sizes = np.abs(planes[-1]).max(axis=0)
+    chosen = sorted(np.argsort(-sizes, kind="stable")[:MOST_BEARINGS].tolist())
+    largest = thin(float(np.abs(plane[:, chosen]).max()) for plane in planes)
+    factor, unit = (1e-3, "kN") if largest >= 1e4 else (1.0, "N")
+    turned = np.exp(-1j * result.final.engine.cycle.angle * np.arange(len(planes[0])) / len(planes[0]))
+    drawn = page(2, len(chosen), (PANEL, PANEL), gap=0.55, lead=0.16, across=0.3)
+    for row, (seen, across, along) in enumerate(((1.0, "lateral", "vertical"), (turned, "across", "along"))):
+        for column, m in enumerate(chosen):
+            axes = drawn.panels[row * len(chosen) + column]
+            paths = [factor * plane[:, m] * seen for plane in planes]
+            _draw(axes, paths, [one.colour for one in series], factor * largest / FILLED)
+            title = "on the crankshaft" if row else fitted(f"bearing {names[m]}", PANEL + 0.6, 9)
+            axes.set_title(title, loc="left", size=9, color=INK, parse_math=False)
+            axes.set(xlabel=f"{across} [{unit}]", ylabel="" if column else f"{along} [{unit}]")
+            axes.tick_params(labelleft=column == 0, length=2)
+    some = f"The {len(chosen)} most loaded of {len(names)} bearings. " if len(chosen) < len(names) else ""
+    lines = f"Force of the crankshaft at {point_name(result, k)}, seen from the front; its axes stand upright at 0°."
+    dot = entry_of_dots("at 0°", color=INK, markersize=4.0)
+    wear: Artist = Patch(color=ORANGE, alpha=0.6, label="where it wears" + (", as decided" if len(series) > 1 else ""))
+    legend = [*(one.entry() for one in series), dot, wear]
+    return headed(drawn, result, "Main-bearing loads over one working cycle", lines, legend, some)
+
+
+def _hardest(result: Result) -> int:
+    """The operating point with the largest force on a bearing."""
+    design = load_designs(result)[0]
+    return int(np.argmax([np.abs(samples_of(design, k, BEARINGS.channel)).max() for k in range(len(design.loads))]))
+
+
+def _draw(axes: Axes, paths: Sequence[Plane], colours: Sequence[str], size: float) -> None:
+    axes.set(xlim=(-size, size), ylim=(-size, size), aspect="equal")
+    axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
+    axes.axvline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
+    for direction in (axes.xaxis, axes.yaxis):
+        direction.set_major_locator(MaxNLocator(4, symmetric=True, steps=[1, 2, 5, 10]))
+    for path, colour in zip(paths, colours, strict=True):
+        whole = np.append(path, path[0])
+        axes.plot(whole.imag, whole.real, color=colour, linewidth=1.5, solid_joinstyle="round")
+        axes.plot(path[:1].imag, path[:1].real, "o", color=colour, markersize=4.0)
+    _wear(axes, paths[-1], size)
+
+
+def wear_of(path: Plane, angles: Array) -> Array:
+    """Load of every direction over the cycle as a share of the most loaded, each load taken SIDES to both sides."""
+    apart = np.abs(np.angle(np.exp(1j * (np.angle(path)[:, None] - angles))))
+    total = (np.abs(path)[:, None] * (apart <= SIDES)).sum(axis=0)
+    return np.asarray(total / (total.max() or 1.0))
+
+
+def _wear(axes: Axes, path: Plane, size: float) -> None:
+    angles = math.tau * np.arange(STEPS + 1) / STEPS
+    inner = RING * size * np.exp(1j * angles)
+    outer = inner * (1.0 + THICK / RING * wear_of(path, angles))
+    ring = np.concatenate([outer, inner[::-1]])
+    axes.fill(ring.imag, ring.real, color=ORANGE, alpha=0.6, linewidth=0.0)
+    axes.plot(inner.imag, inner.real, color=FAINT, linewidth=0.5)

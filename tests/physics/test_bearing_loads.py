@@ -1,0 +1,216 @@
+"""Loads of crank pins and main bearings: what they add up to, and what they follow."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, Rod, Rotor, Seiliger, Shaft, SliderCrank
+from laufruhe.numerics.turns import cis
+from laufruhe.physics.bearing_loads import beam_shares, lever_shares, main_bearing_forces, pin_forces
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.gas_cycle import cylinder_pressure
+from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
+
+FloatArray = NDArray[np.float64]
+GAS = Seiliger(peak_pressure=80e5, imep=6e5)
+POINT = OperatingPoint("run", 230.0, GAS)
+ROD = Rod(0.2, 1.9, 0.07, 0.011)
+
+
+def engine_of(seed: int) -> Engine:
+    """A crankshaft with throws, banks, offsets and counterweights at random, in five bearings, beside a balancer."""
+    random = np.random.default_rng(seed)
+    parts = []
+    for k in range(4):
+        throw, bank = random.uniform(0.0, math.tau), random.uniform(-0.6, 0.6)
+        parts.append(
+            SliderCrank(
+                f"cylinder {k + 1}", 0.15 - 0.1 * k, 0.05, ROD.length, 1.1 + ROD.reciprocating_mass, throw, bank,
+                random.uniform(-0.01, 0.01), ROD.rotating_mass, ROD.inertia_deficit, 0.09,
+            )
+        )  # fmt: skip
+        parts[-1] = replace(parts[-1], firing_angle=(bank - throw + parts[-1].fires_at) % math.tau)
+    rotors = [Rotor(f"web {k}", random.uniform(-0.25, 0.25), complex(*random.normal(0.0, 0.05, 2))) for k in range(3)]
+    rotors.append(Rotor("balancer", 0.04, 0.02 + 0.01j, Shaft("balancer", -2.0, 0.1, -0.08)))
+    bearings = tuple(Bearing(str(k), x) for k, x in enumerate((0.2, 0.1, 0.0, -0.1, -0.2)))
+    return Engine("random", Cycle.FOUR_STROKE, tuple(parts), tuple(rotors), bearings=bearings)
+
+
+def walls_and_heads(engine: Engine, steps: int) -> FloatArray:
+    """Wrench of the pistons on their walls and of the gas on the heads, from what the pins carry, shape (steps, 6)."""
+    phi = engine.cycle.angle * np.arange(steps) / steps
+    pins = pin_forces(engine, POINT, replace(EXACT, samples=steps)).sample(steps)
+    total = np.zeros((steps, 6))
+    for k, part in enumerate(engine.slider_cranks):
+        axis = cmath.exp(1j * part.bank)
+        arm = part.crank_radius * np.exp(1j * (phi + part.throw))
+        on_pin = (pins[:, k, 2] + 1j * pins[:, k, 1] - part.rotating_mass * POINT.speed**2 * arm) / axis
+        local = arm / axis - 1j * part.offset
+        height = local.real + np.sqrt(part.rod_length**2 - local.imag**2) + 1j * part.offset
+        pressure = cylinder_pressure(GAS, part, engine.cycle, steps)
+        shift = round(part.firing_angle / engine.cycle.angle * steps)
+        assert shift == pytest.approx(part.firing_angle / engine.cycle.angle * steps, abs=1e-9)
+        gas = part.piston_area * np.roll(pressure - GAS.crankcase_pressure, shift)
+        for place, force in ((height, -1j * on_pin.imag), (height.imag * 1j, gas + 0j)):
+            place, force = place * axis, force * axis
+            lateral, vertical = force.imag, force.real
+            roll = place.imag * vertical - place.real * lateral
+            total += np.stack([0 * roll, lateral, vertical, roll, -part.x * vertical, part.x * lateral], axis=1)
+    return total
+
+
+def on_grid(engine: Engine, steps: int) -> Engine:
+    """The engine with throws and banks on a grid of its angles, so that gas is sampled where it is given."""
+    grid = engine.cycle.angle / steps
+    parts = []
+    for part in engine.slider_cranks:
+        throw, bank = (round(angle / grid) * grid for angle in (part.throw, part.bank))
+        parts.append(replace(part, throw=throw, bank=bank, firing_angle=(bank - throw) % math.tau))
+    return replace(engine, slider_cranks=tuple(parts))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bearings_walls_heads_and_balancers_make_the_shaking_loads(seed: int) -> None:
+    """Newton's third law for the block, forces and moments, to rounding: gas and inertia by different formulas."""
+    steps = 2880
+    engine = on_grid(engine_of(seed), steps)
+    fidelity = replace(EXACT, samples=steps)
+    bearings = main_bearing_forces(engine, POINT, fidelity).sample(steps)
+    _, lateral, vertical = np.moveaxis(bearings, 2, 0)
+    x, none = np.array([bearing.x for bearing in engine.bearings]), np.zeros(steps)
+    inside = np.stack([none, lateral.sum(1), vertical.sum(1), none, -vertical @ x, lateral @ x], axis=1)
+    balancer = rotor_loads(engine.rotors[-1:], POINT.speed, engine.cycle).sample(steps)
+    total = inside + walls_and_heads(engine, steps) + balancer
+    wanted = shaking_loads(engine, POINT, fidelity).sample(steps)
+    size = np.abs(bearings).max()
+    assert np.abs(total - wanted).max() < 1e-12 * size
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pin_forces_are_those_of_newton_and_euler(seed: int) -> None:
+    """Rod and piston as rigid bodies, accelerations by differences of places, joint forces by their balances."""
+    engine = engine_of(seed)
+    part, speed, step = engine.slider_cranks[seed], POINT.speed, 1e-3
+    phi = np.linspace(0.0, math.tau, 25)
+
+    def bodies(angle: FloatArray) -> tuple[NDArray[np.complex128], ...]:
+        pin = part.crank_radius * np.exp(1j * (angle + part.throw - part.bank))
+        across = pin.imag - part.offset
+        piston = pin.real + np.sqrt(part.rod_length**2 - across**2) + 1j * part.offset
+        reach = piston - pin
+        return pin, piston, pin + reach * ROD.centre_of_gravity / ROD.length, np.unwrap(np.angle(reach)) + 0j
+
+    def second(values: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
+        a, b, c, d, e = values
+        return (-a + 16 * b - 30 * c + 16 * d - e) / (12.0 * step**2) * speed**2
+
+    moved = [bodies(phi + k * step) for k in (-2, -1, 0, 1, 2)]
+    pin, piston, middle, _ = moved[2]
+    of_piston, of_rod, of_angle = (second([m[j] for m in moved]) for j in (1, 2, 3))
+    found = pin_forces(engine, replace(POINT, gas=None)).values(phi)[:, seed]
+    for k in range(len(phi)):
+        # unknown: force of the piston on the rod (2), of the pin on the rod (2), of the wall on the piston (1)
+        a, b = piston[k] - middle[k], pin[k] - middle[k]
+        balance = np.array([
+            [1, 0, 1, 0, 0], [0, 1, 0, 1, 0], [-a.imag, a.real, -b.imag, b.real, 0], [-1, 0, 0, 0, 0], [0, -1, 0, 0, 1],
+        ])  # fmt: skip
+        mass = 1.1
+        right = [ROD.mass * of_rod[k].real, ROD.mass * of_rod[k].imag, ROD.inertia * of_angle[k].real,
+                 mass * of_piston[k].real, mass * of_piston[k].imag]  # fmt: skip
+        forces = np.linalg.solve(balance, np.array(right))
+        wanted = -complex(forces[2], forces[3]) * cmath.exp(1j * part.bank)
+        assert found[k, 2] + 1j * found[k, 1] == pytest.approx(wanted, abs=1e-6 * abs(wanted) + 0.02)
+
+
+def test_bearings_are_linear_in_the_unbalances_of_their_shaft() -> None:
+    engine = engine_of(1)
+
+    def forces(gains: tuple[complex, ...]) -> FloatArray:
+        rotors = (replace(r, unbalance=g * r.unbalance) for r, g in zip(engine.rotors, gains, strict=True))
+        return main_bearing_forces(replace(engine, rotors=tuple(rotors)), POINT).sample(64)
+
+    none, both = forces((0, 0, 0, 0)), forces((2.0, 3.0j, 0, 0))
+    assert both == pytest.approx(forces((2.0, 0, 0, 0)) + forces((0, 3.0j, 0, 0)) - none, rel=1e-12, abs=1e-9)
+    # a balancer shaft has bearings of its own
+    assert np.array_equal(forces((0, 0, 0, 7.0)), none)
+
+
+def test_lever_rule_keeps_forces_and_moments() -> None:
+    bearings, places = [0.2, -0.1, 0.05], [0.3, 0.2, 0.1, -0.03, -0.1, -0.4]
+    shares = lever_shares(bearings, places)
+    assert shares.sum(axis=0) == pytest.approx(1.0)
+    assert np.array(bearings) @ shares == pytest.approx(places)
+    between = shares[:, 1:5]
+    assert between.min() >= 0.0
+    assert np.count_nonzero(between, axis=0).max() <= 2
+
+
+def test_turning_the_engine_turns_its_loads() -> None:
+    """A crank and its banks turned by an angle, in the plane across the crank."""
+    engine, angle = engine_of(2), 0.7
+    parts = (replace(p, throw=p.throw + angle, bank=p.bank + angle) for p in engine.slider_cranks)
+    rotors = (replace(r, unbalance=r.unbalance * cis(angle / math.tau)) for r in engine.rotors[:-1])
+    one = main_bearing_forces(replace(engine, rotors=engine.rotors[:-1]), POINT).sample(90)
+    two = main_bearing_forces(replace(engine, slider_cranks=tuple(parts), rotors=tuple(rotors)), POINT).sample(90)
+    planes = [values[..., 2] + 1j * values[..., 1] for values in (one, two)]
+    assert planes[1] == pytest.approx(planes[0] * cmath.exp(1j * angle), rel=1e-9, abs=1e-6)
+
+
+def test_one_bearing_does_not_carry_a_throw() -> None:
+    engine = engine_of(0)
+    with pytest.raises(ModelError, match="two main bearings"):
+        main_bearing_forces(replace(engine, bearings=engine.bearings[:1]), POINT)
+
+
+def test_uneven_speed_is_refused() -> None:
+    with pytest.raises(ModelError, match="even crank speed"):
+        pin_forces(engine_of(0), POINT, Fidelity(crank_inertia=1.0))
+
+
+def three_moments(bearings: FloatArray, place: float) -> FloatArray:
+    """Reactions of a unit load inside a beam by Clapeyron's equations of the moments over its supports."""
+    n, spans = len(bearings), np.diff(bearings)
+    k = int(np.searchsorted(bearings, place)) - 1
+    a = place - bearings[k]
+    b = spans[k] - a
+    matrix, right = np.eye(n), np.zeros(n)
+    for j in range(1, n - 1):
+        matrix[j, j - 1 : j + 2] = spans[j - 1], 2.0 * (spans[j - 1] + spans[j]), spans[j]
+        # sagging moments; the load's own terms, of the span to the left and to the right of support j
+        right[j] -= a * (spans[k] ** 2 - a**2) / spans[k] if k == j - 1 else 0.0
+        right[j] -= b * (spans[k] ** 2 - b**2) / spans[k] if k == j else 0.0
+    moments = np.linalg.solve(matrix, right)
+    slopes = np.diff(moments) / spans
+    reactions = np.concatenate([slopes, [0.0]]) - np.concatenate([[0.0], slopes])
+    reactions[k] += b / spans[k]
+    reactions[k + 1] += a / spans[k]
+    return reactions
+
+
+@pytest.mark.parametrize("count", [3, 4, 7])
+def test_a_beam_shares_as_the_three_moment_equations_say(count: int) -> None:
+    random = np.random.default_rng(count)
+    bearings = np.cumsum(random.uniform(0.05, 0.2, count))
+    places = random.uniform(bearings[0], bearings[-1], 5)
+    shares = beam_shares(list(bearings), list(places))
+    for k, place in enumerate(places):
+        assert shares[:, k] == pytest.approx(three_moments(bearings, place), abs=1e-12)
+
+
+def test_a_beam_keeps_forces_and_moments() -> None:
+    """Overhanging loads and loads at a bearing among them; by the lever rule on two bearings."""
+    bearings, places = [0.2, -0.1, 0.05, -0.3], [0.3, 0.2, 0.1, -0.03, -0.1, -0.4]
+    shares = beam_shares(bearings, places)
+    assert shares.sum(axis=0) == pytest.approx(1.0)
+    assert np.array(bearings) @ shares == pytest.approx(places)
+    assert shares[:, 1] == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-12)
+    assert beam_shares([0.0, 1.0], [0.25, 1.5]) == pytest.approx(lever_shares([0.0, 1.0], [0.25, 1.5]))
+    # the textbook's beam on three supports, loaded in the middle of one span: 13/32, 11/16, -3/32
+    assert beam_shares([0.0, 1.0, 2.0], [0.5])[:, 0] == pytest.approx([13 / 32, 11 / 16, -3 / 32])
