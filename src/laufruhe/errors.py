@@ -5,12 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
+def printed(text: str, most: int = 2000) -> str:
+    """One line as any screen may show it: an escape in place of what is not printed, cut where it is long."""
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text[:most])
+    return shown if len(text) <= most and len(shown) <= most else shown[: most - 3] + "..."
+
+
 class LaufruheError(Exception):
     """Base of every error this package raises on purpose."""
 
 
 class ModelError(LaufruheError, ValueError):
-    """A machine that cannot exist or cannot run as described."""
+    """A machine that cannot exist or cannot run as described; `where` is the key to blame, if one is known."""
+
+    def __init__(self, text: str, where: str = "") -> None:
+        self.where = where
+        super().__init__(text)
 
 
 class KeyedError(ModelError):
@@ -18,15 +28,15 @@ class KeyedError(ModelError):
 
     def __init__(self, key: str, text: str, value: str = "") -> None:
         self.key, self.text, self.value = key, text, value
-        super().__init__(key, text, value)
+        super().__init__(f"{key}: {text}", f"engine.{key}")
 
-    def __str__(self) -> str:
-        return f"{self.key}: {self.text}"
+    def __reduce__(self) -> tuple[type[KeyedError], tuple[str, str, str]]:
+        return KeyedError, (self.key, self.text, self.value)
 
 
 @dataclass(frozen=True)
 class Complaint:
-    """One thing wrong with an input, in the order in which a user reads it."""
+    """One thing wrong with an input, in the order in which a user reads it; whatever it quotes can be printed."""
 
     where: str
     value: str
@@ -34,16 +44,16 @@ class Complaint:
     remedy: str = ""
 
     def __str__(self) -> str:
-        shown = f" = {self.value}" if self.value else ""
-        remedy = f"; {self.remedy}" if self.remedy else ""
-        return f"{self.where}{shown}: {self.rule}{remedy}"
+        shown = f" = {printed(self.value, 60)}" if self.value else ""
+        remedy = f"; {printed(self.remedy, 400)}" if self.remedy else ""
+        return f"{printed(self.where, 120)}{shown}: {printed(self.rule, 300)}{remedy}"
 
     @classmethod
     def of(cls, error: Exception, where: str, value: str = "", remedy: str = "") -> Complaint:
         """Of an error whose text is a rule, and a remedy after '; '; `remedy` where it names none."""
         text = str(error)
         if isinstance(error, KeyedError):
-            where, value, text = f"engine.{error.key}", error.value, error.text
+            where, value, text = error.where, error.value, error.text
         rule, _, own = text.partition("; ")
         return cls(where, value, rule, own or remedy)
 
@@ -54,7 +64,7 @@ class InputError(LaufruheError, ValueError):
     def __init__(self, source: str, complaints: tuple[Complaint, ...]) -> None:
         self.source = source
         self.complaints = complaints
-        super().__init__("\n".join(f"{source}: {complaint}" for complaint in complaints))
+        super().__init__("\n".join(f"{printed(source, 400)}: {complaint}" for complaint in complaints))
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, tuple[Complaint, ...]]]:
         # raised in a worker process, it has to reach the one that speaks to the user
@@ -63,6 +73,9 @@ class InputError(LaufruheError, ValueError):
 
 class UncarriedLoadError(ModelError):
     """The engine excites a direction that no mount carries."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text, "mounts")
 
 
 class SolverError(LaufruheError, RuntimeError):

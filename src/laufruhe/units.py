@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pint
 
+LONGEST = 100
+"""Characters of a number with its unit."""
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
 # kp/cm2 as it is typed for kp/cm^2; H2O keeps its figure
 _POWER = re.compile(r"(?<=[a-z])([23])\b")
@@ -101,7 +103,7 @@ def advice(unit: str) -> str:
 
 def parse(text: str, unit: str) -> float:
     """SI value of a text such as '120 mm' in the dimension of `unit`; `UnitError` where it has none."""
-    match = _QUANTITY.match(text)
+    match = _QUANTITY.match(text) if len(text) <= LONGEST else None
     if match is None:
         raise UnitError(f"is not a number with a unit; {advice(unit)}")
     number, divisor, name = match.groups()

@@ -109,7 +109,7 @@ BAD = [
     bad("infinite", "0.26", "inf",
         "engine.rod_ratio = inf: is not finite; give a number"),
     bad("an integer beyond floats", "0.26", "1" + "0" * 400,
-        "engine.rod_ratio = 1000"),
+        "engine.rod_ratio: is a whole number of more than 64 bits; write"),
     bad("infinite length", '"120 mm"', '"1e999 mm"',
         'engine.stroke = "1e999 mm": is not finite; write'),
     bad("an angle that is no number", "throws = [0, 180,", "throws = [0, nan,",

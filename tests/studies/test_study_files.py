@@ -156,7 +156,7 @@ def test_problem_given_to_study_and_study_to_solve(tmp_path: Path, monkeypatch: 
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match="use laufruhe solve for a problem"):
         load_study(PROBLEMS / "tractor-single.toml")
-    for command in ("solve", "evaluate", "check"):
+    for command in ("solve", "evaluate", "explain"):
         answer = CliRunner().invoke(app, [command, str(PROBLEMS / "tractor-sweeps.toml")])
         assert answer.exit_code == 2
         assert "makes this a study file; use laufruhe study" in answer.stderr

@@ -92,13 +92,17 @@ def study(problem: StudyArgument, json: StudyJsonOption = None, out: OutOption =
 
 @app.command()
 def check(problem: ProblemArgument, json: JsonOption = None) -> None:
-    """Validate a problem file.
+    """Validate a problem or study file.
 
-    Says what it leaves open; nothing is solved, and no results folder is made.
+    Says what it leaves open, or how many points it has; nothing is solved, and no results folder is made.
     """
     with exit_statuses(problem), handing_out(json, problem) as hand_out:
-        from laufruhe.cli.solve import checked
+        from laufruhe.files.reader import is_study
 
+        if is_study(problem):
+            from laufruhe.cli.study import checked
+        else:
+            from laufruhe.cli.solve import checked
         hand_out(*checked(problem))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import typer
 
-from laufruhe.errors import Complaint, InputError, ModelError, SolverError
+from laufruhe.errors import Complaint, InputError, ModelError, SolverError, printed
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -67,10 +67,10 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
         complain(str(error))
         raise typer.Exit(BAD_INPUT) from None
     except ModelError as error:
-        complain(f"{path}: {error}")
+        complain(str(InputError(str(path), (Complaint.of(error, error.where or "problem"),))))
         raise typer.Exit(BAD_INPUT) from None
     except SolverError as error:
-        complain(f"{path}: {error}")
+        complain(printed(f"{path}: {error}"))
         raise typer.Exit(FAILED) from None
     except KeyboardInterrupt:
         complain(f"laufruhe: {interrupted}")

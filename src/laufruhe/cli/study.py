@@ -10,7 +10,8 @@ from pathlib import Path
 from laufruhe.errors import Complaint, InputError
 from laufruhe.numerics.cores import processors
 from laufruhe.report import files
-from laufruhe.studies import run
+from laufruhe.report.strict_json import strict
+from laufruhe.studies import Scenes, run
 from laufruhe.studies.kept import NAME
 from laufruhe.studies.reader import load_study
 
@@ -37,6 +38,13 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())
     text = f"{spent}done in {time.perf_counter() - started:.1f} s: {folder / files.REPORT}\n"
     return text, as_json(study, datasets, seconds)
+
+
+def checked(path: Path) -> tuple[str, str]:
+    """How many points the parts of a study have, as text and as JSON."""
+    study, scenes = load_study(path), Scenes(path.parent)
+    points = {part.name: len(part.points(scenes)) for part in study.study.parts}
+    return f"ok: {study.title}, {sum(points.values())} points\n", strict({"title": study.title, "points": points})
 
 
 class _Teller:

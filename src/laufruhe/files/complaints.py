@@ -14,6 +14,8 @@ from laufruhe import units
 from laufruhe.errors import Complaint, LaufruheError, ModelError
 
 Loc: TypeAlias = tuple[str | int, ...]
+MOST_COMPLAINTS = 20
+"""That a file gets at once."""
 _CLOSE = 0.6
 _RULES = {
     "int_type": "must be a whole number",
@@ -28,15 +30,19 @@ _RULES = {
 
 
 def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Complaint, ...]:
-    """One complaint for every key that is wrong, in the order of the file."""
+    """One complaint for every key that is wrong, in the order of the file, as far as a reader follows."""
     found: dict[str, Complaint] = {}
-    details = [(*_walk(detail["loc"], model), detail) for detail in error.errors(include_url=False)]
+    told = error.errors(include_url=False)[: 10 * MOST_COMPLAINTS]
+    details = [(*_walk(detail["loc"], model), detail) for detail in told]
     unknown = [loc for loc, _, detail in details if detail["type"] == "extra_forbidden"]
     for loc, tables, detail in details:
         if detail["type"] == "missing" and _is_misspelt(loc, unknown):
             continue
         found.setdefault(key_path(loc), _complaint(detail, loc, tables))
-    return tuple(found.values())
+    first = list(found.values())[:MOST_COMPLAINTS]
+    rest = error.error_count() - len(told) + len(found) - len(first)
+    more = [Complaint("file", "", f"has {rest} more such faults", "correct these first")] if rest else []
+    return (*first, *more)
 
 
 def _walk(loc: Loc, model: type[BaseModel]) -> tuple[Loc, list[type[BaseModel]]]:
@@ -75,21 +81,16 @@ def key_path(loc: Sequence[str | int]) -> str:
 
 
 def short(value: Any) -> str:
-    """A value as the file has it, cut where it is long."""
+    """A value as the file has it."""
     if isinstance(value, dict | list):
-        text = json.dumps(value, default=str, ensure_ascii=False)
-    else:
-        text = f'"{value}"' if isinstance(value, str) else str(value)
-    text = "".join(c if c.isprintable() else "?" for c in text)
-    return text if len(text) <= 60 else text[:57] + "..."
+        return json.dumps(value, default=str, ensure_ascii=False)
+    return f'"{value}"' if isinstance(value, str) else str(value)
 
 
 def nearest(word: str, words: Sequence[str]) -> str:
     """A remedy that names the nearest right word, or all of them."""
     close = difflib.get_close_matches(word, words, n=1, cutoff=_CLOSE)
-    # a name may hold what no terminal should be sent
-    shown = "".join(c if c.isprintable() else "?" for c in close[0]) if close else ""
-    return f"did you mean '{shown}'?" if close else "use one of: " + ", ".join(sorted(words))
+    return f"did you mean '{close[0]}'?" if close else "use one of: " + ", ".join(sorted(words))
 
 
 def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]]) -> Complaint:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
@@ -112,8 +111,7 @@ class Number:
                 raise refusal(str(error)) from None
         if self.unit and self.plain is None:
             raise refusal(f"has no unit, {units.dimension_name(self.unit)} needs one; {units.advice(self.unit)}")
-        # a whole number may be beyond all floats
-        value = math.inf if abs(given) > sys.float_info.max else given * (1.0 if self.plain is None else self.plain)
+        value = given * (1.0 if self.plain is None else self.plain)
         if not math.isfinite(value):
             raise refusal("is not finite; give a number")
         return value

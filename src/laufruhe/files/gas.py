@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
@@ -13,6 +12,9 @@ from laufruhe.files.complaints import Refused, blamed_on, measured
 from laufruhe.files.fields import Table
 from laufruhe.machine import PressureTrace
 from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
+
+MOST_ROWS = 100_000
+"""Of a measured trace."""
 
 
 class ChargeTable(Table):
@@ -86,24 +88,29 @@ def _trace(table: TraceTable, folder: Path) -> PressureTrace:
 
 
 def _pairs(file: str, path: Path) -> list[tuple[float, float]]:
+    beside = "give a CSV file beside the problem"
     try:
+        if path.exists() and not path.is_file():
+            raise Refused("gas.file", file, "is no file", beside)
         text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         why = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
-        raise Refused("gas.file", file, f"cannot be read ({why})", "give a CSV file beside the problem") from None
+        raise Refused("gas.file", file, f"cannot be read ({why})", beside) from None
     parted_by = next((sign for sign in ";\t" if sign in text), ",")
-    reader = csv.reader(text.splitlines(), delimiter=parted_by)
     pairs: list[tuple[float, float]] = []
     heading = True
-    for row in reader:
-        if not row or row[0].lstrip().startswith("#"):
+    for number, line in enumerate(text.splitlines(), 1):
+        row = [cell.strip().strip('"') for cell in line.split(parted_by)]
+        if not line.strip() or row[0].startswith("#"):
             continue
         try:
             angle, pressure = (float(cell if parted_by == "," else cell.replace(",", ".")) for cell in (row[0], row[1]))
             pairs.append((angle, pressure))
         except (ValueError, IndexError):
             if not heading:
-                rule = f"line {reader.line_num} is no pair of numbers"
+                rule = f"line {number} is no pair of numbers"
                 raise Refused("gas.file", file, rule, "write: crank angle, pressure") from None
         heading = False
+        if len(pairs) > MOST_ROWS:
+            raise Refused("gas.file", file, f"has more than {MOST_ROWS} rows", "thin it out")
     return pairs

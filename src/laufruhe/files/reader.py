@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from collections import deque
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,7 +15,7 @@ from pydantic import ValidationError
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.files.asked import Scene, limits_of, objective_of
 from laufruhe.files.bearings import bearings_of
-from laufruhe.files.complaints import Refused, complaints_of
+from laufruhe.files.complaints import Refused, complaints_of, key_path
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.gas import gas_of
@@ -26,6 +28,12 @@ from laufruhe.machine import Engine
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem, Search
+
+DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 10_000_000
+"""Of a file: tables within tables, entries of one list or table, and bytes."""
+LARGEST = 2**63 - 1
+# control characters but tab and line feed, and those that turn the direction of reading
+_UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 
 
 def load(path: str | Path) -> Problem:
@@ -61,8 +69,37 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
 
 def tables_of(path: Path) -> dict[str, Any]:
     """The tables of a TOML file, their keys not yet checked; `InputError` where it is none."""
+    tables = _tables(path)
+    _check_shape(tables, path)
+    return tables
+
+
+def _check_shape(tables: dict[str, Any], path: Path) -> None:
+    """Refuse texts that would command a screen, and tables without end."""
+    left = deque[tuple[tuple[str | int, ...], Any]]([((), tables)])
+    while left:
+        at, node = left.popleft()
+        if len(at) > DEEPEST:
+            raise _refused(path, key_path(at), f"is nested more than {DEEPEST} deep", "flatten it")
+        strange = _UNSEEN.search("".join(text for text in (*at[-1:], node) if isinstance(text, str)))
+        if strange is not None:
+            rule = f"holds U+{ord(strange.group()):04X}, which is no character to read"
+            raise _refused(path, key_path(at), rule, "take it out")
+        if isinstance(node, dict | list) and len(node) > MOST_ENTRIES:
+            raise _refused(path, key_path(at) or "file", f"has {len(node)} entries", f"at most {MOST_ENTRIES} are read")
+        if isinstance(node, int) and not -LARGEST <= node <= LARGEST:
+            raise _refused(path, key_path(at), "is a whole number of more than 64 bits", "write a smaller one")
+        pairs = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+        left.extend(((*at, key), entry) for key, entry in pairs)
+
+
+def _tables(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        with path.open("rb") as stream:
+            content = stream.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise _unreadable(path, f"is larger than {MOST_BYTES // 1_000_000} MB", "a problem takes a few kB")
+        return tomllib.loads(content.decode("utf-8-sig"))
     except IsADirectoryError:
         raise _unreadable(path, "is a folder", "name a problem file in it") from None
     except FileNotFoundError:
@@ -73,6 +110,8 @@ def tables_of(path: Path) -> dict[str, Any]:
         raise _unreadable(path, f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise _unreadable(path, f"is no TOML: {error}", "correct it there") from None
+    except InputError:
+        raise
     except ValueError:
         # the one that is no TOMLDecodeError
         raise _unreadable(path, "holds a whole number of thousands of digits", "write it shorter") from None
@@ -80,8 +119,17 @@ def tables_of(path: Path) -> dict[str, Any]:
         raise _unreadable(path, "is nested too deeply", "flatten it") from None
 
 
+def is_study(path: Path) -> bool:
+    """Whether a file is one of a study, or means to be."""
+    return "study" in tables_of(path)
+
+
 def _unreadable(path: Path, rule: str, remedy: str) -> InputError:
-    return InputError(str(path), (Complaint("file", "", rule, remedy),))
+    return _refused(path, "file", rule, remedy)
+
+
+def _refused(path: Path, where: str, rule: str, remedy: str) -> InputError:
+    return InputError(str(path), (Complaint(where, "", rule, remedy),))
 
 
 def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False, *, path: Path) -> Problem:

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
-from laufruhe.files.fields import Name, Table
+from laufruhe.files.fields import Name, Table, refusal
 
-Value: TypeAlias = bool | int | float | str
+
+def _single(given: object) -> object:
+    if given is not None and not isinstance(given, bool | int | float | str):
+        raise refusal("is neither a number nor a text; write one of them")
+    return given
+
+
+Value: TypeAlias = Annotated[bool | int | float | str, BeforeValidator(_single)]
+End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
 
 
 class SweepTable(Table):
@@ -16,8 +24,8 @@ class SweepTable(Table):
 
     quantity: str = Field(description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     values: list[Value] | None = None
-    first: int | float | str | None = Field(default=None, alias="from")
-    last: int | float | str | None = Field(default=None, alias="to")
+    first: End = Field(default=None, alias="from")
+    last: End = Field(default=None, alias="to")
     points: int | None = Field(default=None, description="Values from the first to the last.")
     spacing: Literal["linear", "log"] | None = None
 

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import chdir
 from importlib import import_module
 from pathlib import Path
+
+# a matplotlibrc in the working folder, which may be broken, is none of ours
+with chdir(Path(__file__).parent):
+    import matplotlib  # noqa: F401
 
 from laufruhe.plots.style import save
 from laufruhe.present.pictures import PICTURES

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from laufruhe.errors import Complaint, InputError, ModelError
+from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.study_paths import joined
 from laufruhe.solvers import Status, solve
@@ -85,7 +85,10 @@ class Replication(Part):
             if name in seen:
                 raise ModelError(f"problem '{name}' is like itself; take out one like")
             seen.append(name)
-            name = str(self.problems[name].get("like"))
+            like = self.problems[name].get("like", "")
+            if not isinstance(like, str):
+                raise ModelError(f"problem '{name}' is like what is no name; write it in quotes")
+            name = like
 
     def settings(self) -> dict[str, Any]:
         """What is asked of every case; numbers and problems stand in the scenes."""
@@ -176,8 +179,8 @@ class Replication(Part):
         assert part.picture_ is not None
         return drawn(part.picture_, part.names(data), data)
 
-    def _refused(self, where: str, rule: str, remedy: str = "correct it") -> InputError:
-        return InputError(f"part '{self.name}'", (Complaint(where, "", rule, remedy),))
+    def _refused(self, where: str, rule: str, remedy: str = "correct it") -> ModelError:
+        return ModelError(f"{rule}; {remedy}", f"part '{self.name}', {where}")
 
 
 def _case(point: Point) -> ReplicaCase:

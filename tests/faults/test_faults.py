@@ -1,0 +1,187 @@
+"""Damaged files: every command reads them or refuses them line by line; nothing else ever happens."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from cli import scenes
+from faults import harness
+from laufruhe.cli import app
+from laufruhe.cli.screen import BAD_INPUT
+from problem_files import written
+
+STUDY = """
+title = "A sweep"
+[study]
+[[study.parts]]
+kind = "layout comparison"
+name = "one"
+title = "One"
+cases = [{ name = "a", problem = "scene.toml" }, { name = "b", problem = "scene.toml" }]
+sweep = [{ quantity = "engine.rod_ratio", values = [0.2, 0.3] }]
+"""
+
+
+def refused(path: Path, *words: str, verb: str = "check") -> str:
+    """Exit status 2, and one line that a screen can show, with these words in it."""
+    answer = CliRunner().invoke(app, [verb, str(path)])
+    assert answer.exception is None or isinstance(answer.exception, SystemExit), answer.exception
+    assert answer.exit_code == BAD_INPUT
+    assert answer.stdout == ""
+    (line,) = answer.stderr.splitlines()
+    assert line.startswith(f"{path}: ")
+    assert line.isprintable()
+    assert len(line) < len(str(path)) + 1000
+    for word in words:
+        assert word in line
+    return line
+
+
+def spoilt(folder: Path, old: str, new: str) -> Path:
+    assert old in scenes.GIVEN
+    return written(folder, scenes.GIVEN.replace(old, new))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("verb", "first", "count"), [("check", 0, 3000), ("evaluate", 3000, 300), ("explain", 4000, 300)]
+)
+def test_damaged_files(verb: str, first: int, count: int, tmp_path: Path) -> None:
+    found = harness.run(range(first, first + count), verb, tmp_path, jobs=2)
+    assert [one for one in found if one.wrong] == []
+    assert [one.seed for one in found] == list(range(first, first + count))
+    # damage that is always found, or never, tests nothing
+    statuses = Counter((one.kind, one.status) for one in found)
+    for kind in ("problem", "study", "trace") if verb == "check" else ("problem",):
+        whole = sum(n for (of, _), n in statuses.items() if of == kind)
+        assert 0.01 * whole < statuses[kind, 0] < 0.7 * whole
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_same_seed_does_the_same_damage() -> None:
+    assert harness.damaged(7) == harness.damaged(7) != harness.damaged(8)
+
+
+def test_undamaged_files_are_read(tmp_path: Path) -> None:
+    harness.prepared(tmp_path)
+    (tmp_path / "trace.csv").write_text(harness.TRACE, encoding="utf-8")
+    for name in ("traced.toml", "tractor-sweeps.toml"):
+        assert CliRunner().invoke(app, ["check", str(tmp_path / name)]).exit_code == 0
+
+
+@pytest.mark.parametrize("deep", [17, 90, 400, 3000])
+@pytest.mark.parametrize("open_close", ["[]", "{a=\0}"])
+def test_deep_nesting(deep: int, open_close: str, tmp_path: Path) -> None:
+    first, last = open_close.split("\0") if "\0" in open_close else open_close
+    value = first * deep + ("1" if open_close != "[]" else "") + last * deep
+    refused(spoilt(tmp_path, 'stroke = "120 mm"', f"stroke = {value}"), "nested")
+    refused(spoilt(tmp_path, 'stroke = "120 mm"', "stroke" + ".a" * deep + " = 1"), "nested")
+
+
+@pytest.mark.parametrize("character", ["\\u001b", "\\u202e", "\\u2028", "\\u009b", "\\u0000"])
+@pytest.mark.parametrize(
+    ("old", "new"), [('title = "', 'title = "{}'), ('stroke = "', 'stroke = "{}'), ("stroke =", '"{}" =')]
+)
+def test_characters_that_command_a_screen(character: str, old: str, new: str, tmp_path: Path) -> None:
+    refused(spoilt(tmp_path, old, new.format(character)), "U+" + character[2:].upper(), "no character to read")
+
+
+def test_a_file_name_cannot_command_a_screen(tmp_path: Path) -> None:
+    answer = CliRunner().invoke(app, ["check", str(tmp_path / "a\x1b[2J\u202eb.toml")])
+    assert answer.exit_code == BAD_INPUT
+    assert "a\\x1b[2J\\u202eb.toml" in answer.stderr
+
+
+def test_long_texts_are_cut(tmp_path: Path) -> None:
+    refused(spoilt(tmp_path, 'stroke = "120 mm"', f'stroke = "1 {"m" * 5000}"'), "engine.stroke", "...")
+    refused(spoilt(tmp_path, "stroke =", f"{'x' * 5000} = 1\nstroke ="), "engine.xxx", "...")
+    names = ", ".join(f'"point {k}"' for k in range(900))
+    refused(spoilt(tmp_path, "[mounts]", f'[mounts]\nnames = [{names}, "\\u0007"]'), "mounts.names[901]")
+
+
+def test_many_faults_are_counted(tmp_path: Path) -> None:
+    path = written(tmp_path, scenes.GIVEN + "assumptions = [" + "1," * 900 + "]")
+    path.write_text("assumptions = [" + "1," * 900 + "]\n" + scenes.GIVEN, encoding="utf-8")
+    lines = CliRunner().invoke(app, ["check", str(path)]).stderr.splitlines()
+    assert len(lines) == 21
+    assert "880 more" in lines[-1]
+
+
+def test_more_than_any_engine_has(tmp_path: Path) -> None:
+    path = written(tmp_path, "assumptions = [" + '"",' * 1001 + "]\n" + scenes.GIVEN)
+    refused(path, "assumptions", "1001 entries", "1000")
+    path.write_bytes(b"#" * 10_000_001)
+    refused(path, "file", "10 MB")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"\x00", b"\xff\xfe", b"[" * 3000, b"a = " + b"[" * 3000, b"title = 'x'\n" * 2, b"\xef\xbb\xbf", b"=" * 99,
+     b"a = " + b"9" * 9999],
+)  # fmt: skip
+def test_what_is_no_problem_at_all(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "spoilt.toml"
+    path.write_bytes(content)
+    answer = CliRunner().invoke(app, ["check", str(path)])
+    assert answer.exit_code == BAD_INPUT
+    assert all(line.startswith(f"{path}: ") and line.isprintable() for line in answer.stderr.splitlines())
+
+
+def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "marked.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + scenes.GIVEN.encode().replace(b"\n", b"\r\n"))
+    assert CliRunner().invoke(app, ["check", str(path)]).exit_code == 0
+
+
+@pytest.mark.parametrize("cell", ["x" * 200_000, '"', "1\x00", "\u202e1", "nan"])
+def test_cells_of_a_trace(cell: str, tmp_path: Path) -> None:
+    path = written(tmp_path, harness.TRACED)
+    (tmp_path / "trace.csv").write_text(harness.TRACE + f"360,{cell}\n", encoding="utf-8")
+    refused(path, "gas")
+
+
+def test_a_trace_that_never_ends(tmp_path: Path) -> None:
+    path = written(tmp_path, harness.TRACED.replace("trace.csv", "/dev/zero"))
+    refused(path, "gas.file", "is no file")
+    (tmp_path / "trace.csv").write_text("1,2\n" * 100_002, encoding="utf-8")
+    refused(written(tmp_path, harness.TRACED), "gas.file", "100000 rows")
+
+
+@pytest.mark.parametrize(
+    "values",
+    ["[1e400, 1]", f"[{10**400}, 1]", "[[0.2], 0.3]", "[{}, 1]", "[nan, 0.1]", '["0.2", 0.3]', "[1e308, -1e308]", "[]",
+     "[true, 1]", '["1e999 mm", "2 mm"]'],
+)  # fmt: skip
+@pytest.mark.parametrize(
+    "quantity", ["engine.rod_ratio", "engine.stroke", "engine.throws.1", "operating_points.1.speed"]
+)
+def test_swept_values(values: str, quantity: str, tmp_path: Path) -> None:
+    written(tmp_path, scenes.GIVEN)
+    study = written(tmp_path, STUDY.replace("[0.2, 0.3]", values).replace("engine.rod_ratio", quantity), "study")
+    answer = CliRunner().invoke(app, ["check", str(study)])
+    assert isinstance(answer.exception, SystemExit), answer.exception
+    assert answer.exit_code == BAD_INPUT
+    assert len(answer.stderr.splitlines()) == 1
+
+
+def test_check_of_a_study_counts_its_points(tmp_path: Path) -> None:
+    written(tmp_path, scenes.GIVEN)
+    study = written(tmp_path, STUDY, "study")
+    answer = CliRunner().invoke(app, ["check", str(study)])
+    assert (answer.exit_code, answer.stdout) == (0, "ok: A sweep, 4 points\n")
+
+
+def test_a_broken_matplotlibrc_in_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import subprocess
+    import sys
+
+    (tmp_path / "matplotlibrc").write_bytes(b"font.size: nonsense\n\xff\xfe\n")
+    path = written(tmp_path, scenes.GIVEN)
+    words = [sys.executable, "-m", "laufruhe", "evaluate", str(path), "--out", "out"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "out/cycle.png").is_file()
