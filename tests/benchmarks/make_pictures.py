@@ -15,7 +15,7 @@ COLOURS = 64
 # arguments of the command; picture that it draws; name under docs/pictures
 WANTED = {
     ("solve", "tractor-four-lanchester"): {"bars": "tractor-four-lanchester-bars"},
-    ("study", "tractor-study"): {"fig-10": "tractor-study-fig-10", "fig-22": "tractor-study-fig-22"},
+    ("study", "tractor-study"): {name: f"tractor-study-{name}" for name in ("fig-10", "fig-22", "reciprocating-mass")},
     ("trade", "tractor-four-lanchester"): {"tractor-four-lanchester": "tractor-four-lanchester-trade"},
 }
 

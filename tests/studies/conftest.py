@@ -41,9 +41,10 @@ def figure() -> Callable[[str], xr.Dataset]:
 
 @pytest.fixture(scope="session")
 def worth() -> Callable[..., Any]:
-    """What an expression is worth in a part of a replication."""
+    """What an expression is worth in a part of a replication, in the first reading unless told."""
 
-    def found(name: str, text: str, file: str = "tractor-study") -> Any:
-        return value_of(text, parts_of(file)[name].names(computed(file, name)))
+    def found(name: str, text: str, file: str = "tractor-study", reading: str | None = None) -> Any:
+        names = parts_of(file)[name].names(computed(file, name))
+        return value_of(text, names[reading or next(iter(names))])
 
     return found

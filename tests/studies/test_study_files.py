@@ -97,7 +97,6 @@ BAD = [
     (REPLICA.replace("within", "witin"), "did you mean 'within'?"),
     (REPLICA.replace('within = "5 %"', ""), "needs is and within together; give both"),
     (REPLICA.replace("is = 1", 'holds = "value > 1"\nis = 1'), "judged by is and within, or by holds"),
-    (REPLICA.replace('problem = "one"', 'problem = "one", computation = "gas"'), "'gas' is no computation"),
     (REPLICA.replace('problem = "one"', 'problem = "two"'), "does not exist"),
     (REPLICA.replace('problem = "one"', 'problem = "one", sweep = { m = { from = 1 } }'), "is no grid; give values"),
     (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "cubic"')), "use one of: linear, log"),
@@ -232,3 +231,38 @@ def test_equal_power_is_eq_23(tmp_path: Path) -> None:
     assert found[1]["objective_given"].values == pytest.approx(2.0 * found[0]["objective_given"].values, rel=1e-9)
     assert found[1]["objective"].values == pytest.approx(2.0 * found[0]["objective"].values, rel=1e-4)
     assert found[1].attrs["at"] == "the power of 4 cylinders"
+
+
+READ = """readings = { "as printed" = { "engine.reciprocating_mass" = "1.25 kg" }, "2.25 kg" = { "engine.reciprocating_mass" = "2.25 kg" } }"""  # noqa: E501
+
+
+def test_a_part_is_read_in_every_reading(tmp_path: Path) -> None:
+    """One part each, its value set in all cases; what a case sets itself stands."""
+    path = tmp_path / "s.toml"
+    own = case("own", str(FOUR), 'set = { "engine.reciprocating_mass" = "3 kg" }')
+    path.write_text(study("layout comparison", more=READ) + own, encoding="utf-8")
+    printed, meant = load_study(path).study.parts
+    assert [printed.name, meant.name] == ["p-as-printed", "p-2-25-kg"]
+    assert [printed.title, meant.title] == ["t; as printed", "t; 2.25 kg"]
+    masses = [[one.set["engine.reciprocating_mass"] for one in part.cases] for part in (printed, meant)]
+    assert masses == [["1.25 kg", "3 kg"], ["2.25 kg", "3 kg"]]
+
+
+def test_readings_of_one_name_are_refused(tmp_path: Path) -> None:
+    """Two readings that make one file name, and one that makes the name of another part."""
+    path = tmp_path / "s.toml"
+    other = study("layout comparison").split("[study]")[1].replace('name = "p"', 'name = "p-2-25-kg"')
+    for text in (study("layout comparison", more=READ.replace("as printed", "2.25-kg")),
+                 study("layout comparison", more=READ) + other):  # fmt: skip
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match="is given twice"):
+            load_study(path)
+
+
+def test_a_table_may_replace_a_number_of_all_parts(tmp_path: Path) -> None:
+    """A grid in place of the common number; the other way round as well."""
+    grid = "numbers = { m = { values = [1, 2] } }\nquantities"
+    path = tmp_path / "s.toml"
+    for text in (REPLICA.replace("quantities", grid), REPLICA.replace("{ m = 2 }", "{ m = { values = [1, 2] } }")):
+        path.write_text(text, encoding="utf-8")
+        assert load_study(path).study.parts[0].name == "p"

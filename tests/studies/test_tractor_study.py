@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from tests.studies.conftest import parts_of
+from tests.studies.conftest import PROBLEMS, parts_of
 
 from lanes import first_fast
+from laufruhe import load
+from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.plots.picture import draw, save_picture
 from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.replication.judging import CONFIRMED, counted
@@ -23,57 +26,89 @@ Worth = Callable[..., Any]
 FIGURES = list(parts_of("tractor-study"))
 SIZED = ["fig-12", "fig-15", "fig-17", "fig-22", "fig-25", "fig-28"]
 
-# statements of the study that are not confirmed here; docs/tractor-study.md says why
+PRINTED, MEANT = "1.25 kg as printed", "2.25 kg"
+# statements that are not confirmed with the printed mass, and with the other; docs/tractor-study.md says why
+NEVER = {"fig-25": ["Share of the force that frees the front mounts (eq. 29)"]}
 NOT_CONFIRMED = {
-    "fig-02-05-07": ["Mount forces of the reciprocating mass over those of the gas (Fig. 5)"],
-    "fig-22": [
-        "The moment pair at Φ = 50 % lowers what is left (Fig. 22)",
-        "Best share of the moment pair at 10 m/s (Fig. 22)",
-    ],
-    "fig-25": ["Share of the force that frees the front mounts (eq. 29)"],
-    "gas-trace": [
-        "Second-order gas and inertia torques cancel at 5.5 kp/cm²",
-        "One fired trace meets all that is said of it",
-    ],
+    PRINTED: {
+        "fig-02-05-07": ["Largest mount force of the reciprocating mass (Fig. 5)"],
+        "fig-22": [
+            "The moment pair at Φ = 50 % lowers what is left (Fig. 22)",
+            "Best share of the moment pair at 10 m/s (Fig. 22)",
+            "Torques of second order of gas and inertia cancel (text on the four-cylinder)",
+        ],
+        "free-force": [
+            "Free force of second order of a four-cylinder vehicle diesel",
+            "The same over the worst sum of tolerances, 100 kp",
+        ],
+        **NEVER,
+    },
+    MEANT: NEVER,
+    "": {},
 }
-# ours, statement by statement, as first computed without a study file
+# ours, statement by statement, as first computed; figures that do not hang on the mass have one reading without a name
 OURS = {
-    "fig-02-05-07": [263.318121310259, 1.2877339061966124, 1.6121422343224967, 98.29904025086172],
-    "fig-08-09": [0.0, 2.528597114157708],
-    "fig-10": [47.11387704618958, 1.4457630499465484],
-    "fig-12": [
-        41.24088393688317, 105.17920525134916, 41.240883936883186, 0.0, 93.98010645358502, 51.98860181606826,
-        44.478828056746934, -36.631521134558334, 2.3100137921565937,
-    ],
-    "fig-13": [0.6310389114631642, 0.5198565653362657, 2 / 3],
-    "fig-15": [-4.793322907629738, -3.817622963535061],
-    "fig-17": [-15.921548688507814, -15.18122685523402],
-    "fig-22": [-74.22521154051643, -1.5238321789903253, 27.5, -14.529406137591838],
-    "fig-25": [-62.17882390046119, -62.08185338189518, 80.95238095238095],
-    "fig-28": [0.8595103547181567, 0.9246582499436518, 0.0, 1.058155924817644],
-    "fig-29": [90.0, 0.0],
-    "fig-30": [0.0, 554.6608451821702, 169.98014929392903, 1 / 22],
-    "fig-31": [math.sqrt(2.0)],
-    "fig-32": [5.589120293809492, 1.397280073452373, 800.0],
-    "free-force": [554.6608451821702, 5.546608451821702],
-    "gas-trace": [8.980764366816558, 7.279050271447632, 1.0, 52.78797259696566],
-    "reciprocating-mass": [2.3179210311538725, -74.30774695, -49.78559343, 57.5, 998.3895213279064],
+    PRINTED: {
+        "fig-02-05-07": [263.318121310259, 339.0836729272133, 1.6121422343224967, 98.29904025086172],
+        "fig-08-09": [0.0, 2.528597114157708],
+        "fig-10": [47.11387704618958, 1.4457630499465484],
+        "fig-12": [
+            41.24088393688317, 105.17920525134916, 41.240883936883186, 0.0, 93.98010645358502, 51.98860181606826,
+            44.478828056746934, -36.631521134558334, 2.3100137921565937,
+        ],
+        "fig-13": [0.6310389114631642, 0.5198565653362657, 2 / 3],
+        "fig-15": [-4.793322907629738, -3.817622963535061],
+        "fig-17": [-15.921548688507814, -15.18122685523402],
+        "fig-22": [-74.22521154051643, -1.5238321789903253, 27.5, 8.952584918046618, -14.529406137591838],
+        "fig-25": [-62.17882390046119, -62.08185338189518, 80.95238095238095],
+        "fig-28": [0.8595103547181567, 0.9246582499436518, 0.0, 1.058155924817644],
+        "fig-30": [0.0, 554.6608451821702, 169.98014929392903, 1 / 22],
+        "free-force": [554.6608451821702, 5.546608451821702],
+    },
+    MEANT: {
+        "fig-02-05-07": [263.318121310259, 610.3506112689839, 1.6121422343224967, 98.29904025086172],
+        "fig-08-09": [0.0, 3.163526038966434],
+        "fig-10": [49.39082835222464, 1.71797748242199],
+        "fig-12": [
+            40.1774537537322, 82.46794933710189, 40.1774537537322, 0.0, 167.06735239085938, 51.227005739335006,
+            56.898990718293554, -48.967997538179084, 2.7976740263574316,
+        ],
+        "fig-13": [0.4541002169007585, 0.4037448140277853, 2 / 3],
+        "fig-15": [-5.089804030642108, -3.930114162077991],
+        "fig-17": [-31.308780077006904, -30.830774187884924],
+        "fig-22": [-74.30774694600348, -49.785593429880215, 57.5, 6.682174635350207, -55.11562459348711],
+        "fig-25": [-60.68359640735056, -70.08464575441371, 80.95238095238095],
+        "fig-28": [0.7532644502412791, 0.809220450106814, 0.0, 1.058155924817644],
+        "fig-30": [0.0, 998.3895213279064, 305.9642687290723, 1 / 22],
+        "free-force": [998.3895213279064, 9.983895213279064],
+    },
+    "": {
+        "fig-29": [90.0, 0.0],
+        "fig-31": [math.sqrt(2.0)],
+        "fig-32": [5.589120293809492, 1.397280073452373, 800.0],
+    },
 }  # fmt: skip
+JUDGED = [name for name in FIGURES if any(name in ours for ours in OURS.values())]
 
 
-@pytest.mark.parametrize("name", first_fast(FIGURES, 4))
+@pytest.mark.parametrize("name", first_fast(JUDGED, 4))
 def test_statements(figure: Data, name: str) -> None:
+    """In every reading of the reciprocating mass."""
     data = figure(name)
-    np.testing.assert_allclose(data["ours"], OURS[name], rtol=1e-6, atol=1e-9)
-    assert all(data["why"].values)
-    held = data["verdict"].values != "not confirmed"
-    assert data["statement"].values[~held].tolist() == NOT_CONFIRMED.get(name, [])
+    assert data["by_reading"].values.tolist() == [reading for reading, ours in OURS.items() if name in ours]
+    for reading in data["by_reading"].values.tolist():
+        own = data.sel(by_reading=reading)
+        np.testing.assert_allclose(own["ours"], OURS[reading][name], rtol=1e-6, atol=1e-9)
+        assert all(own["why"].values)
+        held = own["verdict"].values != "not confirmed"
+        assert own["statement"].values[~held].tolist() == NOT_CONFIRMED[reading].get(name, [])
 
 
 @pytest.mark.slow
 def test_all_are_counted(figure: Data) -> None:
-    assert list(OURS) == FIGURES
-    assert counted([figure(name) for name in FIGURES]) == "42 of 48 statements are confirmed."
+    assert [*JUDGED, "reciprocating-mass"] == FIGURES
+    counts = f"{PRINTED}: 38 of 45 statements are confirmed. {MEANT}: 44 of 45 statements are confirmed."
+    assert counted([figure(name) for name in FIGURES]) == counts
 
 
 @pytest.mark.parametrize("name", first_fast(FIGURES, 4))
@@ -108,14 +143,18 @@ class TestSingle:
         )
 
     def test_reciprocating_force_of_fig_5(self, worth: Worth) -> None:
-        """At dead centre eq. 7 has half of m r w^2 (1 + lambda); a little later the moment adds to it."""
+        """At dead centre eq. 7 has half of m r w^2 (1 + lambda); a little later the moment adds to it.
+
+        "doppelt so gross" as the 300 kp of Fig. 2: 2.25 kg make it, 1.25 kg do not.
+        """
         half = worth("fig-02-05-07", "piston * (1 + lam) / 2 / kp")
         first = worth(
             "fig-02-05-07", "at(force['reciprocating mass'], angle=0, mount='left', direction='vertical') / kp"
         )
         assert first == pytest.approx(half, rel=1e-12)
         assert half < worth("fig-02-05-07", "mass") < 1.05 * half
-        assert 2.0 * half / 300.0 == pytest.approx(2.0, abs=0.25)
+        assert worth("fig-02-05-07", "mass", reading=MEANT) == pytest.approx(2.0 * 300.0, rel=0.02)
+        assert worth("fig-02-05-07", "mass") == pytest.approx(1.13 * 300.0, rel=0.02)
 
     def test_rod_inertia_of_fig_7(self, worth: Worth) -> None:
         """About dTheta lambda w^2 / b, to a few percent: cos psi in the denominator is what that leaves out."""
@@ -195,15 +234,30 @@ class TestSeveralCylinders:
 class TestFourCylinder:
     """Figs. 22 and 25."""
 
-    def test_moment_pair_at_part_load_does_not_reach_the_studys_53_percent(self, worth: Worth) -> None:
-        """Where ours disagrees: gas at 5.5 kp/cm2 takes 81 % of the inertia's second order: half a pair is too much."""
+    def test_printed_mass_contradicts_fig_22(self, worth: Worth) -> None:
+        """Gas at 5.5 kp/cm2 takes four fifths of the second order of 1.25 kg: half a pair is too much."""
         assert 0.0 < worth("fig-22", "1 - mean['both'] / mean['force']") < 0.05
         assert worth("fig-22", "share") == pytest.approx(0.275, abs=0.05)
 
-    def test_moment_pair_without_load_all_but_does(self, worth: Worth) -> None:
-        """-53 % and Phi = 50 % printed; five points each for a trace that is not printed, ten for a flat optimum."""
-        assert worth("fig-22", "argmin(idle)") == pytest.approx(0.5, abs=0.1)
-        assert worth("fig-22", "1 - at(idle, phi=0.5) / at(idle, phi=0)") == pytest.approx(0.53, abs=0.08)
+    def test_2_25_kg_meet_fig_22(self, worth: Worth) -> None:
+        """-70 % and -53 % printed, five points each for what is not printed; about Φ = 50 % the curve is flat."""
+        assert worth("fig-22", "1 - mean['force'] / mean['none']", reading=MEANT) == pytest.approx(0.70, abs=0.05)
+        assert worth("fig-22", "1 - mean['both'] / mean['force']", reading=MEANT) == pytest.approx(0.53, abs=0.05)
+        assert worth("fig-22", "at(part_load, phi=0.5) / min(part_load)", reading=MEANT) < 1.06
+
+    def test_torques_cancel_where_the_roll_moment_is_least(self, worth: Worth) -> None:
+        """The speed by three amplitudes at 10 m/s, against the exact model at that speed."""
+        problem = load(PROBLEMS / "tractor-four-lanchester.toml")
+        cranks = tuple(replace(part, reciprocating_mass=2.25) for part in problem.engine.slider_cranks)
+        engine = replace(problem.engine, slider_cranks=cranks, rotors=())
+
+        def roll(cm: float) -> float:
+            point = replace(problem.points[0], speed=math.pi * cm / 0.12)
+            return float(abs(shaking_loads(engine, point).at(2)[3]))
+
+        found = worth("fig-22", "cancel", reading=MEANT)
+        assert roll(found) < 0.1 * roll(10.0)
+        assert roll(found) < min(roll(found - 0.2), roll(found + 0.2))
 
     def test_best_pairs(self, worth: Worth) -> None:
         """The optimum is below every point of the sweep: angles and the force pair are free there too."""
@@ -255,46 +309,27 @@ def test_isolation_from_root_two(worth: Worth) -> None:
 
 
 def test_free_force(worth: Worth) -> None:
-    """1000 kp are those of another engine: 4 m r w^2 (lambda + lambda^3/4) of this one is an order of size."""
-    force = worth("free-force", "at(force, cm=10)")
-    assert force == pytest.approx(worth("free-force", "4 * piston * (lam + lam**3 / 4) / kp"), rel=2e-3)
-    assert 500.0 < force < 1000.0
+    """4 m r w^2 (lambda + lambda^3/4): "about 1000 kp" with 2.25 kg, little over half of it with 1.25 kg."""
+    for reading, force in ((PRINTED, 555.0), (MEANT, 998.0)):
+        found = worth("free-force", "force", reading=reading)
+        closed = worth("free-force", "4 * piston * (lam + lam**3 / 4) / kp", reading=reading)
+        assert found == pytest.approx(closed, rel=2e-3)
+        assert found == pytest.approx(force, rel=1e-3)
 
 
-class TestGasTrace:
-    """What the study says of its trace: 300 kp, 7 m/s, Phi = 50 %, -70 %, -53 %."""
-
-    @pytest.fixture
-    def row(self, worth: Worth) -> Callable[[str, str], float]:
-        return lambda name, trace: float(worth("gas-trace", f"at({name}['all'], trace='{trace}')"))
-
-    def test_no_fired_trace_cancels_at_seven(self, row: Callable[[str, str], float]) -> None:
-        assert row("cancelling_speed", "assumed here") == pytest.approx(8.98, abs=0.05)
-        assert row("cancelling_speed", "softest fired") > 7.5
-
-    def test_seven_takes_a_burn_that_no_engine_runs_with(self, row: Callable[[str, str], float]) -> None:
-        """All heat after dead centre: the peak is that of a motored cylinder of ratio 13."""
-        assert row("cancelling_speed", "burn too late") == pytest.approx(7.0, abs=0.05)
-        assert row("highest_pressure", "burn too late") < 40.0
-
-    def test_without_load_three_statements_hold_together(self, row: Callable[[str, str], float]) -> None:
-        for name, claimed, allowed in (
-            ("cancelling_speed", 7.0, 0.35), ("first_fall", 0.70, 0.05), ("second_fall", 0.53, 0.05),
-        ):  # fmt: skip
-            assert row(name, "no load, fitted") == pytest.approx(claimed, abs=allowed)
-
-    def test_fired_traces_meet_two_at_most(self, row: Callable[[str, str], float]) -> None:
-        fired = ("assumed here", "largest force met", "softest fired", "fired, all five")
-        assert max(row("met", trace) for trace in fired) <= 2
-
-    def test_fig_2_can_be_met_alone(self, worth: Worth, row: Callable[[str, str], float]) -> None:
-        assert row("gas_force", "largest force met") == pytest.approx(300.0, rel=1e-3)
-        ratio = worth("gas-trace", "at(parameters['all'], trace='largest force met', parameter='ratio')")
-        assert ratio == pytest.approx(20.5, abs=0.05)
+def test_no_compression_ratio_saves_the_printed_mass(worth: Worth) -> None:
+    """From 16 to 21, where the gas makes 253 to 305 kp of the 300 that are printed (Fig. 2)."""
+    for name, low, high in (("cancel", 6.5, 7.5), ("rest", -58.0, -48.0), ("share", 40.0, 60.0)):
+        values = worth("reciprocating-mass", f"{name}_by")
+        printed, meant = values.sel(m=1.25), values.sel(m=2.25)
+        assert not ((low <= printed) & (printed <= high)).any()
+        assert low <= float(meant.sel(eps=17.0)) <= high
+        own = worth("reciprocating-mass", name).sel(m=[1.25, 2.25]).values
+        assert own == pytest.approx([float(printed.sel(eps=17.0)), float(meant.sel(eps=17.0))], rel=1e-9)
 
 
 def test_bars_carry_their_numbers(figure: Data) -> None:
     """Four series of five groups: the mean inside, the largest above."""
     words = [text.get_text() for text in draw(Replication.picture(figure("fig-13"))).axes[0].texts]
     assert "59.3" in words
-    assert figure("fig-13")["verdict"].values.tolist() == [CONFIRMED] * 3
+    assert figure("fig-13")["verdict"].values.tolist() == [[CONFIRMED] * 2] * 3

@@ -44,8 +44,8 @@ def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
 
 def joined(tables: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     """Tables with others upon them: a table within is joined in turn, anything else is replaced."""
-    within = {key: joined(tables[key], own[key]) for key in own if isinstance(own[key], dict) and key in tables}
-    return {**tables, **own, **within}
+    both = [key for key, one in own.items() if isinstance(one, dict) and isinstance(tables.get(key), dict)]
+    return {**tables, **own, **{key: joined(tables[key], own[key]) for key in both}}
 
 
 def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:

@@ -118,8 +118,9 @@ def _axis(axes: Axes, name: Literal["x", "y"], axis: Axis) -> None:
 
 
 def _named(picture: Picture) -> Sequence[Mark]:
-    """Marks of the legend: those given for it, else those with a label; a few of very many."""
-    marks = list(picture.legend) or [m for p in picture.panels for m in p.marks if getattr(m, "label", "")]
+    """Marks of the legend: those given for it, else one for each label; a few of very many."""
+    labelled = {getattr(m, "label", ""): m for p in picture.panels for m in p.marks}
+    marks = list(picture.legend) or [mark for label, mark in labelled.items() if label]
     if len(marks) <= MOST_ENTRIES:
         return marks
     return [marks[k] for k in np.linspace(0, len(marks) - 1, FEW_ENTRIES).round().astype(int)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, TypeAlias
 
@@ -9,7 +10,7 @@ import xarray as xr
 from pydantic import Field
 
 from laufruhe.files.fields import Table
-from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_parts import CaseTable, Value
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text
@@ -28,10 +29,29 @@ class Part(Table):
     title: Annotated[str, Field(min_length=1)]
     source: str = ""
     cases: list[CaseTable] = Field(min_length=1)
+    readings: dict[str, dict[str, Value]] = Field(
+        default_factory=dict,
+        description="Where a number of the source may be misprinted: paths and values, by a name of each reading; "
+        "in a replication, numbers and values.",
+    )
+
+    def each_reading(self) -> list[Part]:
+        """The part in each reading of a doubtful number, which is set in all of its cases; itself where none is."""
+        return [self._in_reading(*reading) for reading in self.readings.items()] or [self]
+
+    def _in_reading(self, name: str, values: dict[str, Value]) -> Part:
+        def read(told: Any) -> Any:
+            if isinstance(told, list):
+                return [read(one) for one in told]
+            return told.model_copy(update={"set": {**values, **told.set}}) if isinstance(told, CaseTable) else told
+
+        slug = re.sub("[^a-z0-9]+", "-", name.lower()).strip("-")
+        own = {"name": f"{self.name}-{slug}", "title": f"{self.title}; {name}", "readings": {}}
+        return self.model_copy(update={**{key: read(told) for key, told in self}, **own})
 
     def settings(self) -> dict[str, Any]:
         """What is asked of every point: all but words, cases, and what is swept."""
-        return self.model_dump(exclude={"name", "title", "source", "cases", "sweep"})
+        return self.model_dump(exclude={"name", "title", "source", "cases", "readings", "sweep"})
 
     def size(self) -> int:
         """How many points it makes at least, counted before any is made."""

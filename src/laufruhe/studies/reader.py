@@ -78,10 +78,11 @@ def load_study(path: Path) -> StudyFile:
         file = StudyFile.model_validate(tables)
     except ValidationError as error:
         raise InputError(str(path), _once(complaints_of(error, StudyFile), tables)) from None
-    names = [part.name for part in file.study.parts]
+    parts = [own for part in file.study.parts for own in part.each_reading()]
+    names = [part.name for part in parts]
     for k, part in enumerate(file.study.parts):
         where = f"study.parts[{k + 1}]"
-        if names.count(part.name) > 1:
+        if max(names.count(own.name) for own in part.each_reading()) > 1:
             raise _refused(path, f"{where}.name", part.name, "is given twice", "give each part its own name")
         cases = [case.name for case in part.cases]
         if len(set(cases)) < len(cases):
@@ -90,11 +91,11 @@ def load_study(path: Path) -> StudyFile:
             _check_sweeps(part, path, where)
         if part.size() > MOST_POINTS:
             raise _refused(path, where, "", f"makes {part.size()} points; a study takes {MOST_POINTS}", "ask for fewer")
-    whole = sum(part.size() for part in file.study.parts)
+    whole = sum(part.size() for part in parts)
     if whole > MOST_POINTS:
         rule = f"make {whole} points; a study takes {MOST_POINTS}"
         raise _refused(path, "study.parts", "", rule, "make two studies of them")
-    return file
+    return file.model_copy(update={"study": file.study.model_copy(update={"parts": parts})})
 
 
 def _check_sweeps(part: SweptPart, path: Path, where: str) -> None:

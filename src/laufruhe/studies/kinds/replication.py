@@ -16,20 +16,19 @@ from laufruhe.files.study_paths import joined
 from laufruhe.solvers import Status, solve
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.picture import Picture
-from laufruhe.studies.replication.computations import COMPUTATIONS
 from laufruhe.studies.replication.drawing import drawn
 from laufruhe.studies.replication.expressions import (
     ExpressionError,
     check,
     check_among,
-    expressions_in,
+    check_table,
     filled,
     grid,
     numbers_of,
 )
 from laufruhe.studies.replication.judging import judged, rows
 from laufruhe.studies.replication.models import PictureTable, ReplicaCase, StatementTable
-from laufruhe.studies.replication.quantities import AskedTable, asked, check_asked
+from laufruhe.studies.replication.quantities import DIMENSIONS, AskedTable, asked, check_asked
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text
 
@@ -54,7 +53,7 @@ class Replication(Part):
 
     @model_validator(mode="after")
     def _means_something(self) -> Replication:
-        """Names, quantities and computations are looked up before anything is computed."""
+        """Names, cases, functions and quantities are looked up before anything is computed."""
         try:
             self._check()
         except ModelError as error:
@@ -62,22 +61,21 @@ class Replication(Part):
         return self
 
     def _check(self) -> None:
-        known = {*self.numbers, *self.quantities, "value"}
-        for case in self.cases:
-            if case.computation:
-                check_among(case.computation, COMPUTATIONS, "computation")
-                known |= {*COMPUTATIONS[case.computation][1]}
+        for reading in self.readings.values():
+            for name in reading:
+                check_among(name, self.numbers, "number")
         for name in self.problems:
             self._check_like(name)
         for what in self.quantities.values():
             check_asked(what)
         cases = [case.name for case in self.cases]
+        known: dict[str, Sequence[Any]] = dict.fromkeys((*self.numbers, *self.quantities), ())
         for name, text in self.define.items():
             check(text, known, cases)
-            known.add(name)
-        for one in self.statements:
-            for text in (one.value, one.holds or "0", *expressions_in(one.why)):
-                check(text, known, cases)
+            known[name] = ()
+        check_table(self.statements, {**known, "value": ()}, cases)
+        places = [*DIMENSIONS, *(name for case in self.cases for name in case.sweep)]
+        check_table(self.picture_, known, cases, places)
 
     def _check_like(self, name: str) -> None:
         seen: list[str] = []
@@ -90,13 +88,18 @@ class Replication(Part):
                 raise ModelError(f"problem '{name}' is like what is no name; write it in quotes")
             name = like
 
+    def each_reading(self) -> list[Part]:
+        """One part shows all readings side by side."""
+        return [self]
+
     def settings(self) -> dict[str, Any]:
         """What is asked of every case; numbers and problems stand in the scenes."""
         return {"kind": self.kind, "quantities": {k: str(what) for k, what in self.quantities.items()}}
 
     def size(self) -> int:
-        """Every case at every combination of its swept numbers."""
-        return sum(math.prod(len(g.values or ()) or g.points or 1 for g in c.sweep.values()) for c in self.cases)
+        """Every case at every combination of its swept numbers, in every reading."""
+        one = sum(math.prod(len(g.values or ()) or g.points or 1 for g in c.sweep.values()) for c in self.cases)
+        return one * len(self._all_readings())
 
     @property
     def ends(self) -> tuple[str, ...]:
@@ -104,18 +107,22 @@ class Replication(Part):
         return ("nc", "png") if self.picture_ else ("nc",)
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """Every case at every combination of its swept numbers."""
-        return [point for case in self.cases for point in self._points(case, scenes)]
+        """Every case at every combination of its swept numbers, in one reading of the source after the other."""
+        each = itertools.product(self._all_readings().values(), self.cases)
+        return [point for reading, case in each for point in self._points(case, reading, scenes)]
 
-    def _points(self, case: ReplicaCase, scenes: Scenes) -> Iterator[Point]:
+    def _all_readings(self) -> Mapping[str, Mapping[str, Any]]:
+        """The readings; one without a name where nothing is in doubt."""
+        return self.readings or {"": {}}
+
+    def _points(self, case: ReplicaCase, reading: Mapping[str, Any], scenes: Scenes) -> Iterator[Point]:
         grids = {name: grid(name, table).values.tolist() for name, table in case.sweep.items()}
         for values in itertools.product(*grids.values()):
             swept = dict(zip(grids, values, strict=True))
             try:
-                names = numbers_of({**self.numbers, **case.numbers, **swept}, {})
+                names = numbers_of({**self.numbers, **reading, **case.numbers, **swept}, {})
                 tables = filled(self._tables(case.problem, scenes), names)
-                told = {name: names[name] for name in case.numbers} if case.computation else swept
-                changed = case.model_copy(update={"set": filled(case.set, names), "numbers": told})
+                changed = case.model_copy(update={"set": filled(case.set, names), "numbers": swept})
             except ExpressionError as error:
                 raise self._refused(case.name, *str(error).split("; ", 1)) from None
             yield Point(changed, base=tables)
@@ -132,9 +139,6 @@ class Replication(Part):
         """Every quantity of one scene, at its optimum where something is open."""
         problem, case = scenes.problem(point), _case(point)
         with scenes.blamed(point):
-            if case.computation:
-                found = COMPUTATIONS[case.computation][0](problem, case.numbers)
-                return {name: values.as_dict() for name, values in found.items()}
             result = solve(problem)
             if result.status in (Status.INFEASIBLE, Status.FAILED):
                 raise ModelError(f"no design meets all limits of '{case.name}'; loosen one")
@@ -144,10 +148,11 @@ class Replication(Part):
         """Quantities along the points, and every statement judged."""
         import xarray as xr
 
-        swept = list(dict.fromkeys(name for case in self.cases for name in case.sweep))
+        swept, readings = list(dict.fromkeys(name for case in self.cases for name in case.sweep)), self._all_readings()
         data = xr.Dataset(
             coords={
                 "case": ("point", [point.case.name for point in points]),
+                "reading": ("point", np.repeat([*readings], len(points) // len(readings))),
                 **{name: ("point", [_case(point).numbers.get(name, np.nan) for point in points]) for name in swept},
             },
             attrs=self.about(
@@ -161,10 +166,17 @@ class Replication(Part):
         except ExpressionError as error:
             raise self._refused("statements", *str(error).split("; ", 1)) from None
 
-    def names(self, data: xr.Dataset) -> dict[str, Any]:
-        """What expressions know: functions, numbers, what every case gave, and what is defined of them."""
+    def names(self, data: xr.Dataset) -> dict[str, dict[str, Any]]:
+        """What expressions know in each reading: numbers, what every case gave, and what is defined of them."""
+        return {
+            name: self._names(data.isel(point=np.flatnonzero(data["reading"] == name)), name)
+            for name in self._all_readings()
+        }
+
+    def _names(self, data: xr.Dataset, reading: str) -> dict[str, Any]:
         quantities = {str(name): _by_case(data, str(name)) for name in data.data_vars if "point" in data[name].dims}
-        return numbers_of(self.define, {**numbers_of(self.numbers, {}), **quantities})
+        numbers = {**self.numbers, **self._all_readings()[reading]}
+        return numbers_of(self.define, {**numbers_of(numbers, {}), **quantities})
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
@@ -200,13 +212,16 @@ def _by_case(data: xr.Dataset, name: str) -> _Cases:
     import xarray as xr
 
     found = _Cases()
-    swept = [str(c) for c, labels in data.coords.items() if labels.dims == ("point",) and c != "case"]
+    swept = [str(c) for c, labels in data.coords.items() if labels.dims == ("point",) and c not in ("case", "reading")]
     for case in dict.fromkeys(data["case"].values.tolist()):
         here = data.isel(point=np.flatnonzero(data["case"].values == case))
         coords = {c: np.array(list(dict.fromkeys(here[c].values.tolist()))) for c in swept if here[c].notnull().all()}
         own = {str(dim): here[dim].values for dim in here[name].dims[1:]}
-        shape = [len(labels) for labels in (*coords.values(), *own.values())]
-        values = xr.DataArray(here[name].values.reshape(shape), coords={**coords, **own}, dims=[*coords, *own])
+        whole = np.full([len(labels) for labels in (*coords.values(), *own.values())], np.nan)
+        # by their labels: cases may sweep the same numbers one within the other in any order
+        places = [[labels.tolist().index(label) for label in here[c].values.tolist()] for c, labels in coords.items()]
+        whole[tuple(places)] = here[name].values if places else here[name].values[0]
+        values = xr.DataArray(whole, coords={**coords, **own}, dims=[*coords, *own])
         for dim in own if here[name].attrs.get("padded") else ():
             values = values.dropna(dim, how="all")
         found[str(case)] = values if values.dims else values.item()

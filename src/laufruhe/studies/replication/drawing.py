@@ -15,18 +15,23 @@ from laufruhe.studies.replication.models import AxisTable, BarsTable, CurveTable
 if TYPE_CHECKING:
     import xarray as xr
 
-GROUP, ABOVE, LEAST_INSIDE, LEAST_SHOWN = 0.84, 0.012, 0.055, 1e-6
+GROUP, ABOVE, LEAST_INSIDE, LEAST_SHOWN = 0.84, 0.012, 0.04, 1e-6
 DIGITS = 3
 
 Names = Mapping[str, Any]
 
 
-def drawn(table: PictureTable, names: Names, data: xr.Dataset) -> Picture:
-    """A picture of what the names are worth."""
+def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) -> Picture:
+    """A picture of what the names are worth in each reading of the source."""
+    panels = [
+        _panel(panel, names, "" if panel.once else reading)
+        for panel in table.panels
+        for reading, names in list(readings.items())[: 1 if panel.once else None]
+    ]
     return Picture(
         table.title or data.attrs["title"],
-        filled(table.words, names),
-        [_panel(panel, names) for panel in table.panels],
+        filled(table.words, next(iter(readings.values()))),
+        panels,
         credit(data),
         size=(table.size[0], table.size[1]),
         columns=table.columns,
@@ -35,7 +40,7 @@ def drawn(table: PictureTable, names: Names, data: xr.Dataset) -> Picture:
     )
 
 
-def _panel(panel: PanelTable, names: Names) -> Panel:
+def _panel(panel: PanelTable, names: Names, reading: str) -> Panel:
     marks: list[Mark] = []
     for area in panel.areas:
         x, (low, high) = ([value_of(end, names) for end in ends] for ends in (area.x, area.y))
@@ -47,7 +52,8 @@ def _panel(panel: PanelTable, names: Names) -> Panel:
     for words in panel.words:
         across, up = (float(value_of(at, names)) for at in (words.x, words.y))
         marks.append(Words(across, up, filled(words.text, names), 8.0, words.colour, words.across, words.along))
-    return Panel(marks, _axis(panel.x, names), _axis(panel.y, names), filled(panel.title, names))
+    title = ", ".join(words for words in (filled(panel.title, names), reading) if words)
+    return Panel(marks, _axis(panel.x, names), _axis(panel.y, names), title)
 
 
 def _axis(axis: AxisTable, names: Names) -> Axis:

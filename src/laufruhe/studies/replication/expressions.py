@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import operator
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from string import Formatter
 from typing import Any
 
@@ -18,8 +18,9 @@ from pydantic import ValidationError
 
 from laufruhe.errors import ModelError
 from laufruhe.files.complaints import nearest
+from laufruhe.files.fields import Table
 from laufruhe.studies.replication.functions import CONSTANTS, FUNCTIONS
-from laufruhe.studies.replication.models import GridTable
+from laufruhe.studies.replication.models import EXPRESSIONS, CurveTable, GridTable
 
 MOST_LETTERS = 2000
 _BINARY: Mapping[type, Callable[[Any, Any], Any]] = {
@@ -37,7 +38,39 @@ class ExpressionError(ModelError):
     """An expression that means nothing here; says which, why, and what would."""
 
 
-def check(text: str, names: Collection[str], cases: Collection[str]) -> None:
+def check_table(
+    told: Any, known: Mapping[str, Sequence[Any]], cases: Collection[str], places: Sequence[str] = (), key: str = ""
+) -> None:
+    """Whether all expressions in a table of a file could have a value, before any name has one.
+
+    Parameters
+    ----------
+    known
+        Names, and the values that each is repeated for, where it is.
+    places
+        Dimensions, which the `x` of a curve knows too.
+    key
+        That `told` stands at.
+
+    Raises
+    ------
+    ExpressionError
+        As `check` does.
+    """
+    if isinstance(told, Table):
+        own = {**known, **getattr(told, "each", {})}
+        for field in type(told).model_fields:
+            at_places = dict.fromkeys(places, ()) if isinstance(told, CurveTable) and field == "x" else {}
+            check_table(getattr(told, field), {**at_places, **own}, cases, places, field)
+    elif isinstance(told, list):
+        for one in told:
+            check_table(one, known, cases, places, key)
+    elif isinstance(told, str):
+        for text in [told] if key in EXPRESSIONS else expressions_in(told):
+            check(text, known, cases)
+
+
+def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str]) -> None:
     """Whether an expression could have a value, before any name has one.
 
     Raises
@@ -49,13 +82,16 @@ def check(text: str, names: Collection[str], cases: Collection[str]) -> None:
     calls = [node for node in nodes if isinstance(node, ast.Call)]
     unknown = {ast.unparse(node.args[1]) for node in calls if ast.unparse(node.func) == "root" and len(node.args) == 4}
     called = {id(node.func) for node in calls}
-    known = {*names, *CONSTANTS, *unknown}
+    names = {*known, *CONSTANTS, *unknown}
     for node in nodes:
         _check_node(node)
         if isinstance(node, ast.Name) and id(node) not in called:
-            check_among(node.id, known, "name")
-        elif isinstance(node, ast.Subscript) and isinstance(case := getattr(node.slice, "value", None), str):
-            check_among(case, cases, "case")
+            check_among(node.id, names, "name")
+        elif isinstance(node, ast.Subscript):
+            place = node.slice
+            for case in known.get(place.id, ()) if isinstance(place, ast.Name) else [getattr(place, "value", None)]:
+                if isinstance(case, str):
+                    check_among(case, cases, "case")
 
 
 def _check_node(node: ast.expr) -> None:
@@ -117,14 +153,16 @@ def filled(text: Any, names: Mapping[str, Any]) -> Any:
 def _parts(text: str) -> list[tuple[str, str, str]]:
     """Plain text, the expression after it, and how its number is written."""
     try:
-        return [(plain, field or "", spec or "") for plain, field, spec, _ in Formatter().parse(text)]
+        parts = [(plain, field or "", spec or "") for plain, field, spec, _ in Formatter().parse(text)]
     except ValueError as error:
         raise ExpressionError(f"'{text}' cannot be read ({error}); check its braces") from None
+    for _, _, spec in parts:
+        if spec and not _SPEC.fullmatch(spec):
+            raise ExpressionError(f"'{spec}' is no format of a number; write for example .1f, .3g or .0f")
+    return parts
 
 
 def _shown(value: Any, spec: str) -> str:
-    if spec and not _SPEC.fullmatch(spec):
-        raise ExpressionError(f"'{spec}' is no format of a number; write for example .1f, .3g or .0f")
     return format(float(value), spec) if spec else str(value)
 
 

@@ -13,28 +13,44 @@ from laufruhe.studies.verdict import UNSTATED
 if TYPE_CHECKING:
     import xarray as xr
 
-CONFIRMED, NOT_CONFIRMED, DEPENDS, BEYOND = "confirmed", "not confirmed", "depends on an assumption", UNSTATED
+CONFIRMED, NOT_CONFIRMED, BEYOND = "confirmed", "not confirmed", UNSTATED
 _SLACK, _NOTHING = 1e-9, 1e-9
 _CELLS = {CONFIRMED: "yes", NOT_CONFIRMED: "**no**", BEYOND: "–"}
 
 
-def judged(statements: Sequence[StatementTable], names: Mapping[str, Any]) -> dict[str, Any]:
-    """Coordinates of a dataset along its statements: words, printed, ours, verdict and why."""
-    found: dict[str, list[Any]] = {key: [] for key in ("statement", "printed", "ours", "unit", "verdict", "why")}
-    for one in statements:
-        value = float(value_of(one.value, names))
-        own = {**names, "value": value}
-        found["statement"].append(one.text + (f" ({one.where})" if one.where else ""))
-        found["printed"].append(UNSTATED if one.printed is None else one.printed)
-        found["ours"].append(value)
-        found["unit"].append(one.unit)
-        found["verdict"].append(verdict(one, own))
-        found["why"].append(filled(one.why, own))
-    return {name: ("statement", values) for name, values in found.items()}
+def judged(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Coordinates of a dataset along its statements and the readings: printed, ours, verdict, why.
+
+    Parameters
+    ----------
+    readings
+        What names are worth in each reading of the source.
+    """
+    if not statements:
+        return {}
+    found = [[_judged(one, names) for names in readings.values()] for one in statements]
+    return {
+        "by_reading": list(readings),
+        "statement": ("statement", [one.text + (f" ({one.where})" if one.where else "") for one in statements]),
+        "printed": ("statement", [UNSTATED if one.printed is None else one.printed for one in statements]),
+        "unit": ("statement", [one.unit for one in statements]),
+        **{
+            name: (("statement", "by_reading"), [[cell[k] for cell in row] for row in found])
+            for k, name in enumerate(("ours", "verdict", "why"))
+        },
+    }
+
+
+def _judged(one: StatementTable, names: Mapping[str, Any]) -> tuple[float, str, str]:
+    value = float(value_of(one.value, names))
+    own = {**names, "value": value}
+    return value, verdict(one, own), filled(one.why, own)
 
 
 def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
     """Whether a statement holds; `names` has our value as `value`."""
+    if statement.printed is None:
+        return BEYOND
     if statement.holds is not None:
         holds = bool(value_of(statement.holds, names))
     else:
@@ -42,22 +58,27 @@ def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
         if isinstance(allowed, str):
             allowed = 0.01 * float(allowed.removesuffix("%")) * abs(expected)
         holds = abs(names["value"] - expected) <= float(allowed or 0.0) * (1.0 + _SLACK)
-    if holds:
-        return BEYOND if statement.printed is None else CONFIRMED
-    assuming = statement.assuming
-    return f"{DEPENDS}: {assuming.what}" if assuming and value_of(assuming.holds, names) else NOT_CONFIRMED
+    return CONFIRMED if holds else NOT_CONFIRMED
 
 
 def rows(data: xr.Dataset) -> list[Text]:
-    """The statements of a dataset as a table, and how many are confirmed."""
+    """The statements of a dataset as a table, with ours and the verdict in every reading."""
     if not data.sizes.get("statement"):
         return []
-    columns = [data[name].values.tolist() for name in ("statement", "printed", "ours", "unit", "verdict", "why")]
-    cells = [
-        [text, printed, f"{_shown(ours)} {unit}".strip(), _CELLS.get(said, said), why]
-        for text, printed, ours, unit, said, why in zip(*columns, strict=True)
-    ]
-    return [Rows(["statement", "the source", "here", "confirmed", "why"], cells)]
+    readings = [str(name) for name in data["by_reading"].values]
+    head = ["statement", "the source", *(cell for name in readings for cell in (name or "here", "confirmed")), "why"]
+    return [Rows(head, [_row(data.isel(statement=k), readings) for k in range(data.sizes["statement"])])]
+
+
+def _row(one: xr.Dataset, readings: Sequence[str]) -> list[str]:
+    unit = one["unit"].item()
+    cells = [str(one[name].item()) for name in ("statement", "printed")]
+    for ours, said in zip(one["ours"].values.tolist(), one["verdict"].values.tolist(), strict=True):
+        cells += [f"{_shown(ours)} {unit}".strip(), _CELLS[said]]
+    whys = one["why"].values.tolist()
+    if len(set(whys)) > 1:
+        return [*cells, "<br>".join(f"{name}: {why}" for name, why in zip(readings, whys, strict=True))]
+    return [*cells, whys[0]]
 
 
 def _shown(value: float) -> str:
@@ -65,7 +86,14 @@ def _shown(value: float) -> str:
 
 
 def counted(datasets: Iterable[xr.Dataset]) -> str:
-    """How many of the statements of all parts are confirmed; empty where there are none."""
+    """How many of the statements of all parts are confirmed, in every reading; empty where there are none."""
     judged_ones = [data for data in datasets if "verdict" in data.coords]
-    verdicts = [v for data in judged_ones for v in data["verdict"].values[data["printed"].values != UNSTATED]]
-    return f"{verdicts.count(CONFIRMED)} of {len(verdicts)} statements are confirmed." if verdicts else ""
+    readings = dict.fromkeys(str(name) for data in judged_ones for name in data["by_reading"].values)
+    found = []
+    for name in [name for name in readings if name] or list(readings):
+        # a part without readings says the same in all of them
+        own = [data.sel(by_reading=name if name in data["by_reading"] else "") for data in judged_ones]
+        verdicts = [v for data in own for v in data["verdict"].values[data["printed"].values != UNSTATED]]
+        told = f"{name}: " if name else ""
+        found += [f"{told}{verdicts.count(CONFIRMED)} of {len(verdicts)} statements are confirmed."] * bool(verdicts)
+    return " ".join(found)

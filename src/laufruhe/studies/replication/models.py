@@ -17,6 +17,10 @@ Each: TypeAlias = Annotated[
 ]
 
 
+EXPRESSIONS = frozenset({"x", "y", "ends", "filled", "outline", "value", "expected", "holds"})
+"""Keys that hold expressions; in the texts of other keys they stand in braces."""
+
+
 class GridTable(Table):
     """Numbers listed, or so many between two ends."""
 
@@ -34,19 +38,11 @@ class GridTable(Table):
 
 
 class ReplicaCase(CaseTable):
-    """One scene, or a computation by its name."""
+    """One scene, its numbers in place of those of the part."""
 
-    problem: str = Field(default="", description="A name under problems, or a problem file.")
+    problem: str = Field(description="A name under problems, or a problem file.")
     numbers: dict[str, Any] = Field(default_factory=dict, description="In place of those of the study.")
     sweep: dict[str, GridTable] = Field(default_factory=dict, description="Numbers that take several values.")
-    computation: str = Field(default="", description="In place of a problem: what no problem file can say.")
-
-
-class AssumptionTable(Table):
-    """On what a statement holds that does not hold as it is printed."""
-
-    what: str
-    holds: str
 
 
 class StatementTable(Table):
@@ -60,7 +56,6 @@ class StatementTable(Table):
     expected: Expression | None = Field(default=None, alias="is", description="Printed number in that unit.")
     within: int | float | str | None = Field(default=None, description='Allowed: a number in that unit, or "15 %".')
     holds: str | None = Field(default=None, description="Condition, with the name value, in place of is and within.")
-    assuming: AssumptionTable | None = None
     why: str = ""
 
     @model_validator(mode="after")
@@ -135,9 +130,10 @@ class AreaTable(Table):
 
 
 class PanelTable(Table):
-    """What shares two axes."""
+    """What shares two axes; drawn once for every reading."""
 
     title: str = ""
+    once: bool = Field(default=False, description="Whether one drawing serves all readings.")
     x: AxisTable = AxisTable()
     y: AxisTable = AxisTable()
     areas: list[AreaTable] = Field(default_factory=list)

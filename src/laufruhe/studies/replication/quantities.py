@@ -24,6 +24,8 @@ from laufruhe.studies.replication.expressions import check_among
 ORDERS = (1.0, 2.0, 4.0, 6.0)
 FORCE, COUPLE = slice(0, 3), slice(4, 6)
 DECISION = "decision "
+DIMENSIONS = ("angle", "direction", "firing", "mode", "motion", "mount", "number", "order", "turns")
+"""Along which quantities may lie."""
 
 
 class AskedTable(QuantityTable):
