@@ -7,13 +7,14 @@ BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test test-fast bench pictures lint format clean distclean
+.PHONY: help solve study test test-fast attack bench pictures lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
 	@echo "make study      sweeps and comparisons that STUDY describes ($(STUDY))"
 	@echo "make test-fast  tests of every room, under a minute on two cores"
 	@echo "make test       all tests, minutes"
+	@echo "make attack     random problems against an independent model, ATTACK='--number 100'"
 	@echo "make lint       style, types, direction of imports"
 	@echo "make format     put the source into the project's style"
 	@echo "make bench      benchmarks, which write results/benchmarks/; an hour and more"
@@ -43,6 +44,12 @@ test: $(STAMP)
 
 test-fast: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) -m "not slow" --hypothesis-profile=fast $(TESTS)
+
+# What the log under results/attack/ has is not run again.
+attack: export OMP_NUM_THREADS = 1
+
+attack: $(STAMP)
+	$(BIN)/python tests/attack/run_attack.py run all $(ATTACK)
 
 # Scripts that write under results/benchmarks/.
 bench: $(STAMP)

@@ -1,0 +1,190 @@
+"""What a result claims, held against the plain model and the best rival."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import time
+import traceback
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from attack.families import toml
+from attack.openings import Openings
+from attack.plain_loads import number
+from attack.plain_scene import Table
+from attack.rivals import Rival, best_star, convex_rival, least_broken, local_rival
+
+READING = {"gas": 6e-5}
+"""Of how a value is read, beside the error that the result states: samples of the plain model."""
+SAMPLED = 1e-5
+KEPT = 3e-5
+"""Share of a limit by which a design may pass it."""
+GAP = 1e-4
+
+
+@dataclass
+class Verdict:
+    """What came out of one problem.
+
+    Attributes
+    ----------
+    wrong
+        What is claimed and not true, in words with figures.
+    beaten
+        Share by which a rival is better than a design that claims no optimum.
+    """
+
+    family: str
+    seed: int
+    status: str = ""
+    kind: str = ""
+    gap: float = 0.0
+    seconds: float = 0.0
+    own_seconds: float = 0.0
+    beaten: float = 0.0
+    rivals: int = 0
+    wrong: list[str] = field(default_factory=list)
+
+    @property
+    def line(self) -> dict[str, Any]:
+        return dict(self.__dict__)
+
+
+def solved(table: Table, folder: Path, name: str = "problem") -> Any:
+    """The result of a problem, or the error that ended it."""
+    import laufruhe
+
+    path = folder / f"{name}.toml"
+    path.write_text(toml(table), encoding="utf-8")
+    return laufruhe.solve(laufruhe.load(path))
+
+
+@contextlib.contextmanager
+def silence_heard(wrong: list[str]):
+    """What is printed or warned of meanwhile is a defect."""
+    heard = io.StringIO()
+    with (
+        warnings.catch_warnings(record=True) as caught,
+        contextlib.redirect_stdout(heard),
+        contextlib.redirect_stderr(heard),
+    ):
+        warnings.simplefilter("always")
+        yield
+    wrong += [f"warns: {w.category.__name__}: {str(w.message)[:150]}" for w in caught[:2]]
+    if heard.getvalue().strip():
+        wrong.append(f"prints: {heard.getvalue().strip()[:150]}")
+
+
+def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, folder: Path, most: int) -> Verdict:
+    """Solve a problem and attack what is claimed of it.
+
+    Parameters
+    ----------
+    most
+        Stars that are solved each by itself, and a hundredth of the calls of a local search.
+    """
+    verdict, started = Verdict(family, seed), time.perf_counter()
+    try:
+        with silence_heard(verdict.wrong):
+            result = solved(table, folder, f"{family}-{seed}-{os.getpid()}")
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        verdict.status = "refused" if type(error).__name__ == "InputError" else "error"
+        verdict.wrong.append(
+            f"{type(error).__name__} at {Path(where.filename).name}:{where.lineno}: {str(error)[:200]}"
+        )
+        return verdict
+    finally:
+        (folder / f"{family}-{seed}-{os.getpid()}.toml").unlink(missing_ok=True)
+        verdict.seconds = time.perf_counter() - started
+    started = time.perf_counter()
+    judge(verdict, table, result, rng, most)
+    verdict.own_seconds = time.perf_counter() - started
+    return verdict
+
+
+def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, most: int) -> None:
+    """Complaints about a result."""
+    openings = Openings(table)
+    verdict.status = result.status.value
+    if verdict.status == "failed":
+        verdict.wrong.append(f"failed: {result.message[:150]}")
+    if result.objective is None:
+        _judge_infeasible(verdict, openings, rng, most)
+        return
+    certificate = result.certificate
+    verdict.kind, verdict.gap = certificate.kind.value, certificate.gap
+    vector, told = openings.read(result.final.engine)
+    scene = openings.scene(vector, told)
+    value, initial = result.objective.value, result.objective.initial
+    floor = 1e-9 * (initial if np.isfinite(initial) and initial > 0.0 else 1.0)
+    reading = SAMPLED + READING["gas"] * ("gas" in table)
+    _judge_value(verdict, result, scene, value, reading, floor)
+    rival = _rival(openings, vector, told, value, rng, most)
+    verdict.rivals = rival.looked_at if rival else 0
+    bound = certificate.lower_bound
+    if bound > scene.objective * (1.0 + reading) + floor and scene.worst <= 0.0:
+        verdict.wrong.append(f"own design {scene.objective:.9g} lies under its bound {bound:.9g}")
+    if scene.worst > KEPT:
+        verdict.wrong.append(f"a limit is passed by {scene.worst:.2e} of itself")
+    given = openings.scene(*openings.read(result.initial.engine))
+    if given.worst <= 0.0 and value > given.objective * (1.0 + reading) + floor:
+        verdict.wrong.append(f"value {value:.9g} is worse than {given.objective:.9g} as given")
+    if rival is None or rival.excess > 1e-6:
+        return
+    if bound > rival.value * (1.0 + reading) + floor:
+        verdict.wrong.append(f"bound {bound:.9g}, a rival has {rival.value:.9g} {rival.told or ''}")
+    over = (value - rival.value) / max(rival.value, floor)
+    unit = max(rival.value, floor)
+    if verdict.kind == "global" and value - rival.value > (GAP + reading + result.error_estimate) * unit + floor:
+        verdict.wrong.append(f"global {value:.9g}, a rival has {rival.value:.9g} {rival.told or ''}")
+    elif verdict.kind != "global":
+        verdict.beaten = max(over, 0.0)
+        if verdict.gap and rival.value < value * (1.0 - verdict.gap) * (1.0 - reading) - floor:
+            verdict.wrong.append(f"gap {verdict.gap:.3g}, but a rival is better by {over:.3g}")
+
+
+def _judge_value(verdict: Verdict, result: Any, scene: Any, value: float, reading: float, floor: float) -> None:
+    """Objective and limits of the final design."""
+    away = abs(scene.objective - value)
+    if away > (reading + 1.5 * result.error_estimate) * max(value, scene.objective) + floor:
+        verdict.wrong.append(
+            f"value {value:.9g} is {scene.objective:.9g}, {away / max(value, floor):.2e} off, "
+            f"error estimate {result.error_estimate:.1e}"
+        )
+    for told, limit in zip(scene.table.get("constraints", []), result.limits, strict=False):
+        if told["limit"] == "natural frequencies" or told.get("name") != limit.name:
+            continue
+        own = scene.measure({**told, "quantity": told["limit"]})
+        if abs(own - limit.value) > 10 * reading * max(own, 1e-6 * number(told.get("max", told.get("min")))):
+            verdict.wrong.append(f"limit {limit.name} is said to be {limit.value:.9g} and is {own:.9g}")
+
+
+def _rival(
+    openings: Openings, vector: np.ndarray, told: Table, value: float, rng: np.random.Generator, most: int
+) -> Rival | None:
+    enough = value * (1.0 - 0.2 * GAP)
+    if openings.numbers:
+        return local_rival(openings, rng, [vector], 100 * most, told)
+    if openings.table["engine"].get("throws") == "open":
+        return best_star(openings, 10 * most, enough)
+    return convex_rival(openings, vector, told, enough)
+
+
+def _judge_infeasible(verdict: Verdict, openings: Openings, rng: np.random.Generator, most: int) -> None:
+    """A design that keeps every limit must not exist."""
+    if openings.numbers:
+        rival = local_rival(openings, rng, [openings.nearest(np.zeros(openings.size))], 100 * most)
+    else:
+        rival = least_broken(openings, 10 * most)
+    if rival is None:
+        return
+    verdict.rivals = rival.looked_at
+    if rival.excess <= -1e-6:
+        verdict.wrong.append(f"{verdict.status}, but a rival keeps every limit with {-rival.excess:.2e} to spare")

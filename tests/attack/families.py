@@ -1,0 +1,425 @@
+"""Random problems of every family, as tables of a problem file in base units, from a family's name and a seed.
+
+Numbers are rounded: a file then says what the generator meant, and a failing one can be read.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from attack.plain_scene import Table
+from attack.star_list import even_stars
+
+Generator = np.random.Generator
+LOADS = ("mount force", "shaking force", "rocking couple", "roll moment")
+NORMS = ("mean", "maximum", "rms", "peak to peak")
+UNITS = {"mount force": "N", "shaking force": "N", "rocking couple": "N m", "roll moment": "N m", "mount travel": "m"}
+
+
+def q(value: float, unit: str, digits: int = 6) -> str:
+    """A number with its unit, to so many digits."""
+    return f"{float(f'{value:.{digits}g}')!r} {unit}"
+
+
+def toml(table: Table) -> str:
+    """Text of a problem file."""
+    lines: list[str] = []
+    tables: list[str] = []
+    for key, value in table.items():
+        if isinstance(value, dict):
+            tables.append(_section(f"[{key}]", value, key))
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            tables += [_section(f"[[{key}]]", entry, key) for entry in value]
+        else:
+            lines.append(f"{key} = {_inline_toml(value)}")
+    return "\n".join(lines + tables) + "\n"
+
+
+def _section(head: str, table: Table, name: str) -> str:
+    lines, below = [head], []
+    for key, value in table.items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            below += [_section(f"[[{name}.{key}]]", entry, f"{name}.{key}") for entry in value]
+        else:
+            lines.append(f"{key} = {_inline_toml(value)}")
+    return "\n".join(lines + below)
+
+
+def _inline_toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{k} = {_inline_toml(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_inline_toml(v) for v in value) + "]"
+    return json.dumps(value)
+
+
+# --- engines
+
+
+def mechanism(rng: Generator, plain: bool = False) -> Table:
+    """Sizes that every layout has."""
+    radius = rng.uniform(0.03, 0.08)
+    found = {
+        "cycle": str(rng.choice(["two-stroke", "four-stroke"])),
+        "stroke": q(2.0 * radius, "m"),
+        "rod_length": q(radius / rng.uniform(0.2, 0.32), "m"),
+        "reciprocating_mass": q(rng.uniform(0.3, 2.0), "kg"),
+        "rotating_mass": q(rng.uniform(0.0, 1.0), "kg"),
+    }
+    if not plain and rng.random() < 0.5:
+        found["rod_inertia_deficit"] = q(rng.uniform(-0.004, 0.004), "kg m^2")
+    if not plain and rng.random() < 0.3:
+        found["offset"] = q(rng.uniform(-0.15, 0.15) * radius, "m")
+    return found
+
+
+def angle(rng: Generator) -> float:
+    return float(round(rng.uniform(0.0, 360.0), 3))
+
+
+def throws(rng: Generator, count: int) -> list[float]:
+    return [0.0] + [angle(rng) for _ in range(count - 1)]
+
+
+def spaced(rng: Generator) -> Table:
+    return {"cylinder_spacing": q(rng.uniform(0.08, 0.14), "m")}
+
+
+def inline(rng: Generator) -> Table:
+    return {"layout": "inline", **mechanism(rng), **spaced(rng), "throws": throws(rng, int(rng.integers(1, 6)))}
+
+
+def vee(rng: Generator) -> Table:
+    count = int(rng.integers(1, 4))
+    found = {"layout": "vee", **mechanism(rng), **spaced(rng), "throws": throws(rng, count)}
+    found["bank_angle"] = float(rng.choice([45.0, 60.0, 90.0, round(rng.uniform(20.0, 150.0), 2)]))
+    if rng.random() < 0.5:
+        found["split_pin_angle"] = float(round(rng.uniform(-40.0, 60.0), 2))
+    if rng.random() < 0.5:
+        found["bank_stagger"] = q(rng.uniform(-0.03, 0.03), "m")
+    return found
+
+
+def boxer(rng: Generator) -> Table:
+    count = 2 * int(rng.integers(1, 4))
+    found = {"layout": "boxer", **mechanism(rng), **spaced(rng), "throws": throws(rng, count)}
+    return {**found, "bank_stagger": q(rng.uniform(0.01, 0.05), "m")}
+
+
+def opposed_piston(rng: Generator) -> Table:
+    found = {
+        "layout": "opposed-piston",
+        **mechanism(rng),
+        **spaced(rng),
+        "throws": throws(rng, int(rng.integers(1, 4))),
+    }
+    found.pop("offset", None)
+    reach = 2.0 * float(found["rod_length"].split()[0]) + float(found["stroke"].split()[0])
+    found |= {"crank_distance": q(reach + rng.uniform(0.05, 0.2), "m"), "crank_ratio": int(rng.choice([-1, 1]))}
+    if rng.random() < 0.5:
+        found["crank_lead"] = float(round(rng.uniform(3.0, 25.0), 2))
+    return found
+
+
+def radial(rng: Generator) -> Table:
+    count = int(rng.choice([3, 5, 7]))
+    found = {"layout": "radial", **mechanism(rng), "cylinders": count}
+    radius = 0.5 * float(found["stroke"].split()[0])
+    arm = rng.uniform(0.6, 0.95) * radius
+    found |= {"knuckle_radius": q(arm, "m"), "knuckle_mass": q(rng.uniform(0.0, 0.3), "kg")}
+    if rng.random() < 0.5:
+        found["knuckle_angles"] = [float(round(360.0 * k / count + rng.uniform(-3, 3), 3)) for k in range(1, count)]
+    if rng.random() < 0.5:
+        found["articulated_rod_length"] = q(float(found["rod_length"].split()[0]) - arm + rng.uniform(-3e-3, 3e-3), "m")
+    return found
+
+
+def parts(rng: Generator) -> Table:
+    """Slider-cranks on two geared shafts, no two alike."""
+    found = {"layout": "parts", **mechanism(rng)}
+    found["shafts"] = [
+        {"name": "first", "position": ["0.0 m", "0.0 m"]},
+        {
+            "name": "second", "ratio": int(rng.choice([-1, 1, 2])),
+            "position": [q(rng.uniform(0.1, 0.3), "m"), q(rng.uniform(-0.1, 0.1), "m")],
+        },
+    ]  # fmt: skip
+    found["slider_cranks"] = [
+        {
+            "x": q(0.11 * k + rng.uniform(-0.02, 0.02), "m"), "bank_angle": angle(rng), "throw": angle(rng),
+            "shaft": str(rng.choice(["first", "second"])),
+            **({"reciprocating_mass": q(rng.uniform(0.3, 2.0), "kg")} if rng.random() < 0.5 else {}),
+        }
+        for k in range(int(rng.integers(1, 5)))
+    ]  # fmt: skip
+    return found
+
+
+# --- everything else of a problem
+
+
+def moving_mass(engine: Table) -> float:
+    """Reciprocating mass times crank radius of all cylinders, about [kg m]."""
+    count = {"vee": 2}.get(engine["layout"], 1)
+    told = engine.get("throws")
+    throw_count = len(told) if isinstance(told, list) else engine.get("cylinders", 1)
+    if engine["layout"] == "parts":
+        throw_count = len(engine["slider_cranks"])
+    return (
+        count * throw_count * float(engine["reciprocating_mass"].split()[0]) * 0.5 * float(engine["stroke"].split()[0])
+    )
+
+
+def rigid_mounts(rng: Generator) -> Table:
+    return {
+        "places": [
+            {
+                "name": f"m{k}",
+                "position": [q(v, "m", 4) for v in (*rng.uniform(-0.4, 0.4, 2), rng.uniform(-0.3, 0.3))],
+                "relative_stiffness": [0.0, 1.0, 1.0]
+                if rng.random() < 0.5
+                else [float(round(v, 3)) for v in rng.uniform(0.3, 2.0, 3)],
+            }
+            for k in range(int(rng.integers(3, 5)))
+        ]
+    }
+
+
+def points(rng: Generator, most: int = 2, low: float = 50.0, high: float = 400.0) -> list[Table]:
+    return [
+        {
+            "name": f"p{k}", "speed": q(rng.uniform(low, high), "rad/s"),
+            "weight": float(round(rng.uniform(0.3, 3.0), 3)),
+        }
+        for k in range(int(rng.integers(1, most + 1)))
+    ]  # fmt: skip
+
+
+def counterweights(rng: Generator, size: float, count: int) -> list[Table]:
+    found = []
+    for k in range(count):
+        told: Table = {
+            "name": f"c{k}", "x": q(rng.uniform(-0.3, 0.3), "m", 4), "radius": "0.06 m",
+            "mass": {"between": ["0.0 kg", q(size * rng.uniform(0.1, 1.2) / 0.06, "kg")]},
+        }  # fmt: skip
+        chance = rng.random()
+        if chance < 0.7:
+            told["angle"] = {"between": [0, 360]}
+        elif chance < 0.85:
+            low = float(round(rng.uniform(0.0, 300.0), 2))
+            told["angle"] = {"between": [low, low + float(round(rng.uniform(20.0, 170.0), 2))]}
+        else:
+            told["angle"] = angle(rng)
+            if rng.random() < 0.5:
+                told["mass"]["between"][0] = q(0.3 * float(told["mass"]["between"][1].split()[0]), "kg")
+        found.append(told)
+    return found
+
+
+def balancers(rng: Generator, size: float, count: int) -> list[Table]:
+    found = []
+    for k in range(count):
+        open_one = {
+            "x": q(rng.uniform(-0.2, 0.2), "m", 4), "radius": "0.04 m",
+            "mass": {"between": ["0.0 kg", q(size * rng.uniform(0.02, 0.4) / 0.04, "kg")]},
+            "angle": {"between": [0, 360]},
+        }  # fmt: skip
+        shaft: Table = {
+            "name": f"s{k}", "ratio": int(rng.choice([-1, 2, -2])),
+            "position": [q(v, "m", 4) for v in rng.uniform(-0.2, 0.2, 2)],
+        }  # fmt: skip
+        if rng.random() < 0.3:
+            how = str(rng.choice(["equal", "opposite", "mirrored", "mirrored opposite"]))
+            second = {
+                "name": "r", "x": q(rng.uniform(-0.2, 0.2), "m", 4), "coupled": {"to": f"s{k}.f", "as": how},
+            }  # fmt: skip
+            shaft["unbalances"] = [{"name": "f", **open_one}, second]
+        else:
+            shaft["unbalances"] = [open_one]
+        found.append(shaft)
+    return found
+
+
+def asked(rng: Generator, table: Table, channels: tuple[str, ...] = LOADS, norms: tuple[str, ...] = NORMS) -> Table:
+    """A quantity and what narrows it."""
+    share = np.array([0.55] + [0.45 / (len(channels) - 1)] * (len(channels) - 1)) if len(channels) > 1 else [1.0]
+    channel = str(rng.choice(channels, p=share))
+    found: Table = {"quantity": f"{rng.choice(norms)} {channel}"}
+    if rng.random() < 0.35:
+        found["orders"] = [1, 2] if rng.random() < 0.5 else [int(rng.choice([1, 2]))]
+    if len(table["operating_points"]) > 1 and rng.random() < 0.3:
+        found["operating_points"] = ["p1"]
+    if channel.startswith("mount"):
+        if rng.random() < 0.3:
+            found["mounts"] = ["m0", "m2"]
+        if rng.random() < 0.3:
+            found["direction_weights"] = [float(round(v, 2)) for v in rng.uniform(0.0, 2.0, 3)]
+    return found
+
+
+def objective(terms: list[Table]) -> Table:
+    if len(terms) == 1:
+        told = {k: v for k, v in terms[0].items() if k not in ("quantity", "weight")}
+        return {"minimise": terms[0]["quantity"], **told}
+    return {"terms": terms}
+
+
+def with_objective(rng: Generator, table: Table, most: int = 2, **kinds: Any) -> Table:
+    count = int(rng.integers(1, most + 1))
+    terms = [{**asked(rng, table, **kinds), "weight": float(round(rng.uniform(0.2, 3.0), 3))} for _ in range(count)]
+    return {**table, "objective": objective(terms)}
+
+
+def unit_of(quantity: str) -> str:
+    if quantity.endswith("mass"):
+        return "kg"
+    return next(unit for channel, unit in UNITS.items() if quantity.endswith(channel))
+
+
+Engine = Callable[[Generator], Table]
+
+
+def of_unbalances(engine: Engine, most_points: int = 2) -> Callable[[Generator], Table]:
+    """An engine on rigid mounts whose counterweights and balancer shafts are open."""
+
+    def made(rng: Generator) -> Table:
+        built = engine(rng)
+        size = moving_mass(built)
+        table = {"engine": built, "operating_points": points(rng, most_points), "mounts": rigid_mounts(rng)}
+        table["counterweights"] = counterweights(rng, size, int(rng.integers(1, 3)))
+        if shafts := balancers(rng, size, int(rng.integers(0, 3))):
+            table["balancer_shafts"] = shafts
+        return with_objective(rng, table)
+
+    return made
+
+
+def gas_engine(rng: Generator) -> Table:
+    """In line, at angles that fire one after the other, no two at once."""
+    found = {"layout": "inline", **mechanism(rng, plain=True), **spaced(rng)}
+    found["bore"] = q(rng.uniform(0.06, 0.12), "m")
+    count, turns = int(rng.integers(1, 5)), 2 if found["cycle"] == "four-stroke" else 1
+    while True:
+        told = throws(rng, count)
+        laps = [0] + [int(rng.integers(0, turns)) for _ in range(count - 1)]
+        at = [(-t) % 360.0 + 360.0 * lap for t, lap in zip(told, laps, strict=True)]
+        order = [int(k) for k in np.argsort(at)]
+        gaps = np.diff([*np.sort(at), 360.0 * turns])
+        # each fires at its first dead centre after the one before; the last gap is what is left of the cycle
+        if gaps.min() > 5.0 and gaps[:-1].max(initial=0.0) < 359.0:
+            break
+    return {**found, "throws": told, "firing_order": [k + 1 for k in order]}
+
+
+def with_gas(rng: Generator) -> Table:
+    table = of_unbalances(gas_engine)(rng)
+    table["gas"] = {
+        "model": "seiliger",
+        "peak_pressure": q(rng.uniform(55, 85), "bar"),
+        "imep": q(rng.uniform(6.5, 10), "bar"),
+    }
+    if len(table["operating_points"]) > 1 and rng.random() < 0.5:
+        table["operating_points"][1]["gas"] = False
+    return table
+
+
+def star_of(engine: Table, count: int) -> Table:
+    found = {k: v for k, v in engine.items() if k not in ("throws", "offset", "bank_stagger", "split_pin_angle")}
+    return {**found, "throws": "open", "firing_order": "open", "cylinders": count}
+
+
+def star_problem(rng: Generator, engine: Table) -> Table:
+    size = moving_mass(engine)
+    table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
+    count = int(rng.integers(0, 3))
+    if count:
+        table["counterweights"] = counterweights(rng, size, count)
+    if shafts := balancers(rng, size, int(rng.integers(0, 2))):
+        table["balancer_shafts"] = shafts
+    return with_objective(rng, table, 2)
+
+
+def stars(rng: Generator) -> Table:
+    return star_problem(rng, star_of({"layout": "inline", **mechanism(rng), **spaced(rng)}, int(rng.integers(3, 6))))
+
+
+def vees(rng: Generator) -> Table:
+    """Open throws of a vee with staggered banks, split pins, bank angles or pins open; one that can fire evenly."""
+    engine = vee_engine(rng)
+    while next(even_stars(engine), None) is None:
+        engine = vee_engine(rng)
+    return star_problem(rng, engine)
+
+
+def vee_engine(rng: Generator) -> Table:
+    engine = star_of({"layout": "vee", **mechanism(rng), **spaced(rng)}, 2 * int(rng.integers(2, 5)))
+    step = 360.0 / (engine["cylinders"] // math.gcd(2 if engine["cycle"] == "four-stroke" else 1, engine["cylinders"]))
+    total = step * int(rng.integers(1, max(2, int(150.0 / step) + 1)))
+    kind = rng.random()
+    if kind < 0.4:
+        engine["bank_angle"] = round(total, 9)
+    elif kind < 0.7:
+        bank = float(rng.choice([45.0, 60.0, 90.0]))
+        engine |= {"bank_angle": bank, "split_pin_angle": round(total - bank, 9)}
+    elif kind < 0.85:
+        engine["bank_angle"] = {"between": [max(10.0, total - 20.0), total + 15.0]}
+    else:
+        engine |= {"bank_angle": 60.0, "split_pin_angle": {"between": [total - 70.0, total - 50.0]}}
+    if rng.random() < 0.6:
+        engine["bank_stagger"] = q(rng.uniform(-0.03, 0.03), "m")
+    return engine
+
+
+FAMILIES: dict[str, Callable[[Generator], Table]] = {
+    "inline": of_unbalances(inline),
+    "vee": of_unbalances(vee),
+    "boxer": of_unbalances(boxer),
+    "opposed-piston": of_unbalances(opposed_piston),
+    "radial": of_unbalances(radial),
+    "parts": of_unbalances(parts),
+    "points": of_unbalances(inline, 5),
+    "gas": with_gas,
+    "stars": stars,
+    "open-vees": vees,
+}
+
+
+def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
+    """Some limits between what the best design without them has and what the one as given has, or under both."""
+    from attack.openings import Openings
+    from attack.rivals import convex_rival, designs_told
+
+    openings = Openings(table)
+    if openings.numbers or rng.random() > share:
+        return table
+    told = next(iter(designs_told(openings)), None)
+    if told is None:
+        return table
+    zero = np.zeros(openings.size)
+    best, given = openings.scene(convex_rival(openings, zero, told).vector, told), openings.scene(zero, told)
+    limits: list[Table] = []
+    for k in range(int(rng.integers(1, 3))):
+        if rng.random() < 0.35:
+            ask, high = {"quantity": "added mass"}, best.mass("added mass")
+            most = high * rng.uniform(0.3, 0.9)
+        else:
+            ask = asked(rng, table)
+            low, high = best.measure(ask), given.measure(ask)
+            most = low * rng.uniform(0.8, 0.98) if rng.random() < 0.5 else low + (high - low) * rng.uniform(0.1, 0.6)
+        # what vanishes by itself is no limit
+        if most > 1e-4 * high > 1e-7:
+            narrowed = {key: value for key, value in ask.items() if key != "quantity"}
+            quantity = ask["quantity"]
+            limits.append({"limit": quantity, "max": q(most, unit_of(quantity), 9), "name": f"l{k}", **narrowed})
+    return {**table, "constraints": limits} if limits else table
+
+
+def problem(family: str, seed: int) -> tuple[Table, Generator]:
+    """A problem, and the generator that goes on from there."""
+    rng = np.random.default_rng([*family.encode(), seed])
+    return with_limits(rng, {"title": f"{family} {seed}", **FAMILIES[family](rng)}), rng

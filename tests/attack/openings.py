@@ -1,0 +1,279 @@
+"""What a problem file leaves open, as a vector that a search may move; and the design of a result, read back.
+
+A vector has one entry for every open number of engine, places and mounts, and one or two for every open
+unbalance: its size where the angle is given, its two components otherwise. All entries are shares of their bounds.
+"""
+
+from __future__ import annotations
+
+import cmath
+import copy
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from attack.plain_loads import number
+from attack.plain_scene import Scene, Table
+
+Path = tuple[Any, ...]
+OPENED = ("engine", "counterweights", "balancer_shafts", "mounts")
+SIGNS = {"equal": 1.0, "opposite": -1.0, "mirrored": 1.0, "mirrored opposite": -1.0}
+
+
+def is_open(value: Any) -> bool:
+    return isinstance(value, dict) and "between" in value
+
+
+def middle(value: Any) -> float:
+    """A number, or where an open one starts."""
+    if not is_open(value):
+        return number(value)
+    return number(value["start"]) if "start" in value else number(value["between"][0])
+
+
+@dataclass(frozen=True)
+class Weight:
+    """One unbalance.
+
+    Attributes
+    ----------
+    least, most
+        Of its size [kg m].
+    sector
+        Bounds of its angle [rad]; None where it is open wholly.
+    follows
+        Name of its leader, sign and whether it is mirrored.
+    """
+
+    name: str
+    where: Path
+    shaft: Path | None
+    ratio: float
+    radius: float
+    role: str
+    least: float
+    most: float
+    sector: tuple[float, float] | None
+    follows: tuple[str, float, bool] | None = None
+
+    @property
+    def entries(self) -> int:
+        """How many of the vector are its."""
+        if self.follows or self.least == self.most:
+            return 0
+        return 1 if self.sector and self.sector[0] == self.sector[1] else 2
+
+    def unbalance(self, entries: np.ndarray) -> complex:
+        if self.entries == 2:
+            return self.most * complex(*entries)
+        size = self.least if self.entries == 0 else self.least + (self.most - self.least) * float(entries[0])
+        return size * cmath.exp(1j * (self.sector or (0.0, 0.0))[0])
+
+
+class Openings:
+    """A problem's table with its open numbers as a vector."""
+
+    def __init__(self, table: Table) -> None:
+        self.table = table
+
+    @cached_property
+    def weights(self) -> tuple[Weight, ...]:
+        found = [self._weight(t, ("counterweights", k), None, 1.0, "c") for k, t in self._listed("counterweights")]
+        for k, shaft in self._listed("balancer_shafts"):
+            where: Path = ("balancer_shafts", k)
+            for j, u in enumerate(shaft["unbalances"]):
+                single = len(shaft["unbalances"]) == 1 and "name" not in u
+                name = shaft["name"] if single else f"{shaft['name']}.{u.get('name', j + 1)}"
+                told = {**u, "name": name}
+                found.append(
+                    self._weight(told, (*where, "unbalances", j), where, float(shaft["ratio"]), "b", tuple(found))
+                )
+        return tuple(found)
+
+    def _listed(self, key: str) -> list[tuple[int, Table]]:
+        return list(enumerate(self.table.get(key, [])))
+
+    def _weight(
+        self, told: Table, where: Path, shaft: Path | None, ratio: float, role: str, before: tuple[Weight, ...] = ()
+    ) -> Weight:
+        if "coupled" in told:
+            leader = next(w for w in before if w.name == told["coupled"]["to"])
+            how = told["coupled"]["as"]
+            follows = (leader.name, SIGNS[how], how.startswith("mirrored"))
+            radius = number(told.get("radius", leader.radius))
+            return Weight(told["name"], where, shaft, ratio, radius, role, 0.0, leader.most, None, follows)
+        radius = number(told.get("radius", 1.0))
+        size = told["mass"] if "mass" in told else told["unbalance"]
+        gain = radius if "mass" in told else 1.0
+        least, most = (number(v) * gain for v in (size["between"] if is_open(size) else (size, size)))
+        angle = told.get("angle", 0.0)
+        low, high = (math.radians(v) for v in (angle["between"] if is_open(angle) else (angle, angle)))
+        sector = None if high - low > 6.28 else (low, high)
+        return Weight(told["name"], where, shaft, ratio, radius, role, least, most, sector)
+
+    @cached_property
+    def numbers(self) -> tuple[tuple[Path, float, float], ...]:
+        """Paths and bounds of open numbers, but sizes and angles of unbalances and the angles of even stars."""
+        steps = self.table["engine"].get("throws") == "open" and "intervals" not in self.table.get("phasing", {})
+        found: list[tuple[Path, float, float]] = []
+
+        def look(value: Any, path: Path) -> None:
+            if is_open(value):
+                if path[0] in ("engine", "mounts") or path[-1] not in ("mass", "unbalance", "angle"):
+                    found.append((path, *(number(v) for v in value["between"])))
+            elif isinstance(value, dict | list):
+                for key, part in value.items() if isinstance(value, dict) else enumerate(value):
+                    look(part, (*path, key))
+
+        for key in OPENED:
+            if not (key == "engine" and steps):
+                look(self.table.get(key), (key,))
+        return tuple(found)
+
+    @property
+    def size(self) -> int:
+        """Entries of the vector."""
+        return len(self.numbers) + sum(w.entries for w in self.weights)
+
+    @property
+    def convex(self) -> bool:
+        """Whether unbalances alone are open."""
+        return not self.numbers and self.table["engine"].get("throws") != "open"
+
+    @property
+    def box(self) -> np.ndarray:
+        """Bounds of the entries, (size, 2); discs and sectors are `allowed` beside."""
+        rows = [(0.0, 1.0)] * len(self.numbers)
+        for w in self.weights:
+            rows += [(0.0, 1.0)] if w.entries == 1 else [(-1.0, 1.0)] * w.entries
+        return np.array(rows).reshape(-1, 2)
+
+    def parts(self, vector: np.ndarray) -> list[tuple[Weight, np.ndarray]]:
+        """Every weight with its entries."""
+        found, at = [], len(self.numbers)
+        for w in self.weights:
+            found.append((w, vector[at : at + w.entries]))
+            at += w.entries
+        return found
+
+    def nearest(self, vector: np.ndarray) -> np.ndarray:
+        """The vector brought into its bounds, discs and sectors."""
+        out = np.clip(vector, *self.box.T) if self.size else vector
+        for w, part in self.parts(out):
+            if w.entries != 2:
+                continue
+            if w.sector:
+                part[:] = _into_sector(part, *w.sector)
+            size = math.hypot(*part)
+            if size > 1.0:
+                part /= size
+        return out
+
+    def random(self, rng: np.random.Generator) -> np.ndarray:
+        vector = rng.uniform(*self.box.T) if self.size else np.zeros(0)
+        return self.nearest(vector)
+
+    def scene(self, vector: np.ndarray, told: Table | None = None, order: tuple[int, ...] | None = None) -> Scene:
+        """The design of a vector; `told` replaces keys of [engine] (a star, a bank)."""
+        table = {**self.table, **{key: copy.deepcopy(self.table[key]) for key in OPENED if key in self.table}}
+        table["engine"].update(told or {})
+        for (path, low, high), share in zip(self.numbers, vector, strict=False):
+            holder = table
+            for key in path[:-1]:
+                holder = holder[key]
+            holder[path[-1]] = low + (high - low) * float(share)
+        return Scene(table, self._rotors(table, vector), order)
+
+    def _rotors(self, table: Table, vector: np.ndarray) -> list[tuple[Any, ...]]:
+        found: dict[str, tuple[Any, ...]] = {}
+        for w, part in self.parts(vector):
+            own = _at(table, w.where)
+            y, z = (number(v) for v in _at(table, w.shaft)["position"]) if w.shaft else (0.0, 0.0)
+            if w.follows:
+                name, sign, mirrored = w.follows
+                leader = found[name][4]
+                u = sign * (leader.conjugate() if mirrored else leader)
+            else:
+                u = w.unbalance(part)
+            found[w.name] = (w.name, number(own["x"]), complex(z, y), w.ratio, u, w.radius, w.role)
+        return list(found.values())
+
+    def read(self, engine: Any) -> tuple[np.ndarray, Table]:
+        """The vector of an engine that was decided, and its throws and angles where these are open as a whole.
+
+        An unbalance that is missing belongs to a shaft that is not built.
+        """
+        rotors = {r.name: r for r in engine.rotors}
+        values = [(self._number(path, engine, rotors) - low) / (high - low) for path, low, high in self.numbers]
+        for w in self.weights:
+            u = rotors[w.name].unbalance if w.name in rotors else 0j
+            if w.entries == 2:
+                values += [u.real / w.most, u.imag / w.most]
+            elif w.entries == 1:
+                assert w.sector is not None
+                values.append(((u * cmath.exp(-1j * w.sector[0])).real - w.least) / (w.most - w.least))
+        return np.array(values), self._star(engine)
+
+    def _star(self, engine: Any) -> Table:
+        e = self.table["engine"]
+        if e.get("throws") != "open" or e["layout"] not in ("inline", "vee"):
+            return {}
+        throws, bank, split = self._angles(engine)
+        told: Table = {"throws": [math.degrees(t) for t in throws]}
+        if e["layout"] == "vee":
+            told |= {"bank_angle": math.degrees(bank), "split_pin_angle": math.degrees(split)}
+        return told
+
+    def _angles(self, engine: Any) -> tuple[list[float], float, float]:
+        """Throws, bank and split pin [rad]."""
+        parts = engine.slider_cranks
+        if self.table["engine"]["layout"] != "vee":
+            return [p.throw for p in parts], 0.0, 0.0
+        half = len(parts) // 2
+        split = math.remainder(parts[half].throw - parts[0].throw, math.tau)
+        told = self.table["engine"].get("split_pin_angle", 0.0)
+        if not is_open(told):
+            split = math.radians(told)
+        elif split < math.radians(told["between"][0]) - 1e-9:
+            split += math.tau
+        return [p.throw + 0.5 * split for p in parts[:half]], parts[0].bank - parts[half].bank, split
+
+    def _number(self, path: Path, engine: Any, rotors: dict[str, Any]) -> float:
+        if path[0] == "engine":
+            throws, bank, split = self._angles(engine)
+            if path[1] == "throws":
+                low, high = (float(v) for v in _at(self.table, path)["between"])
+                given = math.degrees(throws[path[2]])
+                turns = round((0.5 * (low + high) - given) / 360.0)
+                return given + 360.0 * turns
+            return math.degrees({"bank_angle": bank, "split_pin_angle": split}[path[1]])
+        if path[0] == "mounts":
+            mount, key = engine.mounts[path[2]], path[3]
+            value = getattr(mount, {"turned": "turned"}.get(key, key))
+            value = value if key == "loss_factor" else value[path[4]]
+            return math.degrees(value) if key == "turned" else float(value)
+        if path[-1] == "x":
+            return float(rotors[next(w.name for w in self.weights if path[:-1] == w.where)].x)
+        shaft = rotors[next(w.name for w in self.weights if path[:2] == w.shaft)].shaft
+        return float((shaft.y, shaft.z)[path[3]])
+
+
+def _at(table: Any, path: Path) -> Any:
+    for key in path:
+        table = table[key]
+    return table
+
+
+def _into_sector(point: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Nearest point of a sector of at most half a turn."""
+    z, middle_angle, half = complex(*point), 0.5 * (low + high), 0.5 * (high - low)
+    own = z * cmath.exp(-1j * middle_angle)
+    if abs(cmath.phase(own)) <= half or own == 0:
+        return point
+    edge = cmath.exp(1j * math.copysign(half, own.imag))
+    along = max((own * edge.conjugate()).real, 0.0)
+    moved = along * edge * cmath.exp(1j * middle_angle)
+    return np.array([moved.real, moved.imag])

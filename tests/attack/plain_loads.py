@@ -1,0 +1,377 @@
+"""Loads of an engine as a problem file describes it, from positions, momentum and energy alone.
+
+Nothing here comes from the package: every mass has a place at many crank angles, a transform differentiates it, force
+is the loss of momentum, and the roll moment is the loss of angular momentum and the reaction to the crank torque, which
+at constant speed is the loss of kinetic energy. Gas works on the volume. Tables are those of a problem file whose
+numbers are in base units.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+SAMPLES = 4096
+# of crank speed; what lies above is under rounding
+LAST_ORDER = 60
+PASCAL = {"Pa": 1.0, "bar": 1e5}
+
+
+def number(text: Any) -> float:
+    """Value of "3.5 kg" in its base unit, or of a bare number."""
+    if not isinstance(text, str):
+        return float(text)
+    value, _, unit = text.partition(" ")
+    return float(value) * PASCAL.get(unit, 1.0)
+
+
+@dataclass(frozen=True)
+class Knuckle:
+    """Where an articulated rod is held: on the master rod."""
+
+    rod: float
+    bank: float
+    offset: float
+    radius: float
+    angle: float
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A piston on a rod on a crank."""
+
+    x: float
+    throw: float
+    bank: float
+    radius: float
+    rod: float
+    piston_mass: float
+    pin_mass: float = 0.0
+    deficit: float = 0.0
+    offset: float = 0.0
+    ratio: float = 1.0
+    centre: complex = 0j
+    knuckle: Knuckle | None = None
+    bore: float = 0.0
+    fires: float | None = None
+    """Crank angle of its firing; None for one without gas of its own."""
+
+
+def angles(turns: int, samples: int = SAMPLES) -> np.ndarray:
+    return 2.0 * np.pi * turns * np.arange(samples) / samples
+
+
+def slope(signal: np.ndarray, turns: int) -> np.ndarray:
+    """Derivative by the crank angle of a periodic signal (complex)."""
+    c = np.fft.fft(signal)
+    k = np.fft.fftfreq(len(signal), 1.0 / len(signal)) / turns
+    c[np.abs(k) > LAST_ORDER] = 0.0
+    return np.fft.ifft(1j * k * c)
+
+
+def piston(base: np.ndarray, rod: float, bank: float, offset: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Place along the cylinder, place in the plane, and angle of a rod that starts at `base`."""
+    turned = base * np.exp(-1j * bank)
+    aside = turned.imag - offset
+    along = turned.real + np.sqrt(rod**2 - aside**2)
+    return along, np.exp(1j * bank) * (along + 1j * offset), bank - np.arcsin(aside / rod)
+
+
+def rod_end(m: Mechanism, phi: np.ndarray) -> np.ndarray:
+    """Pin that carries the rod."""
+    pin = m.radius * np.exp(1j * (m.ratio * phi + m.throw))
+    if m.knuckle is None:
+        return pin
+    k = m.knuckle
+    _, _, turned = piston(pin, k.rod, k.bank, k.offset)
+    return pin + k.radius * np.exp(1j * (turned + k.angle))
+
+
+def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
+    """Wrench at unit speed, shape (samples, 6)."""
+    phi, out = angles(turns), np.zeros((SAMPLES, 6))
+    base = rod_end(m, phi)
+    _, end, swing = piston(base, m.rod, m.bank, m.offset)
+    energy = np.zeros(SAMPLES)
+    for mass, place in ((m.piston_mass, end + m.centre), (m.pin_mass, base + m.centre)):
+        velocity = slope(place, turns)
+        force = -mass * slope(velocity, turns)
+        energy += 0.5 * mass * np.abs(velocity) ** 2
+        out += force_at(m.x, place, force)
+    if m.deficit:
+        rate = slope(swing, turns).real
+        energy += 0.5 * m.deficit * rate**2
+        out[:, 3] += m.deficit * slope(rate, turns).real
+    out[:, 3] -= slope(energy, turns).real
+    return out
+
+
+def force_at(x: float, place: np.ndarray | complex, force: np.ndarray) -> np.ndarray:
+    """Wrench of a force across the crank axis."""
+    zero = np.zeros(len(force))
+    return np.stack(
+        [zero, force.imag, force.real, -(np.conj(place) * force).imag, -x * force.real, x * force.imag], axis=1
+    )
+
+
+def rotor_load(x: float, place: complex, ratio: float, unbalance: complex, turns: int) -> np.ndarray:
+    """Wrench of an unbalance at unit speed."""
+    return force_at(x, place, unbalance * ratio**2 * np.exp(1j * ratio * angles(turns)))
+
+
+# --- gas
+
+
+def travel(m: Mechanism, alpha: np.ndarray) -> np.ndarray:
+    """Place of the piston along its cylinder at its own crank angles."""
+    return piston(m.radius * np.exp(1j * alpha), m.rod, 0.0, m.offset)[0]
+
+
+def seiliger(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
+    """Absolute pressure on a fine grid of one cycle from the firing dead centre; the cut-off is found by trying."""
+    e, n1, n2 = (gas.get(k, d) for k, d in DEFAULTS.items() if k in ("compression_ratio", *EXPONENTS))
+    intake, exhaust = number(gas.get("intake_pressure", ATMOSPHERE)), number(gas.get("exhaust_pressure", ATMOSPHERE))
+    peak, wanted = number(gas["peak_pressure"]), number(gas["imep"])
+    alpha = angles(turns, FINE)
+    s = travel(m, alpha)
+    top, bottom = (math.asin(m.offset / (m.rod + m.radius)), math.pi + math.asin(m.offset / (m.rod - m.radius)))
+    highest, lowest = travel(m, np.array([top, bottom]))
+    v = 1.0 / (e - 1.0) + (highest - s) / (highest - lowest)
+    small, large = 1.0 / (e - 1.0), e / (e - 1.0)
+    since = np.mod(alpha - top, 2.0 * np.pi * turns)
+    down = bottom - top
+
+    def pressure(cut_off: float) -> np.ndarray:
+        burnt = peak * np.minimum(1.0, cut_off * small / v) ** n2
+        compressed = intake * (large / v) ** n1
+        if turns == 1:
+            return np.where(since < down, burnt, compressed)
+        up = 2.0 * np.pi
+        return np.select(
+            [since < down, since < up, since < up + down], [burnt, np.full_like(v, exhaust), np.full_like(v, intake)],
+            compressed,
+        )  # fmt: skip
+
+    def imep(cut_off: float) -> float:
+        mean = 0.5 * (pressure(cut_off) + np.roll(pressure(cut_off), -1))
+        return float(np.sum(mean * (np.roll(v, -1) - v)))
+
+    found = brentq(lambda c: imep(c) - wanted, 1.0, e, xtol=1e-12)
+    return pressure(found)
+
+
+ATMOSPHERE = 101325.0
+FINE = 16 * SAMPLES
+EXPONENTS = ("compression_exponent", "expansion_exponent")
+DEFAULTS = {"compression_ratio": 17.0, "compression_exponent": 1.35, "expansion_exponent": 1.3}
+
+
+def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
+    """Coefficients of the roll moment of the gas on one piston, its firing at angle 0."""
+    area = 0.25 * math.pi * m.bore**2
+    over = seiliger(gas, m, turns) - number(gas.get("crankcase_pressure", ATMOSPHERE))
+    rise = slope(travel(m, angles(turns, FINE)).astype(complex), turns).real
+    return np.fft.rfft(-area * over * rise)[: SAMPLES // 2 + 1] / FINE
+
+
+# --- an engine of a problem file
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Mechanisms of an engine, and how many turns its cycle has."""
+
+    turns: int
+    mechanisms: tuple[Mechanism, ...]
+
+
+def machine(engine: dict[str, Any], order: list[int] | None = None) -> Machine:
+    """Mechanisms of [engine], every number closed."""
+    turns = 2 if engine["cycle"] == "four-stroke" else 1
+    build = {
+        "inline": _inline, "vee": _vee, "boxer": _boxer, "opposed-piston": _opposed, "radial": _radial, "parts": _parts
+    }[engine["layout"]]  # fmt: skip
+    found = build(engine)
+    given = order or engine.get("firing_order")
+    if "bore" in engine and given is not None:
+        found = _fired(found, list(given), turns)
+    return Machine(turns, tuple(found))
+
+
+def _common(engine: dict[str, Any], part: dict[str, Any] | None = None) -> dict[str, Any]:
+    told = {**engine, **(part or {})}
+    offset, deficit = number(told.get("offset", 0.0)), number(told.get("rod_inertia_deficit", 0.0))
+    rod = number(told["rod_length"])
+    stroke = number(told["stroke"])
+    # the stroke of a piston beside the crank's axis is longer than two crank radii
+    radius = 0.5 * stroke
+    if offset:
+        radius = brentq(
+            lambda r: math.sqrt((rod + r) ** 2 - offset**2) - math.sqrt((rod - r) ** 2 - offset**2) - stroke,
+            0.3 * stroke, 0.5 * stroke, xtol=1e-16,
+        )  # fmt: skip
+    return {
+        "radius": radius, "rod": rod, "piston_mass": number(told["reciprocating_mass"]), "deficit": deficit,
+        "offset": offset, "bore": number(told.get("bore", 0.0)),
+    }  # fmt: skip
+
+
+def stations(count: int, spacing: float) -> list[float]:
+    return [(0.5 * (count - 1) - k) * spacing for k in range(count)]
+
+
+def _radians(values: list[Any]) -> list[float]:
+    return [math.radians(float(v)) for v in values]
+
+
+def _inline(e: dict[str, Any]) -> list[Mechanism]:
+    throws, common = _radians(e["throws"]), _common(e)
+    places = stations(len(throws), number(e.get("cylinder_spacing", 1.0)))
+    pin = number(e.get("rotating_mass", 0.0))
+    return [Mechanism(x, t, 0.0, pin_mass=pin, **common) for x, t in zip(places, throws, strict=True)]
+
+
+def _banks(e: dict[str, Any], angle: float, throws: list[float], split: float) -> list[Mechanism]:
+    """Two banks, whose throws are listed left bank first."""
+    common, stagger = _common(e), number(e.get("bank_stagger", 0.0))
+    count = len(throws) // 2
+    places = stations(count, number(e.get("cylinder_spacing", 1.0)))
+    return [
+        Mechanism(places[k % count] + side * stagger, t - side * split, side * angle, **common)
+        for k, t in enumerate(throws)
+        for side in (0.5 if k < count else -0.5,)
+    ]
+
+
+def _vee(e: dict[str, Any]) -> list[Mechanism]:
+    throws = _radians(e["throws"])
+    bank, split = math.radians(e["bank_angle"]), math.radians(e.get("split_pin_angle", 0.0))
+    pistons = _banks(e, bank, throws + throws, split)
+    places = stations(len(throws), number(e.get("cylinder_spacing", 1.0)))
+    pin = number(e.get("rotating_mass", 0.0))
+    # one mass a throw, between its cylinders
+    common = {**_common(e), "piston_mass": 0.0, "deficit": 0.0, "bore": 0.0, "offset": 0.0}
+    return pistons + [Mechanism(x, t, 0.0, pin_mass=pin, **common) for x, t in zip(places, throws, strict=True)]
+
+
+def _boxer(e: dict[str, Any]) -> list[Mechanism]:
+    pin = number(e.get("rotating_mass", 0.0))
+    found = _banks(e, math.pi, _radians(e["throws"]), 0.0)
+    return [_with(m, pin_mass=pin) for m in found]
+
+
+def _with(m: Mechanism, **changed: Any) -> Mechanism:
+    return Mechanism(**{**m.__dict__, **changed})
+
+
+def _opposed(e: dict[str, Any]) -> list[Mechanism]:
+    lower = _inline(e)
+    ratio, lead = int(e.get("crank_ratio", -1)), math.radians(e.get("crank_lead", 0.0))
+    centre = complex(number(e["crank_distance"]))
+    return lower + [
+        _with(m, centre=centre, ratio=ratio, bank=math.pi, throw=math.pi + ratio * (m.throw + lead)) for m in lower
+    ]
+
+
+def _parts(e: dict[str, Any]) -> list[Mechanism]:
+    shafts = {s["name"]: s for s in e.get("shafts", [])}
+    found = []
+    for part in e["slider_cranks"]:
+        shaft = shafts.get(part.get("shaft", ""), {})
+        y, z = (number(v) for v in shaft.get("position", [0.0, 0.0]))
+        found.append(
+            Mechanism(
+                number(part["x"]), math.radians(part.get("throw", 0.0)), math.radians(part.get("bank_angle", 0.0)),
+                pin_mass=number({**e, **part}.get("rotating_mass", 0.0)), ratio=float(shaft.get("ratio", 1)),
+                centre=complex(z, y), **_common(e, part),
+            )
+        )  # fmt: skip
+    return found
+
+
+def _radial(e: dict[str, Any]) -> list[Mechanism]:
+    n, common, phi = int(e["cylinders"]), _common(e), angles(1)
+    radius, rod, offset = common["radius"], common["rod"], common["offset"]
+    arm, at_knuckle = number(e["knuckle_radius"]), number(e.get("knuckle_mass", 0.0))
+    turned = _radians(e.get("knuckle_angles", [360.0 * k / n for k in range(1, n)]))
+    highest = math.sqrt((radius + rod) ** 2 - offset**2)
+    found = [Mechanism(0.0, 0.0, 0.0, pin_mass=number(e.get("rotating_mass", 0.0)), **common)]
+    for k in range(1, n):
+        bank, knuckle = 2.0 * math.pi * k / n, Knuckle(rod, 0.0, offset, arm, turned[k - 1])
+
+        def made(length: float, bank: float = bank, knuckle: Knuckle = knuckle) -> Mechanism:
+            told = {**common, "rod": length}
+            return Mechanism(0.0, 0.0, bank, pin_mass=at_knuckle, knuckle=knuckle, **told)
+
+        def above(length: float) -> float:
+            m = made(length)
+            s = piston(rod_end(m, phi), length, m.bank, offset)[0]
+            i = int(np.argmax(s))
+            a, b, c = s[i - 1], s[i], s[(i + 1) % len(s)]
+            return float(b + (a - c) ** 2 / (8.0 * (2.0 * b - a - c)) - highest)
+
+        length = (
+            number(e["articulated_rod_length"])
+            if "articulated_rod_length" in e
+            else brentq(above, rod - 1.4 * arm, rod - 0.6 * arm, xtol=1e-15)
+        )
+        found.append(made(length))
+    return found
+
+
+def firing_angles(mechanisms: list[Mechanism], order: list[int], turns: int) -> list[float]:
+    """Crank angle of each cylinder's firing: its first dead centre after the one before."""
+    first = mechanisms[order[0] - 1]
+    at = [0.0] * len(order)
+    now = at[order[0] - 1] = (first.bank - first.throw) % (2.0 * math.pi)
+    for cylinder in order[1:]:
+        m = mechanisms[cylinder - 1]
+        ahead = (m.bank - m.throw - now) % (2.0 * math.pi)
+        now += ahead if ahead > 1e-9 else 2.0 * math.pi
+        at[cylinder - 1] = now
+    return at
+
+
+def _fired(mechanisms: list[Mechanism], order: list[int], turns: int) -> list[Mechanism]:
+    at = firing_angles(mechanisms, order, turns)
+    return [_with(m, fires=at[k]) if k < len(at) else m for k, m in enumerate(mechanisms)]
+
+
+@lru_cache(maxsize=512)
+def _upright_spectrum(m: Mechanism, turns: int) -> np.ndarray:
+    """Coefficients of the transform of a mechanism's load, (n, 6)."""
+    return np.fft.rfft(mechanism_load(m, turns), axis=0) / SAMPLES
+
+
+def engine_spectrum(found: Machine) -> np.ndarray:
+    """Wrench of everything that moves with the cranks at unit speed; a throw that stands ahead moves earlier."""
+    orders = np.arange(SAMPLES // 2 + 1)[:, None] / found.turns
+    total = np.zeros((SAMPLES // 2 + 1, 6), complex)
+    for m in found.mechanisms:
+        at_zero = _upright_spectrum(_with(m, throw=0.0, fires=None), found.turns)
+        total += at_zero * np.exp(1j * orders * m.throw / m.ratio)
+    return total
+
+
+@lru_cache(maxsize=64)
+def _gas_spectrum(gas: str, m: Mechanism, turns: int) -> np.ndarray:
+    out = np.zeros((SAMPLES // 2 + 1, 6), complex)
+    out[:, 3] = gas_torque(json.loads(gas), m, turns)
+    return out
+
+
+def gas_spectrum(gas: dict[str, Any], found: Machine) -> np.ndarray:
+    """Roll moment of all cylinders, each at its firing angle."""
+    told, orders = json.dumps(gas, sort_keys=True), np.arange(SAMPLES // 2 + 1)[:, None] / found.turns
+    total = np.zeros((SAMPLES // 2 + 1, 6), complex)
+    for m in found.mechanisms:
+        if m.fires is not None:
+            one = _gas_spectrum(told, _with(m, throw=0.0, bank=0.0, x=0.0, pin_mass=0.0, fires=None), found.turns)
+            total += one * np.exp(-1j * orders * m.fires)
+    return total

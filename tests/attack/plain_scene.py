@@ -1,0 +1,265 @@
+"""What a problem file asks of one design, every number closed: measures, objective, how far limits are broken.
+
+Loads of one design are a transform per operating point; a measure picks a channel and a norm of it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from attack import plain_loads, plain_mounts
+from attack.plain_loads import SAMPLES, number
+
+Table = dict[str, Any]
+NORMS = ("mean", "maximum", "rms", "peak to peak")
+ON_BLOCK = {"shaking force": slice(0, 3), "rocking couple": slice(4, 6), "roll moment": slice(3, 4)}
+
+
+def norm_and_channel(quantity: str) -> tuple[str, str]:
+    """ "peak to peak", "mount force" of "peak to peak mount force"; no norm where it has none."""
+    for norm in NORMS:
+        if quantity.startswith(f"{norm} "):
+            return norm, quantity[len(norm) + 1 :]
+    return "", quantity
+
+
+def circumsphere(points: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    """Smallest ball about few points: centre, radius and the weights of its points (all subsets are tried)."""
+    best = (points[0], math.inf, np.eye(len(points))[0])
+    for size in range(1, min(len(points), points.shape[1] + 1) + 1):
+        for chosen in itertools.combinations(range(len(points)), size):
+            p = points[list(chosen)]
+            edges = p[1:] - p[0]
+            gram = edges @ edges.T
+            try:
+                lam = np.linalg.solve(2.0 * gram, np.diag(gram)) if size > 1 else np.zeros(0)
+            except np.linalg.LinAlgError:
+                continue
+            weights = np.concatenate([[1.0 - lam.sum()], lam])
+            if weights.min() < -1e-9:
+                continue
+            centre = weights @ p
+            radius = float(np.linalg.norm(points - centre, axis=1).max())
+            if radius < best[1] - 1e-15:
+                full = np.zeros(len(points))
+                full[list(chosen)] = weights
+                best = (centre, radius, full)
+    return best
+
+
+def smallest_ball(signal: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Diameter of the smallest ball that holds a path, the samples it rests on, and twice their pull on it."""
+    scale = float(np.abs(signal).max()) or 1.0
+    v = signal / scale
+    if v.shape[1] == 1:
+        k = np.array([int(np.argmax(v)), int(np.argmin(v))])
+        return float(np.ptp(v)) * scale, k, np.array([[1.0], [-1.0]])
+    held = [int(np.argmax(np.linalg.norm(v - v[0], axis=1)))]
+    for _ in range(200):
+        centre, radius, weights = circumsphere(v[held])
+        far = np.linalg.norm(v - centre, axis=1)
+        k = int(np.argmax(far))
+        if far[k] <= radius * (1.0 + 1e-12) + 1e-15 or k in held:
+            break
+        held = [h for h, w in zip(held, weights, strict=True) if w > 0.0] + [k]
+    centre, radius, weights = circumsphere(v[held])
+    pull = 2.0 * weights[:, None] * (v[held] - centre) / (radius or 1.0)
+    return 2.0 * float(np.linalg.norm(v - centre, axis=1).max()) * scale, np.array(held), pull
+
+
+def norm_of(norm: str, signal: np.ndarray, weights: np.ndarray) -> float:
+    """Of (points, places, samples, d) with the weight of every point; those of weight zero do not count."""
+    counted = signal[weights > 0.0]
+    share = weights[weights > 0.0] / weights.sum()
+    if norm == "peak to peak":
+        return max(smallest_ball(v)[0] for point in counted for v in point)
+    length = np.linalg.norm(counted, axis=-1)
+    if norm == "mean":
+        return float(share @ length.mean(axis=(1, 2)))
+    if norm == "rms":
+        return math.sqrt(float(share @ (length**2).mean(axis=(1, 2))))
+    return float(length.max())
+
+
+@lru_cache(maxsize=64)
+def _machine(engine: str, order: tuple[int, ...] | None) -> plain_loads.Machine:
+    return plain_loads.machine(json.loads(engine), list(order) if order else None)
+
+
+@lru_cache(maxsize=64)
+def _unit_load(engine: str, order: tuple[int, ...] | None) -> np.ndarray:
+    return plain_loads.engine_spectrum(_machine(engine, order))
+
+
+@lru_cache(maxsize=64)
+def _gas_load(engine: str, order: tuple[int, ...] | None, gas: str) -> np.ndarray:
+    return plain_loads.gas_spectrum(json.loads(gas), _machine(engine, order))
+
+
+class Scene:
+    """A design: a table without open numbers, and unbalances that were put in beside it.
+
+    Parameters
+    ----------
+    table
+        Of the problem file, every number closed.
+    rotors
+        (name, x, place in the plane, ratio, unbalance, radius, role) of every rotor.
+    order
+        Firing order, where the file leaves it open.
+    """
+
+    def __init__(self, table: Table, rotors: list[tuple[Any, ...]], order: tuple[int, ...] | None = None) -> None:
+        self.table, self.rotors, self.order = table, rotors, order
+        self._key = json.dumps(table["engine"], sort_keys=True)
+
+    @cached_property
+    def turns(self) -> int:
+        return 2 if self.table["engine"]["cycle"] == "four-stroke" else 1
+
+    @cached_property
+    def points(self) -> list[Table]:
+        return list(self.table["operating_points"])
+
+    @cached_property
+    def speeds(self) -> list[float]:
+        return [number(p["speed"]) for p in self.points]
+
+    @cached_property
+    def orders(self) -> np.ndarray:
+        return np.arange(SAMPLES // 2 + 1) / self.turns
+
+    @cached_property
+    def mounting(self) -> plain_mounts.Rigid | plain_mounts.Elastic:
+        mounts = self.table["mounts"]
+        if mounts.get("kind") == "elastic":
+            return plain_mounts.elastic(mounts, self.table["block"])
+        return plain_mounts.rigid(mounts)
+
+    @cached_property
+    def wrenches(self) -> list[np.ndarray]:
+        """Coefficients (n, 6) of the transform of every operating point; gas is real and does not grow with speed."""
+        unit = _unit_load(self._key, self.order).copy()
+        for _, x, place, ratio, unbalance, *_ in self.rotors:
+            unit += np.fft.rfft(plain_loads.rotor_load(x, place, ratio, unbalance, self.turns), axis=0) / SAMPLES
+        found = [unit * speed**2 for speed in self.speeds]
+        if "gas" in self.table:
+            for k, point in enumerate(self.points):
+                if point.get("gas", True):
+                    told = {**self.table["gas"], **({"imep": point["imep"]} if "imep" in point else {})}
+                    found[k] = found[k] + _gas_load(self._key, self.order, json.dumps(told, sort_keys=True))
+        return found
+
+    @cached_property
+    def felt(self) -> np.ndarray:
+        """Which orders carry any load."""
+        size = np.max([np.abs(w).max(axis=1) for w in self.wrenches], axis=0)
+        return np.flatnonzero(size > 1e-13 * size.max())
+
+    def coefficients(self, channel: str, orders: list[float] | None) -> list[np.ndarray]:
+        """Per operating point (n, places, d)."""
+        keep = self.felt
+        if orders is not None:
+            keep = np.array([k for k in keep if any(abs(self.orders[k] - o) < 1e-9 for o in orders)], dtype=int)
+        found = []
+        for wrench, speed in zip(self.wrenches, self.speeds, strict=True):
+            told = (self.orders[keep], wrench[keep], speed)
+            if channel in ON_BLOCK:
+                part = wrench[keep][:, None, ON_BLOCK[channel]]
+            elif channel == "mount force":
+                part = self.mounting.forces(*told)
+            else:
+                assert isinstance(self.mounting, plain_mounts.Elastic), channel
+                part = self.mounting.travel(*told)
+            whole = np.zeros((len(self.orders), *part.shape[1:]), complex)
+            whole[keep] = part
+            found.append(whole)
+        return found
+
+    def signal(self, asked: Table) -> np.ndarray:
+        """(points, places, samples, d) of a load that is asked for."""
+        _, channel = norm_and_channel(asked["quantity"])
+        found = [plain_mounts.over_cycle(c) for c in self.coefficients(channel, asked.get("orders"))]
+        signal = np.stack(found).transpose(0, 2, 1, 3)
+        if channel in ON_BLOCK:
+            return signal
+        names = [place.get("name", f"mount {k + 1}") for k, place in enumerate(self.table["mounts"]["places"])]
+        places = [names.index(name) for name in asked.get("mounts", names)]
+        return signal[:, places] * np.array(asked.get("direction_weights", [1.0, 1.0, 1.0]))
+
+    def weights(self, asked: Table) -> np.ndarray:
+        told = asked.get("operating_points")
+        counted = [told is None or point["name"] in told for point in self.points]
+        return np.array([point.get("weight", 1.0) * c for point, c in zip(self.points, counted, strict=True)])
+
+    def measure(self, asked: Table) -> float:
+        """The number of an objective's term or a limit."""
+        norm, channel = norm_and_channel(asked["quantity"])
+        if norm:
+            return norm_of(norm, self.signal(asked), self.weights(asked))
+        if channel.endswith("mass"):
+            return self.mass(channel)
+        block = self.mounting
+        assert isinstance(block, plain_mounts.Elastic), channel
+        if channel == "transmissibility":
+            return self._transmissibility(block, asked)
+        return {
+            "static sag": lambda: block.sag,
+            "total stiffness": lambda: block.total,
+            "torque-roll residual": lambda: block.torque_roll(number(asked["frequency"])),
+        }[channel]()
+
+    def _transmissibility(self, block: plain_mounts.Elastic, asked: Table) -> float:
+        found = []
+        for wrench, speed, weight in zip(self.wrenches, self.speeds, self.weights(asked), strict=True):
+            keep = [k for k in self.felt if k > 0]
+            if asked.get("orders") is not None:
+                keep = [k for k in keep if any(abs(self.orders[k] - o) < 1e-9 for o in asked["orders"])]
+            if weight > 0.0 and keep:
+                passed = np.sum(np.abs(block.forces(self.orders[keep], wrench[keep], speed)) ** 2)
+                found.append(math.sqrt(passed / np.sum(np.abs(block.firm(wrench[keep])) ** 2)))
+        return max(found, default=0.0)
+
+    def mass(self, channel: str) -> float:
+        role = {"counterweight mass": "c", "balancer mass": "b", "added mass": "cb"}[channel]
+        return sum(abs(u) / radius for *_, u, radius, own in self.rotors if own in role)
+
+    @cached_property
+    def objective(self) -> float:
+        return sum(term.get("weight", 1.0) * self.measure(term) for term in terms_of(self.table))
+
+    def excess(self, limit: Table) -> float:
+        """By how much of itself a limit is broken; negative where it is kept."""
+        asked = {**limit, "quantity": limit["limit"]}
+        if limit["limit"] == "natural frequencies":
+            block = self.mounting
+            assert isinstance(block, plain_mounts.Elastic)
+            f = block.frequencies
+            over = f.max() / number(limit["max"]) - 1.0 if "max" in limit else -1.0
+            under = 1.0 - f.min() / number(limit["min"]) if "min" in limit else -1.0
+            a, b = (number(v) for v in limit.get("outside", [0.0, 0.0]))
+            within = max((min(v - a, b - v) / b for v in f), default=-1.0) if b else -1.0
+            return float(max(over, under, within))
+        value = self.measure(asked)
+        over = value / number(limit["max"]) - 1.0 if "max" in limit else -1.0
+        under = 1.0 - value / number(limit["min"]) if "min" in limit else -1.0
+        return max(over, under)
+
+    @cached_property
+    def worst(self) -> float:
+        """Largest excess over all limits."""
+        return max((self.excess(limit) for limit in self.table.get("constraints", [])), default=-1.0)
+
+
+def terms_of(table: Table) -> list[Table]:
+    """Terms of the objective."""
+    told = table.get("objective", {})
+    if "terms" in told:
+        return list(told["terms"])
+    return [{**told, "quantity": told["minimise"]}] if told else []

@@ -1,0 +1,132 @@
+"""The best design that a search of our own finds: planes where a problem is convex, all stars, simplex, evolution."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import differential_evolution, minimize
+
+from attack.cutting_planes import Program
+from attack.openings import Openings
+from attack.plain_scene import Scene, Table
+from attack.star_list import even_stars
+
+KEPT = 1e-6
+"""Share by which a rival may pass a limit."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A design that keeps the limits, or comes as near as was found.
+
+    Attributes
+    ----------
+    bound
+        No design of ours is less, by planes; zero where there is none.
+    least_excess
+        No design breaks the limits less, by planes.
+    """
+
+    value: float
+    excess: float
+    vector: np.ndarray
+    told: Table
+    looked_at: int = 1
+    bound: float = 0.0
+    least_excess: float = -1.0
+
+
+def designs_told(openings: Openings) -> Iterator[Table]:
+    """What may stand in [engine] in place of open stars."""
+    engine = openings.table["engine"]
+    if engine.get("throws") == "open":
+        yield from even_stars(engine)
+    else:
+        yield {}
+
+
+def convex_rival(openings: Openings, start: np.ndarray, told: Table, enough: float = np.inf) -> Rival:
+    """Where unbalances alone are open; looked for until none under `enough` can be left."""
+    program = Program(openings, told)
+    found = program.least(start, enough=enough)
+    if found.excess > KEPT:
+        least = program.least_excess(found.vector)
+        if least.excess <= KEPT:
+            found = program.least(least.vector, charge=1e6)
+        else:
+            scene = openings.scene(least.vector, told)
+            return Rival(scene.objective, least.excess, least.vector, told, least_excess=least.bound)
+    scene = openings.scene(found.vector, told)
+    return Rival(scene.objective, scene.worst, found.vector, told, bound=found.bound)
+
+
+def best_star(openings: Openings, most: int, enough: float = np.inf) -> Rival | None:
+    """Every star by itself; None where there are too many, or none."""
+    told = list(designs_told(openings))
+    if not told or len(told) > most:
+        return None
+    rivals = [convex_rival(openings, openings.nearest(np.zeros(openings.size)), star, enough) for star in told]
+    kept = [r for r in rivals if r.excess <= KEPT]
+    best = min(kept, key=lambda r: r.value) if kept else min(rivals, key=lambda r: r.excess)
+    return Rival(best.value, best.excess, best.vector, best.told, len(told), min(r.bound for r in rivals))
+
+
+def least_broken(openings: Openings, most: int) -> Rival | None:
+    """The design, of any star, that passes its limits least."""
+    told = list(designs_told(openings))
+    if not told or len(told) > most:
+        return None
+    best: Rival | None = None
+    for star in told:
+        found = Program(openings, star).least_excess(openings.nearest(np.zeros(openings.size)))
+        if best is None or found.excess < best.excess:
+            best = Rival(0.0, found.excess, found.vector, star, len(told), least_excess=found.bound)
+    return best
+
+
+def charged(openings: Openings, unit: float, told: Table | None = None):
+    """Objective in its unit, and much more for what limits are passed by; infinite where nothing answers."""
+
+    def value(vector: np.ndarray) -> float:
+        scene = openings.scene(openings.nearest(vector.copy()), told)
+        try:
+            over = max(scene.worst, 0.0)
+            found = scene.objective / unit + (100.0 * over + 0.1 if over > KEPT else 0.0)
+        except (np.linalg.LinAlgError, ValueError):
+            return 1e9
+        return found if np.isfinite(found) else 1e9
+
+    return value
+
+
+def local_rival(
+    openings: Openings, rng: np.random.Generator, starts: list[np.ndarray], calls: int, told: Table | None = None
+) -> Rival:
+    """Random designs and evolution, then a simplex from the best of them and from `starts`."""
+    unit = openings.scene(starts[0], told).objective or 1.0
+    value = charged(openings, unit, told)
+    pool = [*starts, *(openings.random(rng) for _ in range(calls // 4))]
+    values = [value(v) for v in pool]
+    if openings.size <= 6:
+        evolved = differential_evolution(
+            value, openings.box.tolist(), maxiter=max(calls // (10 * openings.size) // 2, 2), popsize=10,
+            init="sobol", polish=False, seed=rng,
+        )  # fmt: skip
+        pool.append(evolved.x)
+        values.append(evolved.fun)
+    best = [pool[k] for k in np.argsort(values)[:2]]
+    for start in [*best, *starts[:1]]:
+        simplex = start + 0.05 * np.vstack([np.zeros(openings.size), np.eye(openings.size)]) * np.where(
+            start > 0.9, -1, 1
+        )
+        found = minimize(
+            value, start, method="Nelder-Mead",
+            options={"maxfev": calls // 4, "xatol": 1e-9, "fatol": 1e-10, "initial_simplex": simplex},
+        )  # fmt: skip
+        pool.append(found.x)
+        values.append(found.fun)
+    vector = openings.nearest(pool[int(np.argmin(values))].copy())
+    scene: Scene = openings.scene(vector, told)
+    return Rival(scene.objective, scene.worst, vector, told or {}, len(pool))

@@ -1,0 +1,81 @@
+"""Random problems of every family, what is claimed of each, and the page that says what came out.
+
+    python tests/attack/run_attack.py run FAMILY[,FAMILY ...] --from 0 --number 100 --log results/attack/run.jsonl
+    python tests/attack/run_attack.py page results/attack/*.jsonl
+
+`make attack` does both. A line of the log is one problem; what the log has is not run again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from attack.claims import Verdict, try_problem
+from attack.families import FAMILIES, problem, toml
+
+ROOT = Path(__file__).resolve().parents[2]
+EFFORT = 6
+"""Stars that are solved one by one, at most ten times as many, and hundreds of calls of a local search."""
+
+
+def done_in(log: Path) -> set[tuple[str, int]]:
+    if not log.exists():
+        return set()
+    lines = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines() if line.endswith("}")]
+    return {(line["family"], line["seed"]) for line in lines}
+
+
+def attacked(family: str, seed: int, effort: int = EFFORT) -> Verdict:
+    """One problem."""
+    table, rng = problem(family, seed)
+    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+        return try_problem(family, seed, table, rng, Path(folder), effort)
+
+
+def run(families: list[str], first: int, number: int, log: Path, seconds: float, effort: int) -> None:
+    """Every family in turn, seed by seed, until the number or the time is reached."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    done, until = done_in(log), time.monotonic() + seconds
+    for seed in range(first, first + number):
+        for family in families:
+            if (family, seed) in done:
+                continue
+            if time.monotonic() > until:
+                return
+            verdict = attacked(family, seed, effort)
+            with log.open("a", encoding="utf-8") as out:
+                out.write(json.dumps(verdict.line) + "\n")
+            if verdict.wrong:
+                print(family, seed, verdict.status, *verdict.wrong, sep=" | ", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    running = commands.add_parser("run")
+    running.add_argument("families", help="comma-separated, or all")
+    running.add_argument("--from", dest="first", type=int, default=0)
+    running.add_argument("--number", type=int, default=100)
+    running.add_argument("--log", type=Path, default=ROOT / "results" / "attack" / "run.jsonl")
+    running.add_argument("--seconds", type=float, default=1e9)
+    running.add_argument("--effort", type=int, default=EFFORT)
+    show = commands.add_parser("show", help="the problem file of a family and a seed")
+    show.add_argument("families")
+    show.add_argument("--from", dest="first", type=int, default=0)
+    told = parser.parse_args()
+    if told.command == "show":
+        print(toml(problem(told.families, told.first)[0]))
+        return
+    families = sorted(FAMILIES) if told.families == "all" else told.families.split(",")
+    run(families, told.first, told.number, told.log, told.seconds, told.effort)
+
+
+if __name__ == "__main__":
+    main()

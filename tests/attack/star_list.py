@@ -1,0 +1,53 @@
+"""Every even star of a problem with open throws, by trying all ways to stand on the steps of even firing."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Iterator
+
+from attack.openings import is_open
+from attack.plain_scene import Table
+
+
+def angles_of(engine: Table) -> Iterator[tuple[float, float]]:
+    """Bank and split pin [deg] for which cylinders of one throw can fire evenly; one of the two may be open."""
+    turns = 2 if engine["cycle"] == "four-stroke" else 1
+    step = 360.0 * math.gcd(turns, engine["cylinders"]) / engine["cylinders"]
+    bank, split = engine["bank_angle"], engine.get("split_pin_angle", 0.0)
+    if not is_open(bank) and not is_open(split):
+        yield bank, split
+        return
+    low, high = (bank if is_open(bank) else split)["between"]
+    other = split if is_open(bank) else bank
+    for k in range(math.ceil((low + other - 1e-6) / step), math.floor((high + other + 1e-6) / step) + 1):
+        free = min(max(k * step - other, low), high)
+        yield (free, other) if is_open(bank) else (other, free)
+
+
+def even_stars(engine: Table) -> Iterator[Table]:
+    """What to put into [engine], for every star that fires evenly, its first throw where cylinder 1 fires at 0."""
+    turns, count = 2 if engine["cycle"] == "four-stroke" else 1, int(engine["cylinders"])
+    steps = count // math.gcd(turns, count)
+    if engine["layout"] == "inline":
+        for places in _stands(steps, count, [0], count // steps):
+            yield {"throws": [360.0 * k / steps for k in places]}
+        return
+    for bank, split in angles_of(engine):
+        apart = (bank + split) * steps / 360.0
+        if abs(apart - round(apart)) > 1e-6:
+            continue
+        first = 0.5 * (bank + split)
+        for places in _stands(steps, count // 2, [0, round(apart) % steps], count // steps):
+            told = [first + 360.0 * k / steps for k in places]
+            yield {"throws": told, "bank_angle": bank, "split_pin_angle": split}
+
+
+def _stands(steps: int, throws: int, own: list[int], each: int) -> Iterator[tuple[int, ...]]:
+    """Steps of all throws, the first at 0, so that every step has as many dead centres."""
+    for rest in itertools.product(range(steps), repeat=throws - 1):
+        places = (0, *rest)
+        fired = Counter((p + o) % steps for p in places for o in own)
+        if all(fired[s] == each for s in range(steps)):
+            yield places

@@ -1,0 +1,73 @@
+"""A share of the attack of `make attack`, on fixed seeds; and that false claims are found out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from attack.claims import Verdict, judge, solved
+from attack.families import problem
+from attack.plain_loads import number
+from attack.plain_scene import Table
+from attack.run_attack import attacked
+from laufruhe.solvers.result import Result, Status
+
+pytestmark = pytest.mark.slow
+
+SEEDS = {
+    "inline": (1, 4), "vee": (0, 3), "boxer": (0, 5), "opposed-piston": (1, 5), "radial": (3, 5), "parts": (2, 5),
+    "points": (1, 3), "gas": (0, 4), "stars": (2, 4), "open-vees": (1, 2, 9, 11),
+}  # fmt: skip
+"""Of problems that take a second at most, with and without a design."""
+
+
+@pytest.mark.parametrize("family", SEEDS)
+def test_no_claim_falls(family: str) -> None:
+    for seed in SEEDS[family]:
+        verdict = attacked(family, seed)
+        assert verdict.wrong == [], f"{family} {seed}"
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory: pytest.TempPathFactory) -> tuple[Table, Result]:
+    """One with a limit that binds."""
+    table, _ = problem("gas", 4)
+    return table, solved(table, tmp_path_factory.mktemp("attack"))
+
+
+def complaints(table: Table, result: Any) -> str:
+    verdict = Verdict("gas", 4)
+    judge(verdict, table, result, np.random.default_rng(0), 3)
+    return " ".join(verdict.wrong)
+
+
+def test_what_is_true_is_not_complained_of(example: tuple[Table, Result]) -> None:
+    assert complaints(*example) == ""
+
+
+@pytest.mark.parametrize(
+    ("lie", "heard"),
+    [
+        (lambda r: replace(r, objective=replace(r.objective, value=0.999 * r.objective.value)), "value"),
+        (lambda r: replace(r, certificate=replace(r.certificate, lower_bound=1.001 * r.objective.value)), "bound"),
+        (lambda r: replace(r, objective=None, status=Status.INFEASIBLE, final=r.initial), "keeps every limit"),
+        (lambda r: replace(r, status=Status.FAILED), "failed"),
+    ],
+    ids=["value", "bound", "infeasible", "failed"],
+)
+def test_a_lie_is_found_out(lie: Any, heard: str, example: tuple[Table, Result]) -> None:
+    table, result = example
+    assert heard in complaints(table, lie(result))
+
+
+def test_a_design_that_is_not_the_best_is_found_out(example: tuple[Table, Result], tmp_path: Path) -> None:
+    """The optimum within a tighter limit, claimed for this one."""
+    table, result = example
+    tighter = [{**limit, "max": f"{0.8 * number(limit['max'])} kg"} for limit in table["constraints"]]
+    worse = solved({**table, "constraints": tighter}, tmp_path)
+    assert worse.objective.value > 1.001 * result.objective.value
+    assert "a rival has" in complaints(table, worse)
