@@ -44,7 +44,7 @@ class Complaint:
     remedy: str = ""
 
     def __str__(self) -> str:
-        shown = f" = {printed(self.value, 60)}" if self.value else ""
+        shown = f" = {printed(self.value, 300)}" if self.value else ""
         remedy = f"; {printed(self.remedy, 400)}" if self.remedy else ""
         return f"{printed(self.where, 120)}{shown}: {printed(self.rule, 300)}{remedy}"
 

@@ -17,7 +17,7 @@ from laufruhe.cli import app
 from laufruhe.errors import SolverError
 from problem_files import written
 
-ALL_FILES = {"result.json", "report.md", "polar.png", "cycle.png", "bars.png", "spectrum.png"}
+ALL_FILES = {".laufruhe.json", "result.json", "report.md", "polar.png", "cycle.png", "bars.png", "spectrum.png"}
 
 
 @pytest.fixture
@@ -139,7 +139,7 @@ def test_an_interrupt_keeps_the_earlier_result(here: Path, monkeypatch: pytest.M
         raise KeyboardInterrupt
 
     monkeypatch.setattr("laufruhe.plots.draw", interrupt)
-    assert run("evaluate", path).exit_code == 130
+    assert run("solve", path).exit_code == 130
     assert {name: (here / "results/scene" / name).read_bytes() for name in ALL_FILES} == before
     assert {entry.name for entry in (here / "results/scene").iterdir()} == ALL_FILES
 
@@ -148,8 +148,38 @@ def test_pictures_of_another_result_do_not_stay(here: Path) -> None:
     path = written(here, scenes.TIGHT)
     run("solve", path)
     (here / "results/scene/notes.txt").write_text("mine")
+    run("solve", path, "--no-plots")
+    assert tree(here / "results/scene") == {".laufruhe.json", "result.json", "report.md", "notes.txt"}
+    assert tree(here / "results") == {f"scene/{name}" for name in tree(here / "results/scene")}
+
+
+def test_solve_and_evaluate_have_places_of_their_own(here: Path) -> None:
+    path = written(here, scenes.TIGHT)
+    run("solve", path, "--no-plots")
+    before = (here / "results/scene/result.json").read_bytes()
     run("evaluate", path, "--no-plots")
-    assert tree(here / "results/scene") == {"result.json", "report.md", "notes.txt"}
+    assert (here / "results/scene/result.json").read_bytes() == before
+    assert (here / "results/scene-as-given/result.json").is_file()
+    refused(run("evaluate", path, "--out", "results/scene"), "--out", "holds the results of laufruhe solve")
+
+
+def test_what_others_made_is_never_touched(here: Path) -> None:
+    path = written(here, scenes.TIGHT)
+    (here / "mine").mkdir()
+    (here / "mine/report.md").write_text("mine")
+    for out in (".", "mine", "..", here):
+        refused(run("solve", path, "--out", out), "--out")
+    assert run("evaluate", path, "--no-plots").exit_code == 0
+    (here / "results/scene-as-given/cycle.png").write_text("mine")
+    refused(run("evaluate", path), "results", "'cycle.png', which Laufruhe did not make")
+    for name, text in (("trace.csv", "1,2\n"), ("package.json", '{"name": 1}'), ("deep.json", "[" * 5000)):
+        (here / name).write_text(text)
+        refused(run("check", path, "--json", name), "--json", "did not make")
+        assert (here / name).read_text() == text
+    assert (here / "mine/report.md").read_text() == "mine"
+    assert (here / "results/scene-as-given/cycle.png").read_text() == "mine"
+    for _ in range(2):
+        assert run("check", path, "--json", "own.json").exit_code == 0
 
 
 @pytest.mark.parametrize("command", ["solve", "evaluate", "check"])
@@ -212,7 +242,7 @@ class TestUnwritable:
     def test_a_folder_stands_where_a_file_goes(self, here: Path) -> None:
         path = written(here, scenes.TIGHT)
         (here / "out/result.json").mkdir(parents=True)
-        refused(run("solve", path, "--out", "out"), "--out", "is a folder")
+        refused(run("solve", path, "--out", "out"), "--out", "did not make")
         assert list((here / "out").iterdir()) == [here / "out/result.json"]
 
     @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder that nobody can write to")
@@ -241,7 +271,9 @@ class TestUnwritable:
 
 def test_a_name_of_dots_stays_under_results(here: Path) -> None:
     assert run("evaluate", written(here, scenes.GIVEN, "..."), "--no-plots").exit_code == 0
-    assert tree(here / "results") == {"problem/result.json", "problem/report.md"}
+    assert tree(here / "results") == {
+        f"problem-as-given/{name}" for name in (".laufruhe.json", "result.json", "report.md")
+    }
 
 
 def test_markup_in_a_title_is_text(here: Path) -> None:

@@ -30,7 +30,7 @@ JSON = "Write the result as JSON to FILE; - prints it, and the text goes to stde
 JsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=JSON)]
 PARTS = "Write all parts as JSON to FILE; - prints them."
 StudyJsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=PARTS)]
-OUT = "Folder of the results.  [default: results/<name of the file>]"
+OUT = "Folder of the results.  [default: results/<name of the file>, of evaluate <name>-as-given]"
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT)]
 PAGES = "Folder of the pages.  [default: results/trade]"
 PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=PAGES)]

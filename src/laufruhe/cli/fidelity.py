@@ -62,7 +62,7 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
         one = trade(problem, lambda text, name=problem.name: say(f"{name}: {text}"))  # type: ignore[misc]
         found.append(one)
         names = (f"{problem.name}.md", f"{problem.name}.png")
-        with files.staged(folder, "--out", names) as stage:
+        with files.staged(files.Set(folder, "--out", "trade", names, adds=True)) as stage:
             drawn = has_picture(one)
             if drawn:
                 save(figure(one), stage / names[1])
@@ -71,7 +71,7 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
         data.append(report.as_json(one).strip())
     index = report.index(found)
     if len(found) > 1:
-        with files.staged(folder, "--out", ("README.md",)) as stage:
+        with files.staged(files.Set(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
             files.write(stage / "README.md", index)
     return index + f"Results: {folder}\n", "[" + ",\n".join(data) + "]\n"
 

@@ -21,6 +21,9 @@ from laufruhe.report.json_result import as_json
 from laufruhe.report.markdown import as_markdown
 from laufruhe.solvers.result import Result, Status
 
+# each has a folder of its own
+_SUFFIX = {"solve": "", "evaluate": "-as-given"}
+
 Answer = Callable[[Problem, Callable[[str], None]], Result]
 
 
@@ -86,9 +89,9 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
             problem = replace(problem, tolerance=checked_tolerance(request.tolerance))
     with ExitStack() as places:
         # a file called '...toml' would name the folder above
-        default = Path("results") / (problem.name.strip(".") or "problem")
-        option, folder = ("results", default) if request.out is None else ("--out", request.out)
-        stage = places.enter_context(files.staged(folder, option))
+        name = (problem.name.strip(".") or "problem") + _SUFFIX[request.verb]
+        option, folder = ("results", Path("results") / name) if request.out is None else ("--out", request.out)
+        stage = places.enter_context(files.staged(files.Set(folder, option, request.verb)))
         copy = json_file(request.json, [request.problem], places)
         open_numbers = len(problem.decisions)
         what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"

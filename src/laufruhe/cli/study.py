@@ -11,6 +11,7 @@ from laufruhe.errors import Complaint, InputError
 from laufruhe.numerics.cores import processors
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
+from laufruhe.report.study_report import as_json, file_names, write_study
 from laufruhe.studies import Scenes, run
 from laufruhe.studies.kept import NAME
 from laufruhe.studies.reader import load_study
@@ -27,12 +28,12 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
     study = load_study(path)
     folder = out if out is not None else Path("results") / path.stem
     kept = folder / NAME
-    datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or processors())
-    # late: pictures and tables are not needed where the study is refused
-    from laufruhe.plots.picture import save_picture
-    from laufruhe.report.study_report import as_json, file_names, write_study
+    option, names = "--out" if out is not None else "results", file_names(study)
+    with files.staged(files.Set(folder, option, "study", names, beside=[NAME])) as stage:
+        datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or processors())
+        # late: pictures are not needed where the study is refused
+        from laufruhe.plots.picture import save_picture
 
-    with files.staged(folder, "--out" if out is not None else "results", file_names(study)) as stage:
         write_study(study, datasets, seconds, stage, shlex.join(["laufruhe", "study", str(path)]), say, save_picture)
     kept.unlink(missing_ok=True)
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())

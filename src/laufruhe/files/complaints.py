@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, get_args
 from pydantic import BaseModel, ValidationError
 
 from laufruhe import units
-from laufruhe.errors import Complaint, LaufruheError, ModelError
+from laufruhe.errors import Complaint, LaufruheError, ModelError, printed
 
 Loc: TypeAlias = tuple[str | int, ...]
 MOST_COMPLAINTS = 20
@@ -81,10 +81,10 @@ def key_path(loc: Sequence[str | int]) -> str:
 
 
 def short(value: Any) -> str:
-    """A value as the file has it."""
+    """A value as the file has it, cut where it is long."""
     if isinstance(value, dict | list):
-        return json.dumps(value, default=str, ensure_ascii=False)
-    return f'"{value}"' if isinstance(value, str) else str(value)
+        return printed(json.dumps(value, default=str, ensure_ascii=False), 60)
+    return printed(f'"{value}"' if isinstance(value, str) else str(value), 60)
 
 
 def nearest(word: str, words: Sequence[str]) -> str:

@@ -1,68 +1,142 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, in folders that know what was made in them."""
 
 from __future__ import annotations
 
+import ctypes
+import hashlib
+import json
 import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from laufruhe.errors import Complaint, InputError
 from laufruhe.present.pictures import CAPTIONS
 
+try:
+    import fcntl
+except ImportError:
+    # a system without locks: what a killed run leaves behind stays there
+    fcntl = None  # type: ignore[assignment]
+
 RESULT = "result.json"
 REPORT = "report.md"
 RESULT_FILES = (RESULT, REPORT, *CAPTIONS)
+MADE = ".laufruhe.json"
+"""What stands in a folder of results beside them: the command that made them, and their names."""
+_NEXT = f"{MADE}-next"
+_SWAP = 2
+_HERE = -100
 
 
-@contextmanager
-def staged(folder: Path, option: str, names: Collection[str] = RESULT_FILES) -> Iterator[Path]:
-    """A hidden folder whose files move into `folder` when all of them are made.
+@dataclass(frozen=True)
+class Set:
+    """The files that one command makes in a folder.
 
-    Whether `folder` can be written is found out on entry. After an error or an
-    interrupt it is as it was before.
-
-    Parameters
+    Attributes
     ----------
     folder
         Made if it does not exist.
     option
         Names the culprit in a complaint.
+    verb
+        Of the command; a folder holds the results of one.
     names
-        The files that may be made. One that is not made this time is removed from
-        `folder`: it would show another result.
+        That may be made.
+    adds
+        Whether what earlier runs made stays, where this one does not make it again.
+    beside
+        Files of this command that are no results and stay where they are.
+    """
+
+    folder: Path
+    option: str
+    verb: str
+    names: Collection[str] = RESULT_FILES
+    adds: bool = False
+    beside: Collection[str] = ()
+
+    def check(self) -> frozenset[str]:
+        """The files that earlier runs made there; what they did not make is never touched (`InputError`)."""
+        folder = self.folder
+        above = next(path for path in (folder, *folder.parents) if path.exists())
+        if not above.is_dir():
+            raise self.refused(f"cannot be written ('{above}' is not a folder)")
+        if folder in (here := Path.cwd(), *here.parents) or os.path.ismount(folder):
+            raise self.refused("cannot be replaced while it is worked in or mounted")
+        if not folder.exists():
+            return frozenset()
+        verb, made = _made(folder)
+        foreign = sorted({entry.name for entry in folder.iterdir()} - made - {MADE, *self.beside})
+        if verb not in ("", self.verb):
+            raise self.refused(f"holds the results of laufruhe {verb}")
+        in_the_way = [name for name in foreign if not verb or name in self.names]
+        if in_the_way:
+            raise self.refused(f"holds '{in_the_way[0]}', which Laufruhe did not make")
+        return made
+
+    def refused(self, rule: str) -> InputError:
+        """One line about the folder."""
+        complaint = Complaint(self.option, str(self.folder), rule, "name another place")
+        return InputError("laufruhe", (complaint,))
+
+
+@contextmanager
+def staged(wanted: Set) -> Iterator[Path]:
+    """A hidden folder that takes the place of the set's when all files are made, at once.
+
+    Whether it can is found out on entry. After an error, an interrupt or a kill at any
+    moment the folder is as it was before, or all new; the next run takes away what a
+    killed one left behind.
 
     Raises
     ------
     InputError
-        If nothing can be written to `folder`.
+        If the folder cannot be written, holds what Laufruhe did not make and would
+        overwrite, or holds the results of another command.
     """
-    missing = [path for path in (folder, *folder.parents) if not path.exists() and not path.is_symlink()]
-    with ExitStack() as undone:
-        # deepest first; what holds files by then stays
-        undone.callback(_remove_empty, missing)
-        try:
-            stage = _stage(folder, names)
-        except OSError as error:
-            why = f"cannot be written ({error.strerror or error})"
-            raise InputError("laufruhe", (Complaint(option, str(folder), why, "name another place"),)) from None
-        undone.callback(shutil.rmtree, stage, ignore_errors=True)
+    wanted = replace(wanted, folder=Path(os.path.realpath(wanted.folder)))
+    with ExitStack() as until_then:
+        with _reporting(wanted):
+            wanted.check()
+            stage = until_then.enter_context(_stage_for(wanted.folder))
+            if wanted.folder.exists():
+                shutil.copymode(wanted.folder, stage)
         yield stage
-        _move(stage, folder, names)
+        with _held(wanted.folder.parent):
+            made = wanted.check()
+            if wanted.adds:
+                for name in made - {entry.name for entry in stage.iterdir()}:
+                    shutil.copy2(wanted.folder / name, stage)
+            _note(stage, wanted.verb, sorted({entry.name for entry in stage.iterdir()} - {MADE}))
+            _put(stage, wanted.folder)
+            _swept(stage, wanted.folder)
+
+
+@contextmanager
+def _reporting(wanted: Set) -> Iterator[None]:
+    """What stands in the way before any work is done is a complaint."""
+    try:
+        yield
+    except OSError as error:
+        raise wanted.refused(f"cannot be written ({error.strerror or error})") from None
 
 
 @contextmanager
 def staged_file(path: Path, option: str) -> Iterator[Path]:
-    """A place to write one file to; it becomes `path` when it is whole.
+    """A place to write data to; it becomes `path` when it is whole.
 
     Raises
     ------
     InputError
-        If `path` cannot be written.
+        If `path` cannot be written, or is a file that Laufruhe did not make.
     """
     path = path.resolve()
+    place = Set(path, option, "")
     if path.exists() and not path.is_file() and not path.is_dir():
         # a device or a pipe takes text, and must not be replaced by a file
         yield path
@@ -71,8 +145,14 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
         raise InputError("laufruhe", (Complaint(option, str(path), "is a folder", "name a file in it"),))
     if path.is_file() and not os.access(path, os.W_OK):
         raise InputError("laufruhe", (Complaint(option, str(path), "cannot be written", "check its permissions"),))
-    with staged(path.parent, option, (path.name,)) as stage:
+    if path.is_file() and not _is_data(path):
+        raise place.refused("is a file that Laufruhe did not make")
+    with ExitStack() as until_then:
+        with _reporting(place):
+            stage = until_then.enter_context(_stage_for(path))
         yield stage / path.name
+        if (stage / path.name).exists():
+            os.replace(stage / path.name, path)
 
 
 def write(path: Path, text: str) -> None:
@@ -81,23 +161,111 @@ def write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
-def _stage(folder: Path, names: Collection[str]) -> Path:
-    above = next(path for path in (folder, *folder.parents) if path.exists() or path.is_symlink())
-    if not above.is_dir():
-        raise NotADirectoryError(f"'{above}' is not a folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    taken = [name for name in names if (folder / name).is_dir()]
-    if taken:
-        raise IsADirectoryError(f"'{taken[0]}' is a folder there")
-    return Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
+def _is_data(path: Path) -> bool:
+    """Whether a file is empty, or JSON as a command writes it."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8") or '{"title": ""}')
+    except (OSError, ValueError, RecursionError):
+        return False
+    first = found[0] if isinstance(found, list) and found else found
+    return isinstance(first, dict) and not {"problem", "title"}.isdisjoint(first)
 
 
-def _move(stage: Path, folder: Path, names: Collection[str]) -> None:
-    ready = sorted(stage.iterdir())
-    for file in ready:
-        os.replace(file, folder / file.name)
-    for name in set(names) - {file.name for file in ready}:
-        (folder / name).unlink(missing_ok=True)
+@contextmanager
+def _stage_for(place: Path) -> Iterator[Path]:
+    """An unfinished folder beside a place; those that killed runs left there are swept away first."""
+    missing = [path for path in place.parents if not path.exists() and not path.is_symlink()]
+    mark = f".unfinished-{hashlib.sha256(place.name.encode(errors='surrogateescape')).hexdigest()[:8]}-"
+    with ExitStack() as undone:
+        undone.callback(_remove_empty, missing)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with _held(place.parent):
+            for left in place.parent.glob(f"{mark}*"):
+                with _held(left, wait=False) as ours:
+                    if ours:
+                        _swept(left, place)
+            stage = place.parent / f"{mark}{secrets.token_hex(4)}"
+            stage.mkdir()
+            undone.callback(_swept, stage, place)
+            _note(stage, "", None)
+            undone.enter_context(_held(stage))
+        yield stage
+
+
+def _note(folder: Path, verb: str, names: list[str] | None) -> None:
+    """Note what was made in a folder; no names where it is unfinished, and all in it is."""
+    write(folder / _NEXT, json.dumps({"made_by": verb, "files": names}, ensure_ascii=False) + "\n")
+    os.replace(folder / _NEXT, folder / MADE)
+
+
+def _made(folder: Path) -> tuple[str, frozenset[str]]:
+    """The command that made what is in a folder, and names; none where it is no folder of results."""
+    try:
+        noted: Any = json.loads((folder / MADE).read_text(encoding="utf-8"))
+        names = [entry.name for entry in folder.iterdir()] if noted["files"] is None else noted["files"]
+        return str(noted["made_by"]), frozenset(map(str, names))
+    except (OSError, ValueError, KeyError, TypeError):
+        return "", frozenset()
+
+
+def _swept(left: Path, place: Path) -> None:
+    """Take away what was made in a folder left behind; what was not goes to the place that it was taken from."""
+    if not left.is_dir():
+        return
+    verb, made = _made(left)
+    with suppress(OSError):
+        if verb and not place.exists():
+            # killed between two renames: this is the only whole set
+            left.rename(place)
+            return
+        for entry in [entry for entry in left.iterdir() if entry.name != MADE]:
+            if entry.name in made or entry.name == _NEXT:
+                entry.unlink()
+            elif not (place / entry.name).exists():
+                entry.rename(place / entry.name)
+        # last, for without it nothing here is known as made
+        (left / MADE).unlink(missing_ok=True)
+        left.rmdir()
+
+
+def _put(stage: Path, folder: Path) -> None:
+    """A folder in the place of another, which then stands in its own."""
+    with suppress(OSError):
+        # there is none yet, or an empty one
+        stage.rename(folder)
+        return
+    if os.name == "posix":
+        libc, one, other = ctypes.CDLL(None), os.fsencode(stage), os.fsencode(folder)
+        for call, words in (("renameat2", (_HERE, one, _HERE, other, _SWAP)), ("renamex_np", (one, other, _SWAP))):
+            if hasattr(libc, call) and getattr(libc, call)(*words) == 0:
+                return
+    # a file system that cannot swap: what is left after a kill in between, the next run puts in its place
+    aside = stage.with_name(f"{stage.name}-before")
+    folder.rename(aside)
+    stage.rename(folder)
+    aside.rename(stage)
+
+
+@contextmanager
+def _held(folder: Path, wait: bool = True) -> Iterator[bool]:
+    """Keep a folder to this process; whether it could, which without waiting it may not."""
+    if fcntl is None:
+        yield wait
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        yield _locked(handle, wait)
+    finally:
+        os.close(handle)
+
+
+def _locked(handle: int, wait: bool) -> bool:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:
+        # another process has it, or the file system has no locks
+        return wait
+    return True
 
 
 def _remove_empty(folders: list[Path]) -> None:

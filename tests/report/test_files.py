@@ -1,0 +1,138 @@
+"""Folders of results: all old or all new after a kill at any moment, and nothing of others lost."""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from laufruhe.errors import InputError
+from laufruhe.report import files
+from laufruhe.report.files import MADE, Set, staged, staged_file
+
+NAMES = [f"file-{k}" for k in range(8)]
+# makes set after set, each of files that hold its number
+MAKER = f"""
+import sys, itertools
+from pathlib import Path
+from laufruhe.report.files import Set, staged, write
+for k in itertools.count(int(sys.argv[2])):
+    with staged(Set(Path(sys.argv[1]), "--out", "solve", {NAMES})) as stage:
+        for name in {NAMES}[: 4 + k % 5]:
+            write(stage / name, str(k))
+"""
+
+
+def make(folder: Path, text: str, names: list[str] = NAMES, **more: object) -> None:
+    with staged(Set(folder, "--out", "solve", NAMES, **more)) as stage:  # type: ignore[arg-type]
+        for name in names:
+            (stage / name).write_text(text)
+
+
+def held(folder: Path) -> tuple[set[str], set[str]]:
+    """Names and contents of a set."""
+    found = {path.name: path.read_text() for path in folder.glob("file-*")}
+    return set(found), set(found.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("makers", [1, 2])
+@pytest.mark.parametrize("swaps", [True, False], ids=["swap", "rename"])
+def test_a_kill_at_any_moment(makers: int, swaps: bool, tmp_path: Path) -> None:
+    rng = random.Random(makers)
+    folder = tmp_path / "set"
+    make(folder, "0")
+    (folder / "notes.txt").write_text("mine")
+    no_swap = "" if swaps else "import ctypes; ctypes.CDLL = lambda *_: None\n"
+    for kill in range(12):
+        running = [
+            subprocess.Popen([sys.executable, "-c", no_swap + MAKER, str(folder), str(kill * 10**6 + k)])
+            for k in range(makers)
+        ]
+        time.sleep(0.3 + rng.random() * 0.3)
+        for one in running:
+            one.send_signal(signal.SIGKILL)
+            assert one.wait() == -signal.SIGKILL
+        if swaps:
+            names, texts = held(folder)
+            assert len(texts) == 1
+            assert names == set(NAMES[: 4 + int(texts.pop()) % 5])
+    make(folder, "done")
+    assert held(folder) == (set(NAMES), {"done"})
+    assert (folder / "notes.txt").read_text() == "mine"
+    assert {path.name for path in tmp_path.iterdir()} == {"set"}
+
+
+def test_a_set_is_replaced_as_a_whole(tmp_path: Path) -> None:
+    folder = tmp_path / "set"
+    make(folder, "old")
+    (folder / "notes.txt").write_text("mine")
+    (folder / "drafts").mkdir()
+    make(folder, "new", NAMES[:2])
+    assert {path.name for path in folder.iterdir()} == {MADE, *NAMES[:2], "notes.txt", "drafts"}
+    make(folder, "more", NAMES[1:3], adds=True)
+    assert [(folder / name).read_text() for name in NAMES[:3]] == ["new", "more", "more"]
+    assert {path.name for path in tmp_path.iterdir()} == {"set"}
+
+
+def test_an_error_leaves_all_as_it_was(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), staged(Set(tmp_path / "a/b", "--out", "solve")) as stage:
+        (stage / "x").write_text("x")
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+    make(tmp_path / "set", "old")
+    with pytest.raises(ZeroDivisionError), staged(Set(tmp_path / "set", "--out", "solve", NAMES)) as stage:
+        (stage / NAMES[0]).write_text("x")
+        raise ZeroDivisionError
+    assert held(tmp_path / "set") == (set(NAMES), {"old"})
+
+
+@pytest.mark.parametrize("noted", ["{}", "[]", "", '{"made_by": "solve"}', "\0"])
+def test_a_spoilt_note_owns_nothing(noted: str, tmp_path: Path) -> None:
+    make(tmp_path / "set", "old")
+    (tmp_path / "set" / MADE).write_text(noted)
+    with pytest.raises(InputError, match="did not make"):
+        make(tmp_path / "set", "new")
+    assert held(tmp_path / "set") == (set(NAMES), {"old"})
+
+
+def test_what_came_in_the_meantime_stays(tmp_path: Path) -> None:
+    folder = tmp_path / "set"
+    make(folder, "old", NAMES[:2])
+    with pytest.raises(InputError, match=NAMES[3]), staged(Set(folder, "--out", "solve", NAMES)) as stage:
+        (stage / NAMES[3]).write_text("new")
+        (folder / NAMES[3]).write_text("mine")
+    assert (folder / NAMES[3]).read_text() == "mine"
+
+
+def test_a_run_that_works_is_not_swept_away(tmp_path: Path) -> None:
+    with staged(Set(tmp_path / "set", "--out", "solve", NAMES)) as first:
+        (first / NAMES[0]).write_text("first")
+        make(tmp_path / "set", "second")
+        assert (first / NAMES[0]).exists()
+        assert held(tmp_path / "set") == (set(NAMES), {"second"})
+    assert held(tmp_path / "set") == ({NAMES[0]}, {"first"})
+
+
+def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to("real")
+    make(tmp_path / "link", "new")
+    assert (tmp_path / "link").is_symlink()
+    assert held(tmp_path / "real") == (set(NAMES), {"new"})
+
+
+def test_one_file_appears_whole(tmp_path: Path) -> None:
+    place = tmp_path / "deep/data.json"
+    with staged_file(place, "--json") as path:
+        files.write(path, '{"title": "x"}')
+        assert not place.exists()
+    assert place.read_text() == '{"title": "x"}'
+    with staged_file(place, "--json"):
+        pass
+    assert [entry.name for entry in place.parent.iterdir()] == ["data.json"]
