@@ -159,8 +159,8 @@ class Replication(Part):
                 says=self.says, part=self.model_dump_json(by_alias=True, exclude_defaults=True, exclude={"problems"})
             ),
         )
-        for name in dict.fromkeys(name for record in records for name in record):
-            data = data.merge(_along_points([record.get(name) for record in records], name))
+        for name in self.quantities if records else ():
+            data = data.merge(_along_points([record[name] for record in records], name))
         try:
             return data.assign_coords(judged(self.statements, self.names(data)))
         except ExpressionError as error:
@@ -228,16 +228,15 @@ def _by_case(data: xr.Dataset, name: str) -> _Cases:
     return found
 
 
-def _along_points(found: Sequence[Mapping[str, Any] | None], name: str) -> xr.DataArray:
+def _along_points(found: Sequence[Mapping[str, Any]], name: str) -> xr.DataArray:
     """One quantity of all points; those that lack labels others have are padded with no number."""
     import xarray as xr
 
-    given = [one["coords"] for one in found if one is not None]
-    coords = {dim: list(dict.fromkeys(label for one in given for label in one[dim])) for dim in given[0]}
+    dims = list(found[0]["coords"])
+    coords = {dim: list(dict.fromkeys(label for one in found for label in one["coords"][dim])) for dim in dims}
     whole = np.full((len(found), *(len(labels) for labels in coords.values())), np.nan)
     for k, one in enumerate(found):
-        if one is not None:
-            places = [[coords[dim].index(label) for label in labels] for dim, labels in one["coords"].items()]
-            whole[np.ix_([k], *places)] = np.array(one["values"], dtype=float)
-    padded = int(any(len(one[dim]) < len(labels) for one in given for dim, labels in coords.items()))
+        places = [[coords[dim].index(label) for label in labels] for dim, labels in one["coords"].items()]
+        whole[np.ix_([k], *places)] = np.array(one["values"], dtype=float)
+    padded = int(any(len(one["coords"][dim]) < len(labels) for one in found for dim, labels in coords.items()))
     return xr.DataArray(whole, coords, ("point", *coords), name, {"padded": padded})

@@ -36,7 +36,6 @@ def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) 
         size=(table.size[0], table.size[1]),
         columns=table.columns,
         gap=table.gap,
-        room=table.room,
     )
 
 

@@ -18,8 +18,6 @@ from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE
 if TYPE_CHECKING:
     import xarray as xr
 
-STEPS = 60
-
 
 def _reduced(how: str) -> Callable[..., Any]:
     def reduce(values: Any, *dims: str) -> Any:
@@ -45,15 +43,6 @@ def _arg(how: str) -> Callable[..., Any]:
         return answer if answer.dims else answer.item()
 
     return found
-
-
-def root(function: Callable[[Any], Any], low: float, high: float) -> Any:
-    """Where a function that is positive at the lower end and falls crosses zero, by bisection; of arrays, each."""
-    width: Any = high - low
-    for _ in range(STEPS):
-        width = 0.5 * width
-        low = low + width * (function(low + width) > 0.0)
-    return low + 0.5 * width
 
 
 def orders(values: xr.DataArray) -> Any:
@@ -88,16 +77,11 @@ def transmissibility(ratio: Any, loss_factor: Any) -> Any:
         return xr.apply_ufunc(single_transmissibility, ratio, loss_factor)
 
 
-def _lengths(values: xr.DataArray, dim: str = "direction") -> Any:
-    return (values**2).sum(dim) ** 0.5
-
-
 FUNCTIONS: Mapping[str, Any] = {
     **{name: _reduced(name) for name in ("min", "max", "mean", "sum", "all", "any")},
     **{name: getattr(np, name) for name in ("sqrt", "log", "exp", "sin", "cos", "minimum", "maximum", "round", "diff")},
-    "abs": abs, "len": len, "at": at, "argmin": _arg("min"), "argmax": _arg("max"), "root": root, "orders": orders,
-    "length": _lengths, "join": join, "rising": lambda values: bool(np.all(np.diff(np.asarray(values)) > 0.0)),
-    "list": lambda values: [value.item() for value in np.asarray(values)],
+    "abs": abs, "len": len, "at": at, "argmin": _arg("min"), "argmax": _arg("max"), "orders": orders,
+    "join": join, "rising": lambda values: bool(np.all(np.diff(np.asarray(values)) > 0.0)),
     "degrees": lambda z: math.degrees(cmath.phase(z)), "conjugate": lambda z: z.conjugate(),
     "couple_star": couple_star, "transmissibility": transmissibility,
     "sag_for_critical_speed": sag_for_critical_speed, "sag_frequency": sag_frequency,

@@ -150,5 +150,4 @@ class PictureTable(Table):
     size: list[float] = Field(default=[7.2, 4.0], min_length=2, max_length=2, description="Of a panel [inch].")
     columns: Annotated[int, Field(ge=1)] = 1
     gap: float = 0.7
-    room: float = 0.0
     panels: list[PanelTable] = Field(min_length=1)
