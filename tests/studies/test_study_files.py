@@ -113,8 +113,8 @@ BAD = [
     (study(sweep=swept(FRACTION, MANY) + swept(SPEED, 'from = "6 m/s"\nto = "7 m/s"\npoints = 100000')),
      "makes 10000000000 points; a study takes 100000"),
     (study("layout comparison", sweep=swept(FRACTION, MANY)) + case("b", "x.toml"), "makes 200000 points"),
-    (study(sweep=swept(FRACTION, MANY)) + study(sweep=swept(FRACTION, MANY)).partition("[study]")[2].replace('"p"', '"q"'),
-     "make 200000 points"),
+    (study(sweep=swept(FRACTION, MANY)) + study(sweep=swept(FRACTION, MANY)).partition("[study]")[2]
+     .replace('"p"', '"q"'), "make 200000 points"),
     (study("balancer sizing", swept("gas.imep", 'from = "5 bar"\nto = "6 bar"\npoints = 40000'),
            "tractor-four-lanchester-and-moment"), "makes 160000 points"),
     (REPLICA.replace('problem = "one"', f'problem = "one", sweep = {{ m = {{ {MANY.replace(chr(10), ", ")} }}, '

@@ -1,0 +1,52 @@
+"""Studies killed at random moments, alone and two at once in one folder, their kept points damaged in between.
+
+Writes results/benchmarks/kills.md: what was tried, and every study whose files were not those of one run.
+`python tests/benchmarks/bench_kills.py 300` tries so many studies.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from pages import PAGES, publish
+
+from studies import kills
+
+OUT = PAGES / "kills.md"
+TRIED = 60
+WORDS = """{} studies of {} points in three parts, each killed one to four times at seeded random moments by SIGINT,
+SIGTERM or SIGKILL, alone or two at once in one folder, their kept points damaged after every kill, and then left to
+end. Datasets, CSV files, pictures and the report but for its table of times are compared byte by byte with those of one
+run that nothing stopped. What a crash of the machine leaves is not tried.
+"""
+
+
+def page(told: kills.Told, studies: int, points: int) -> str:
+    """What was tried and what came of it."""
+    rows = [f"| {what} | {count} |" for what, count in sorted(told.tried.items())]
+    wrong = [f"- {line}" for line in told.wrong] or ["None."]
+    head = ["# Killed studies", "", WORDS.format(studies, points), "| tried | times |", "| --- | ---: |"]
+    return "\n".join([*head, *rows, "", "Studies that ended otherwise:", "", *wrong, ""])
+
+
+def main() -> None:
+    """Try as many as asked."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else TRIED
+    with tempfile.TemporaryDirectory() as name:
+        folder = kills.prepared(Path(name) / "whole")
+        began = time.monotonic()
+        process = kills.started(folder)
+        said = process.communicate()[1]
+        assert process.returncode == 0, said
+        seconds, told = time.monotonic() - began, kills.Told()
+        for seed in range(count):
+            kills.attacked(Path(name) / "s", seed, kills.results(folder), seconds, told)
+    publish(OUT, page(told, count, 4 * 7 + 12 + 1))
+    sys.exit(bool(told.wrong))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""Studies killed at random moments, alone and two at once, and what they kept damaged in between."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import laufruhe
+from laufruhe.studies.kept import NAME
+
+PROBLEM = Path(__file__).parents[2] / "problems" / "tractor-single.toml"
+STUDY = """
+title = "t"
+[[study.parts]]
+name = "fraction"
+kind = "counterweight fraction"
+title = "t"
+sweep = [
+    { quantity = "operating_points.1.mean_piston_speed", from = "6 m/s", to = "12 m/s", points = 4 },
+    { quantity = "counterweights.web.balance_factor", from = 0, to = 1, points = 6 },
+]
+cases = [{ name = "single", problem = "single.toml" }]
+[[study.parts]]
+name = "layouts"
+kind = "layout comparison"
+title = "t"
+sweep = [{ quantity = "engine.rod_ratio", from = 0.2, to = 0.3, points = 6 }]
+cases = [
+    { name = "a", problem = "single.toml" },
+    { name = "b", problem = "single.toml", set = { "gas.imep" = "9 bar" } },
+]
+[[study.parts]]
+name = "map"
+kind = "speed map"
+title = "t"
+speeds = { from = "1000 rpm", to = "2000 rpm", points = 5 }
+cases = [{ name = "single", problem = "single.toml" }]
+"""
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
+TIMED = "## Where the time went"
+
+
+def prepared(folder: Path) -> Path:
+    """The study and its problem, at so few samples that a point takes milliseconds."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = PROBLEM.read_text(encoding="utf-8") + "\n[fidelity]\nsamples = 144\n"
+    (folder / "single.toml").write_text(text, encoding="utf-8")
+    (folder / "s.toml").write_text(STUDY, encoding="utf-8")
+    return folder
+
+
+def started(folder: Path) -> subprocess.Popen[str]:
+    """The command in a process of its own."""
+    source = str(Path(laufruhe.__file__).parents[1])
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    # a test run in the background has its interrupts ignored, and hands that on
+    return subprocess.Popen(
+        [sys.executable, "-m", "laufruhe", "study", "s.toml", "--out", "out", "--jobs", "1"],
+        cwd=folder, env={**os.environ, **threads, "PYTHONPATH": source}, stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    """Every file of the results, without what is a matter of time."""
+    found = {path.name: path.read_bytes() for path in (folder / "out").iterdir() if path.is_file()}
+    return {name: data.partition(TIMED.encode())[0] for name, data in found.items()}
+
+
+def damage(path: Path, rng: random.Random) -> str:
+    """Something wrong with the kept points; says what."""
+    if not path.is_file() or not path.stat().st_size:
+        return "nothing was kept"
+    data = path.read_bytes()
+    lines = [line for line in data.splitlines() if line]
+    line, place = rng.randrange(len(lines)), rng.randrange(len(data))
+    ways = {
+        "as it was": data,
+        "figure changed": data[:place] + bytes([rng.choice(b"0123456789")]) + data[place + 1 :],
+        "bit changed": data[:place] + bytes([data[place] ^ (1 << rng.randrange(8))]) + data[place + 1 :],
+        "cut": data[:place],
+        "line cut": b"\n".join([*lines[:line], lines[line][: rng.randrange(len(lines[line]))], *lines[line + 1 :]]),
+        "line doubled": b"\n".join([*lines, lines[line], b""]),
+        "lines in disorder": b"\n".join([*rng.sample(lines, len(lines)), b""]),
+        "two lines joined": b"".join(lines[:2]) + b"\n" + b"\n".join([*lines[2:], b""]),
+        # a checksum and a fingerprint have 32 letters each
+        "records exchanged": b"\n".join(
+            one[:67] + other[67:] for one, other in zip(lines, rng.sample(lines, len(lines)), strict=True)
+        ),
+        "noise added": data + rng.randbytes(200),
+        "emptied": b"",
+    }  # fmt: skip
+    way = rng.choice(list(ways))
+    path.write_bytes(ways[way])
+    return way
+
+
+@dataclass
+class Told:
+    """What was tried, and what went wrong."""
+
+    tried: Counter[str] = field(default_factory=Counter)
+    wrong: list[str] = field(default_factory=list)
+
+
+def attacked(folder: Path, seed: int, whole: dict[str, bytes], seconds: float, told: Told) -> None:
+    """One study in a new folder: killed up to four times, its kept points damaged, then left alone."""
+    rng = random.Random(seed)
+    shutil.rmtree(folder, ignore_errors=True)
+    prepared(folder)
+    for _ in range(rng.randint(1, 4)):
+        running = [started(folder) for _ in range(rng.choice((1, 2)))]
+        told.tried[f"runs of {len(running)} at once"] += 1
+        _stopped(running, rng, seconds, seed, told)
+        told.tried[f"kept points: {damage(folder / 'out' / NAME, rng)}"] += 1
+    last = started(folder)
+    said = last.communicate()[1]
+    if last.returncode or said:
+        told.wrong.append(f"seed {seed}: the last run ended with {last.returncode}: {said[-300:]}")
+    elif results(folder) != whole:
+        names = {name for name, data in results(folder).items() ^ whole.items()}
+        told.wrong.append(f"seed {seed}: {', '.join(sorted(names))} differ")
+
+
+def _stopped(
+    running: Sequence[subprocess.Popen[str]], rng: random.Random, seconds: float, seed: int, told: Told
+) -> None:
+    """Each by a signal of its own, at a moment of its own."""
+    began = time.monotonic()
+    moments = sorted((rng.uniform(0.2, 1.1) * seconds, rng.choice(SIGNALS), process) for process in running)
+    for moment, stop, process in moments:
+        time.sleep(max(0.0, began + moment - time.monotonic()))
+        told.tried[f"{stop.name} {'sent' if process.poll() is None else 'too late'}"] += 1
+        process.send_signal(stop)
+    for _, stop, process in moments:
+        said = process.communicate()[1]
+        allowed = {0, -stop} | ({130} if stop is signal.SIGINT else set())
+        if process.returncode not in allowed or ("Traceback" in said and "laufruhe: " in said):
+            told.wrong.append(f"seed {seed}: {stop.name} ended with {process.returncode}: {said[-300:]}")
