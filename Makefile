@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test test-fast attack bench pictures lint format clean distclean
+.PHONY: help solve study test test-fast attack matrix bench pictures lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
@@ -15,6 +15,7 @@ help:
 	@echo "make test-fast  tests of every room, under a minute on two cores"
 	@echo "make test       all tests, minutes"
 	@echo "make attack     random problems against an independent model, ATTACK='--number 100'"
+	@echo "make matrix     every kind of decision, measure and layout together; hours, results/matrix/ (MATRIX='--share 0.1')"
 	@echo "make lint       style, types, direction of imports"
 	@echo "make format     put the source into the project's style"
 	@echo "make bench      benchmarks, which write results/benchmarks/; an hour and more"
@@ -50,6 +51,11 @@ attack: export OMP_NUM_THREADS = 1
 
 attack: $(STAMP)
 	$(BIN)/python tests/attack/run_attack.py run all $(ATTACK)
+
+matrix: export OMP_NUM_THREADS = 1
+
+matrix: $(STAMP)
+	$(BIN)/python tests/matrix/whole.py $(MATRIX)
 
 # Scripts that write under results/benchmarks/.
 bench: $(STAMP)

@@ -8,7 +8,7 @@ a file asks no names.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import ClassVar, Protocol
@@ -20,6 +20,7 @@ from laufruhe.physics.bearing_loads import bearing_pressures, main_bearing_force
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import PointLoads
 
 
@@ -55,6 +56,7 @@ class Answered(Protocol):
         """Per operating point."""
 
 
+OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders")
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
     (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
@@ -104,6 +106,10 @@ class Channel:
     def __str__(self) -> str:
         return self.name
 
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Whether it may change with decisions of these kinds."""
+        return bool(kinds)
+
 
 @dataclass(frozen=True, eq=False)
 class LoadChannel(Channel):
@@ -134,6 +140,10 @@ class LoadChannel(Channel):
     is_inside: bool = False
     is_load: ClassVar[bool] = True
 
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Mounts move what they transmit, and nothing of what the block feels."""
+        return bool(set(kinds) - OF_MOUNTS) if self.part is not None else bool(kinds)
+
 
 @dataclass(frozen=True, eq=False)
 class MassChannel(Channel):
@@ -142,6 +152,10 @@ class MassChannel(Channel):
     keys: tuple[str, ...] = ("of",)
     roles: tuple[Role, ...] = field(kw_only=True)
     is_mass: ClassVar[bool] = True
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Unbalances, and shafts that may be left out."""
+        return Kind.UNBALANCE in kinds or Kind.STAR in kinds
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +174,10 @@ class MountChannel(Channel):
     values: Callable[[Asked, Answered], Sequence[float]] = field(kw_only=True)
     of_loads: bool = False
     is_mounting: ClassVar[bool] = True
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Mounts, and all that moves loads where these count."""
+        return bool(kinds) if self.of_loads else bool(set(kinds) & OF_MOUNTS)
 
 
 def _on_block(name: str, unit: str, part: slice, lever: int | None = None) -> LoadChannel:

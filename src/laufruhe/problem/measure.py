@@ -222,7 +222,8 @@ def load_rows(
         values = selected(measure, signal, engine).sample(samples)
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
         blocks.append(rows)
-        weights.append(np.full(len(rows), share / len(rows)))
+        # a part of an engine may have none of the places
+        weights.append(np.full(len(rows), share / max(len(rows), 1)))
     return Rows(measure.norm, np.concatenate(blocks), Grid(np.concatenate(weights), samples))
 
 

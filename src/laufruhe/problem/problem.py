@@ -174,13 +174,17 @@ class Problem:
             return None
         return units.pop() if len(units) == 1 else ""
 
+    def changed(self, **changes: Any) -> Problem:
+        """The same problem with other attributes, every design of an open star included."""
+        if self.phasing is not None:
+            realise = self.phasing.realise
+            phasing = replace(self.phasing, realise=lambda candidate: realise(candidate).changed(**changes))
+            return replace(self, phasing=phasing, **changes)
+        return replace(self, **changes)
+
     def at(self, fidelity: Fidelity) -> Problem:
-        """The same problem at another fidelity, every design of an open star included."""
-        if self.phasing is None:
-            return replace(self, fidelity=fidelity)
-        realise = self.phasing.realise
-        phasing = replace(self.phasing, realise=lambda candidate: realise(candidate).at(fidelity))
-        return replace(self, fidelity=fidelity, phasing=phasing)
+        """The same problem at another fidelity."""
+        return self.changed(fidelity=fidelity)
 
     def design(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Engine:
         """The engine with decisions, all of them unless some are named, in place of those it was given with."""

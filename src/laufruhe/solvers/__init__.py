@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.channels import MountChannel
+from laufruhe.problem.channels import OF_MOUNTS, MountChannel
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Term
+from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.accuracy import solve_within
-from laufruhe.solvers.conclusion import broken_limits, none_within, state
+from laufruhe.solvers.conclusion import Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
 
@@ -75,20 +76,9 @@ def _smooth(problem: Problem, _: Say) -> Result:
     return solve_joint(problem)
 
 
-def _given(problem: Problem, _: Say) -> Result:
-    result = state(problem)
-    broken = broken_limits(problem.limits, result.final)
-    return none_within(problem, result.final, broken, dict(result.timing)) if broken else result
-
-
 def _stars(problem: Problem, _: Say) -> Result:
     from laufruhe.solvers.phasing import solve_phasing
 
-    if problem.mount_limits:
-        given = evaluate(problem)
-        broken = broken_limits(problem.mount_limits, given)
-        if broken:
-            return none_within(problem, given, broken, {})
     return solve_within(problem, solve_phasing)
 
 
@@ -121,7 +111,7 @@ def _asks_loads(problem: Problem) -> bool:
 
 _U, _P, _K, _M, _S = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR
 METHODS: tuple[Method, ...] = (
-    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, _given),
+    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, lambda problem, _: state(problem)),
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem, _: solve_within(problem, solve_unbalances)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_block, Reach.WHOLE, _places),
@@ -133,6 +123,16 @@ METHODS: tuple[Method, ...] = (
            _stars_on_mounts),
 )  # fmt: skip
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
+
+
+def _beyond_mounts(problem: Problem, kinds: frozenset[Kind]) -> tuple[str, ...]:
+    """Limits that no unbalances keep together, whatever the open mounts are."""
+    open_mounts = kinds & OF_MOUNTS
+    limits = tuple(limit for limit in problem.load_limits if not limit.measure.channel.is_moved_by(open_mounts))
+    if not limits or kinds - open_mounts != {Kind.UNBALANCE}:
+        return ()
+    apart = replace(problem.balance, objective=(Term(limits[0].measure),), limits=limits)
+    return solve_unbalances(off_resonance(apart)).conflict
 
 
 def solve(problem: Problem, say: Say = lambda _: None) -> Result:
@@ -155,9 +155,25 @@ def solve(problem: Problem, say: Say = lambda _: None) -> Result:
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
     kinds = kinds_of(problem)
+    fixed = [limit for limit in problem.limits if not limit.measure.channel.is_moved_by(kinds)]
+    broken = broken_limits(fixed, evaluate_start(problem)) if fixed else ()
+    if broken:
+        return none_within(problem, evaluate_start(problem), broken, {})
+    if fixed:
+        moved = tuple(limit for limit in problem.limits if limit not in fixed)
+        return with_limits(solve(problem.changed(limits=moved), say), problem.limits)
+    moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)
+    if problem.objective and kinds and not moving and problem.phasing is None:
+        given = judged(problem, problem.start)
+        if not broken_limits(problem.limits, given.evaluation):
+            shown = Shown(given.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
+            return concluded(given, given.evaluation, shown, {})
     if problem.decisions and not problem.objective and Kind.STAR not in kinds:
         raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
     method = next((m for m in METHODS if kinds <= m.decides and m.suits(problem)), None)
     if method is None:
         raise ModelError(f"no method decides {_named(kinds)} together, with what is asked here; fix one of them")
+    conflict = _beyond_mounts(problem, kinds) if Kind.MOUNT in method.decides else ()
+    if conflict:
+        return none_within(problem, evaluate_start(problem), conflict, {})
     return method.solve(problem, say)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -57,6 +58,12 @@ class Design:
     evaluation: Evaluation
     value: float
     excess: float
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """By what breaks limits least, then by what is least."""
+        broken = self.excess > KEPT
+        return broken, self.excess if broken else self.value
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,9 +121,11 @@ def better(design: Design, other: Design | None) -> Design:
 
 
 def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[str, float]) -> Result:
-    """The result of a design."""
+    """The result of a design, or of the one given where that is better."""
     problem = design.problem
     given = objective_value(problem, initial)
+    as_given = Design(problem, problem.start, initial, given, initial.excess(problem.limits))
+    design = min(design, as_given, key=lambda each: each.rank)
     met = design.excess <= KEPT
     certificate = certified(
         design.value,
@@ -194,15 +203,29 @@ def limit_values(
     problem: Problem, evaluation: Evaluation, prices: Sequence[float] = (), value: float = 0.0
 ) -> tuple[LimitValue, ...]:
     """How a design stands to the limits (E15); a price that would not move the objective by its rounding is none."""
-    out = []
-    for k, limit in enumerate(problem.limits):
-        found = evaluation.standing(limit)
-        price = prices[k] if k < len(prices) else 0.0
-        told = price * abs(found.edge) > _TOLD * value and found.excess >= -problem.tolerance
-        active = bool(found.excess >= -ACTIVE or told)
-        price = price if active and price * abs(found.edge) > _FELT * value else 0.0
-        out.append(LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side))
-    return tuple(out)
+    known = itertools.chain(prices, itertools.repeat(0.0))
+    return tuple(
+        _limit_value(limit, evaluation, price, value, problem.tolerance)
+        for limit, price in zip(problem.limits, known, strict=False)
+    )
+
+
+def _limit_value(limit: Limit, evaluation: Evaluation, price: float, value: float, tolerance: float) -> LimitValue:
+    found = evaluation.standing(limit)
+    told = price * abs(found.edge) > _TOLD * value and found.excess >= -tolerance
+    active = bool(found.excess >= -ACTIVE or told)
+    price = price if active and price * abs(found.edge) > _FELT * value else 0.0
+    return LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side)
+
+
+def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
+    """A result with limits beside its own that nothing open acts on, in the order given."""
+    problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
+    shown = tuple(
+        known.get(limit) or _limit_value(limit, result.final, 0.0, 0.0, problem.tolerance) for limit in limits
+    )
+    resonant = not known and result.final.resonance
+    return replace(result, problem=problem.changed(limits=limits), limits=() if resonant else shown)
 
 
 def decision_values(decision: Decision, value: Value, slope: Array | None = None) -> tuple[DecisionValue, ...]:

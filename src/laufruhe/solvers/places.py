@@ -31,7 +31,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Set, Value
 from laufruhe.prove.certificate import Reach, gap_of
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged, none_within
+from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, none_within
 from laufruhe.solvers.mount_starts import unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
@@ -74,15 +74,9 @@ class _Found:
     result: Result | None
 
     @property
-    def rank(self) -> tuple[bool, float]:
-        """By what breaks limits least, then by what is least."""
-        broken = self.design.excess > KEPT
-        return broken, self.design.excess if broken else self.design.value
-
-    @property
     def value(self) -> float:
         """The objective of a design that is allowed."""
-        return np.inf if self.rank[0] else self.design.value
+        return np.inf if self.design.rank[0] else self.design.value
 
 
 def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Result:
@@ -135,7 +129,7 @@ def _divided(search: _Search, nothing: float, say: Callable[[str], None]) -> tup
                 heapq.heappush(heap, (half.bound, next(number), half))
                 best = search.better(best, half.middle)
         say(f"{seen} boxes of places")
-    return (best, heap[0][0], seen) if heap else (None if best.rank[0] else best, np.inf, seen)
+    return (best, heap[0][0], seen) if heap else (None if best.design.rank[0] else best, np.inf, seen)
 
 
 class _Search:
@@ -162,7 +156,7 @@ class _Search:
     def better(self, best: _Found | None, places: Array) -> _Found:
         """The better of the best design so far and the best with these places."""
         found = self._at(places)
-        return found if best is None or found.rank < best.rank else best
+        return found if best is None or found.design.rank < best.design.rank else best
 
     def halves(self, box: _Box) -> Iterator[_Box | None]:
         """A box cut where what was left out pulls most."""

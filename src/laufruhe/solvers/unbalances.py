@@ -14,7 +14,7 @@ from laufruhe.problem.evaluation import BETWEEN, evaluate
 from laufruhe.problem.nothing import ROUNDING, nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, concluded, judged, none_within
 from laufruhe.solvers.conic import lightest, solve_cones
 from laufruhe.solvers.result import Result
 
@@ -66,10 +66,6 @@ def solve_unbalances(problem: Problem) -> Result:
     # most designs are given with what is open at zero, and that one is known
     initial = evaluate(problem) if any(problem.start) else model.bare
     modelled = time.perf_counter()
-    # what is asked of mounts that stay holds for every design, or for none
-    broken = broken_limits(problem.mount_limits, initial)
-    if broken:
-        return none_within(problem, initial, broken, {"model": modelled - started})
     optimum, samples = _refine(problem, model, nothing_of(problem))
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
@@ -158,14 +154,12 @@ def _hopeless(problem: Problem, optimum: _Optimum) -> tuple[str, ...]:
 
 
 def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
-    """Of designs that no load can tell apart the lightest, without what is negligible; the one given if it is best."""
+    """Of designs that no load can tell apart the lightest, what is negligible in it left out."""
     still = _indistinguishable(problem, affine)
     if still.shape[1]:
         sizes = [sum(abs(drive.gain) for drive in domain.decision.rotor_drives) for domain in affine.domains]
         x = lightest(affine, x, still, sizes)
-    x = _without_negligible(affine, x)
-    better = affine.objective(affine.start) < affine.objective(x) and affine.excess(affine.start) <= FEASIBLE
-    return affine.start if better else x
+    return _without_negligible(affine, x)
 
 
 def _without_negligible(affine: AffineProblem, x: Array) -> Array:

@@ -1,0 +1,25 @@
+"""A seeded share of all combinations of decision, measure and layout; `make matrix` judges every one."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from lanes import first_fast
+from matrix.cells import Cell, cells
+from matrix.claims import judged
+
+SHARE, FAST = 150, 10
+
+
+def _chosen() -> list[Cell]:
+    every = cells()
+    random.Random(2).shuffle(every)
+    return every[:SHARE]
+
+
+@pytest.mark.parametrize("cell", first_fast(_chosen(), FAST), ids=str)
+def test_it_is_refused_in_one_line_or_every_claim_holds(cell: Cell, tmp_path: Path) -> None:
+    assert not judged(cell, tmp_path).broken
