@@ -104,6 +104,30 @@ def test_limits_that_contradict_on_every_star_are_named(tmp_path):
     assert set(result.conflict) == {"static sag", "natural frequencies"}
 
 
+@pytest.mark.slow
+def test_throws_that_fire_unevenly_get_the_firing_order_that_gas_likes_best(tmp_path):
+    """Every order with mounts of its own: none is better, and none lies under the bound."""
+    gas = '[gas]\nmodel = "seiliger"\npeak_pressure = "60 bar"\nimep = "8 bar"\n'
+    wide = '[phasing]\nintervals = { min = "20 deg", max = "700 deg" }\n'
+    engine = changed(ENGINE, ("[[operating_points]]", 'bore = "80 mm"\nfiring_order = "open"\n[[operating_points]]'),
+                     ('"open"', "[0, 100, 190, 300]"), ("cylinders = 4\n", ""))  # fmt: skip
+    engine = engine.partition("[[counterweights]]")[0]
+
+    def found(order):
+        text = changed(engine, ('firing_order = "open"', f"firing_order = {order}"))
+        force = '[objective]\nminimise = "rms mount force"\norders = [0.5, 1.5]\n'
+        return solve(problem_of(tmp_path, text, BLOCK, MOUNTS, gas, force, SEARCH, wide))
+
+    best = found('"open"')
+    values = {}
+    for order in ([1, 4, 2, 3], [1, 3, 2, 4], [1, 3, 4, 2], [1, 2, 4, 3], [1, 4, 3, 2]):
+        values[tuple(order)] = found(order).objective.value
+    assert max(values.values()) > 1.02 * min(values.values())
+    assert best.objective.value == pytest.approx(min(values.values()), rel=1e-4)
+    assert best.certificate.lower_bound <= min(values.values())
+    assert values[best.phasing.ranking[0].firing_orders[0].order] == min(values.values())
+
+
 @pytest.fixture(scope="module")
 def uneven(tmp_path_factory):
     return solve(problem_of(tmp_path_factory.mktemp("uneven"), *parts(), UNEVEN))

@@ -28,7 +28,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
 from laufruhe.solvers.conclusion import no_star, with_star
 from laufruhe.solvers.mount_nonlinear import solve_mounts, solve_moved
-from laufruhe.solvers.ranking import RankedStar, ranked_orders, ranked_star, ranking_result
+from laufruhe.solvers.ranking import RankedStar, ranked_star, ranking_result, told_orders
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.star_answers import MOST_LISTED
 from laufruhe.solvers.star_cuts import search_designs
@@ -74,7 +74,10 @@ def solve_star_mounts(problem: Problem, say: Say = lambda _: None) -> Result:
     if phasing is None:
         raise ValueError("nothing of the phasing is open")
     started = time.perf_counter()
-    stars, designs = _stars(problem, phasing)
+    ranking, count = _stars(problem, phasing)
+    stars = [(replace(star, firing_order=order.order), steps) for star, steps in ranking
+             for order in told_orders(problem, phasing, star, steps)]  # fmt: skip
+    designs = count - len(ranking) + len(stars)
     ranked = time.perf_counter()
     found = _solved_shortly(problem, phasing, stars, say)
     found = _solved_fully(problem, found, say)
@@ -134,18 +137,17 @@ def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts
 
 
 def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star], say: Say) -> list[StarDesign]:
-    """Every star with the best of its firing orders and a quarter of the starts, the best first."""
+    """Every star and firing order with a quarter of the starts, the best first."""
     starts = problem.search.starts
     few = starts if len(stars) == 1 else min(starts, max(SHORTEST_SEARCH, starts // FEWER_STARTS))
-    found = []
-    for k, (star, steps) in enumerate(stars):
+    began, found = time.perf_counter(), list[StarDesign]()
+    for k, (candidate, steps) in enumerate(stars):
+        if found and time.perf_counter() - began > phasing.time_limit:
+            break
         say(f"mounts of star {k + 1} of {len(stars)}")
-        orders = ranked_orders(phasing, star, steps)
-        if orders:
-            # a process of its own costs more than so few starts
-            candidate = replace(star, firing_order=orders[0].order)
-            own = _problem_of(problem, phasing, candidate, few)
-            found.append(StarDesign(candidate, solve_mounts(own, 1 if len(stars) > 1 else None), steps))
+        # a process of its own costs more than so few starts
+        own = _problem_of(problem, phasing, candidate, few)
+        found.append(StarDesign(candidate, solve_mounts(own, 1 if len(stars) > 1 else None), steps))
     return sorted(found, key=_rank)
 
 
@@ -155,7 +157,8 @@ def _solved_fully(problem: Problem, found: list[StarDesign], say: Say) -> list[S
     starts = problem.search.starts
     for k, each in enumerate(found[:MOST_SEARCHED]):
         own = each.result.problem
-        if own.search.starts >= starts:
+        # what is proven to be no better than the best needs no more starts
+        if own.search.starts >= starts or each.bound >= found[0].value * (1.0 - problem.tolerance):
             continue
         say(f"mounts of the best stars, {k + 1} of {min(len(found), MOST_SEARCHED)}")
         more = replace(own, search=replace(own.search, starts=starts))
@@ -225,7 +228,7 @@ def _entry(phasing: Phasing, found: StarDesign, proven: bool) -> RankedStar:
     certificate = found.result.certificate
     bound = certificate.lower_bound if certificate is not None else 0.0
     proven = proven and certificate is not None and certificate.kind is Proof.GLOBAL
-    only = replace(phasing, firing_order=found.candidate.firing_order) if found.moved else phasing
+    only = phasing if found.steps else replace(phasing, firing_order=found.candidate.firing_order)
     return ranked_star(only, found.candidate, found.steps, found.value, bound, proven)
 
 

@@ -14,7 +14,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.solvers.conclusion import no_star, with_star
-from laufruhe.solvers.ranking import ORDERS_LISTED, ranked_orders, ranked_star, ranking_result
+from laufruhe.solvers.ranking import ORDERS_LISTED, ranked_orders, ranked_star, ranking_result, told_orders
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.star_answers import Answer, Decided, searched
 from laufruhe.solvers.star_cuts import owners_of, solve_design
@@ -84,17 +84,20 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
         return no_star(problem, _no_order(phasing, star))
     # the small ones first: a shaft that buys nothing is not built
     sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
-    told = orders if problem.feels_gas and not all(order.is_even for order in orders) else orders[:1]
+    told = told_orders(problem, phasing, star)
     designs = [replace(star, firing_order=o.order, left_out=phasing.without(built)) for built in sets for o in told]
-    solved, complete = _solved(problem, phasing, designs)
+    every, complete = _solved(problem, phasing, designs)
+    solved = [design for design in every if design.is_met]
     if not solved:
-        return no_star(problem, "no firing order and no set of shafts that may be built keeps the limits")
+        proven = complete and all(design.result.status is not Status.FAILED for design in every)
+        why = f"no firing order and no set of shafts that may be built {'keeps' if proven else 'was found that keeps'}"
+        return no_star(problem, f"{why} the limits", Status.INFEASIBLE if proven else Status.FAILED)
     nothing = nothing_of(problem)
     best = solved[0]
     for design in solved[1:]:
         if design.value < best.value - room_of(best.value, _share(problem), nothing):
             best = design
-    bound = min(design.bound for design in solved) if complete else 0.0
+    bound = min(design.bound for design in every) if complete else 0.0
     entry = ranked_star(phasing, best.candidate, None, best.value, bound, complete)
     own = next(order for order in orders if order.order == best.candidate.firing_order)
     rest = tuple(order for order in orders if order != own)
@@ -108,16 +111,14 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
 
 
 def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) -> tuple[list[StarDesign], bool]:
-    """Those designs that keep the limits, and whether time was enough for all."""
+    """Those designs with the rest at its optimum, and whether time was enough for all."""
     started = time.perf_counter()
     found: list[StarDesign] = []
     for candidate in designs:
         if found and time.perf_counter() - started > phasing.time_limit:
             return found, False
         result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem)))
-        design = StarDesign(candidate, result)
-        if math.isfinite(design.value):
-            found.append(design)
+        found.append(StarDesign(candidate, result))
     return found, True
 
 

@@ -13,7 +13,7 @@ from laufruhe.machine import firing
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.turns import as_turn, star_sum
 from laufruhe.problem.phasing import Candidate, OrderCriterion
-from laufruhe.problem.problem import Phasing
+from laufruhe.problem.problem import Phasing, Problem
 
 ORDERS = (1, 2, 4)
 ORDERS_LISTED = 6
@@ -183,6 +183,14 @@ def ranked_orders(
             found.append(_judged(phasing, layout, order, turns, intervals))
     found.sort(key=lambda o: (*(o.by(criterion) for criterion in phasing.criteria), o.order))
     return tuple(found)
+
+
+def told_orders(
+    problem: Problem, phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None = None
+) -> tuple[RankedOrder, ...]:
+    """Those of its firing orders that the loads tell apart: one, unless gas is felt and they are uneven (S8)."""
+    orders = ranked_orders(phasing, candidate, steps)
+    return orders if problem.feels_gas and not all(order.is_even for order in orders) else orders[:1]
 
 
 def _judged(
