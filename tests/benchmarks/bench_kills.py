@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 from pages import PAGES, publish
@@ -36,14 +35,9 @@ def main() -> None:
     """Try as many as asked."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else TRIED
     with tempfile.TemporaryDirectory() as name:
-        folder = kills.prepared(Path(name) / "whole")
-        began = time.monotonic()
-        process = kills.started(folder)
-        said = process.communicate()[1]
-        assert process.returncode == 0, said
-        seconds, told = time.monotonic() - began, kills.Told()
+        whole, told = kills.uninterrupted(Path(name) / "whole"), kills.Told()
         for seed in range(count):
-            kills.attacked(Path(name) / "s", seed, kills.results(folder), seconds, told)
+            kills.attacked(Path(name) / "s", seed, whole, told)
     publish(OUT, page(told, count, 4 * 7 + 12 + 1))
     sys.exit(bool(told.wrong))
 

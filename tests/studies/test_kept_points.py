@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import math
 import random
-import shutil
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
-from laufruhe.studies import Scenes, run
+from laufruhe.studies import run
 from laufruhe.studies.kept import NAME, KeptPoints
 from laufruhe.studies.reader import load_study
 
@@ -120,19 +119,3 @@ def test_a_changed_figure_is_solved_again(tmp_path: Path) -> None:
     for digit in b"123456789":
         path.write_bytes(lines.replace(b'"objective": %c' % digit, b'"objective": 9%c' % digit))
         assert computed().identical(whole)
-
-
-def test_points_hang_on_the_numbers_of_a_computation(tmp_path: Path) -> None:
-    """Two studies that differ in a number which only a computation reads share no point."""
-    shutil.copy(PROBLEMS / "tractor-single.toml", tmp_path)
-    marks = set()
-    for imep in (5.5, 9.0):
-        text = (
-            'title = "t"\n[[study.parts]]\nname = "p"\nkind = "replication"\ntitle = "t"\n'
-            f'numbers = {{ kp = {imep} }}\ncases = [{{ name = "a", problem = "tractor-single.toml", '
-            'computation = "gas trace of a four-cylinder", numbers = { imep = "kp" } }]\n'
-        )
-        (tmp_path / "s.toml").write_text(text, encoding="utf-8")
-        (part,), scenes = load_study(tmp_path / "s.toml").study.parts, Scenes(tmp_path)
-        marks |= {scenes.fingerprint(point, part.settings()) for point in part.points(scenes)}
-    assert len(marks) == 2
