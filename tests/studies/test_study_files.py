@@ -266,3 +266,19 @@ def test_a_table_may_replace_a_number_of_all_parts(tmp_path: Path) -> None:
     for text in (REPLICA.replace("quantities", grid), REPLICA.replace("{ m = 2 }", "{ m = { values = [1, 2] } }")):
         path.write_text(text, encoding="utf-8")
         assert load_study(path).study.parts[0].name == "p"
+
+
+def test_every_bad_expression_is_told_by_its_place(tmp_path: Path) -> None:
+    """One line each: key, what stands there, the rule and the nearest name."""
+    panel = 'picture = { panels = [{ title = "{m:d}", curves = [{ y = "mean[\'givn\'] / m" }] }] }\nquantities'
+    path = tmp_path / "s.toml"
+    path.write_text(REPLICA.replace("quantities", panel).replace("is = 1", 'is = "2 * mm"'), encoding="utf-8")
+    with pytest.raises(InputError) as found:
+        load_study(path)
+    assert [str(one) for one in found.value.complaints] == [
+        "study.parts[1].statements[1].is = \"2 * mm\": 'mm' is no name here; did you mean 'm'?",
+        "study.parts[1].picture.panels[1].title = \"{m:d}\": 'd' is no format of a number; "
+        "write for example .1f, .3g or .0f",
+        "study.parts[1].picture.panels[1].curves[1].y = \"mean['givn'] / m\": 'givn' is no case here; "
+        "did you mean 'given'?",
+    ]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, model_validator
+from pydantic_core import InitErrorDetails
 
 from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
@@ -19,9 +21,10 @@ from laufruhe.studies.picture import Picture
 from laufruhe.studies.replication.drawing import drawn
 from laufruhe.studies.replication.expressions import (
     ExpressionError,
+    Place,
     check,
     check_among,
-    check_table,
+    checks_in,
     filled,
     grid,
     numbers_of,
@@ -54,30 +57,37 @@ class Replication(Part):
     @model_validator(mode="after")
     def _means_something(self) -> Replication:
         """Names, cases, functions and quantities are looked up before anything is computed."""
-        try:
-            self._check()
-        except ModelError as error:
-            raise f.refusal(str(error)) from None
+        wrong = [InitErrorDetails(type=f.refusal(str(e)), loc=at, input=told) for at, told, e in self._wrong()]
+        if wrong:
+            raise ValidationError.from_exception_data("replication", wrong)
         return self
 
-    def _check(self) -> None:
-        for reading in self.readings.values():
-            for name in reading:
-                check_among(name, self.numbers, "number")
-        for name in self.problems:
-            self._check_like(name)
-        for what in self.quantities.values():
-            check_asked(what)
+    def _wrong(self) -> Iterator[tuple[Place, Any, ModelError]]:
+        for at, told, check_it in self._checks():
+            try:
+                check_it(told)
+            except ModelError as error:
+                yield at, told, error
+
+    def _checks(self) -> Iterator[tuple[Place, Any, Callable[[Any], None]]]:
+        """What is looked up: where it stands, it, and how."""
+        for reading, numbers in self.readings.items():
+            for name in numbers:
+                yield ("readings", reading), name, partial(check_among, known=self.numbers, what="number")
+        for name, tables in self.problems.items():
+            yield ("problems", name, "like"), tables.get("like", ""), partial(self._check_like, name)
+        for name, what in self.quantities.items():
+            yield ("quantities", name), what, check_asked
         cases = [case.name for case in self.cases]
         known: dict[str, Sequence[Any]] = dict.fromkeys((*self.numbers, *self.quantities), ())
         for name, text in self.define.items():
-            check(text, known, cases)
+            yield ("define", name), text, partial(check, known=known, cases=cases)
             known[name] = ()
-        check_table(self.statements, {**known, "value": ()}, cases)
+        yield from checks_in(self.statements, {**known, "value": ()}, cases, at=("statements",))
         places = [*DIMENSIONS, *(name for case in self.cases for name in case.sweep)]
-        check_table(self.picture_, known, cases, places)
+        yield from checks_in(self.picture_, known, cases, places, ("picture",))
 
-    def _check_like(self, name: str) -> None:
+    def _check_like(self, name: str, _: str) -> None:
         seen: list[str] = []
         while name in self.problems:
             if name in seen:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import ast
 import operator
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import cache, partial
 from string import Formatter
 from types import CodeType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from pydantic import ValidationError
@@ -24,6 +24,8 @@ from laufruhe.files.fields import Table
 from laufruhe.studies.replication.functions import CONSTANTS, FUNCTIONS
 from laufruhe.studies.replication.models import EXPRESSIONS, CurveTable, GridTable
 
+Place: TypeAlias = tuple[str | int, ...]
+"""Of a text in a file: keys, and numbers in lists from zero."""
 MOST_LETTERS = 2000
 _ARITHMETIC: Mapping[str, Any] = {
     "Add": operator.add, "Sub": operator.sub, "Mult": operator.mul, "Div": operator.truediv, "Mod": operator.mod,
@@ -39,10 +41,10 @@ class ExpressionError(ModelError):
     """An expression that means nothing here; says which, why, and what would."""
 
 
-def check_table(
-    told: Any, known: Mapping[str, Sequence[Any]], cases: Collection[str], places: Sequence[str] = (), key: str = ""
-) -> None:
-    """Whether all expressions in a table of a file could have a value, before any name has one.
+def checks_in(
+    told: Any, known: Mapping[str, Sequence[Any]], cases: Collection[str], places: Sequence[str] = (), at: Place = ()
+) -> Iterator[tuple[Place, Any, Callable[[str], None]]]:
+    """Every text of a table that has expressions: where it stands, it, and the check of it before any name has a value.
 
     Parameters
     ----------
@@ -50,25 +52,26 @@ def check_table(
         Names, and the values that each is repeated for, where it is.
     places
         Dimensions, which the `x` of a curve knows too.
-    key
-        That `told` stands at.
-
-    Raises
-    ------
-    ExpressionError
-        As `check` does.
     """
     if isinstance(told, Table):
         own = {**known, **getattr(told, "each", {})}
-        for field in type(told).model_fields:
-            at_places = dict.fromkeys(places, ()) if isinstance(told, CurveTable) and field == "x" else {}
-            check_table(getattr(told, field), {**at_places, **own}, cases, places, field)
+        for name, field in type(told).model_fields.items():
+            at_places = dict.fromkeys(places, ()) if isinstance(told, CurveTable) and name == "x" else {}
+            where = (*at, field.alias or name)
+            yield from checks_in(getattr(told, name), {**at_places, **own}, cases, places, where)
     elif isinstance(told, list):
-        for one in told:
-            check_table(one, known, cases, places, key)
+        for k, one in enumerate(told):
+            yield from checks_in(one, known, cases, places, (*at, k))
     elif isinstance(told, str):
-        for text in [told] if key in EXPRESSIONS else [field for _, field, _ in _parts(told) if field]:
-            check(text, known, cases)
+        key = next(key for key in reversed(at) if isinstance(key, str))
+        checked = partial(check, known=known, cases=cases)
+        yield at, told, checked if key in EXPRESSIONS else partial(_check_braces, check=checked)
+
+
+def _check_braces(text: str, check: Callable[[str], None]) -> None:
+    for _, field, _ in _parts(text):
+        if field:
+            check(field)
 
 
 def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str]) -> None:
@@ -205,12 +208,13 @@ def filled(text: Any, names: Mapping[str, Any]) -> Any:
 def _parts(text: str) -> Iterator[tuple[str, str, str]]:
     """Plain text, the expression after it, and how its number is written."""
     try:
-        for plain, field, spec, _ in Formatter().parse(text):
-            if spec and not _SPEC.fullmatch(spec):
-                raise ExpressionError(f"'{spec}' is no format of a number; write for example .1f, .3g or .0f")
-            yield plain, field or "", spec or ""
+        parts = list(Formatter().parse(text))
     except ValueError as error:
         raise ExpressionError(f"'{text}' cannot be read ({error}); check its braces") from None
+    for plain, field, spec, _ in parts:
+        if spec and not _SPEC.fullmatch(spec):
+            raise ExpressionError(f"'{spec}' is no format of a number; write for example .1f, .3g or .0f")
+        yield plain, field or "", spec or ""
 
 
 def _shown(value: Any, spec: str) -> str:

@@ -17,7 +17,7 @@ Each: TypeAlias = Annotated[
 ]
 
 
-EXPRESSIONS = frozenset({"x", "y", "ends", "filled", "outline", "value", "expected", "holds"})
+EXPRESSIONS = frozenset({"x", "y", "ends", "filled", "outline", "value", "is", "holds"})
 """Keys that hold expressions; in the texts of other keys they stand in braces."""
 
 
