@@ -139,6 +139,7 @@ _SHOWN = {
     "rad/s": ("rpm", 30.0 / math.pi),
     "m": ("mm", 1e3),
     "N/m": ("N/mm", 1e-3),
+    "Pa": ("N/mm^2", 1e-6),
 }
 
 

@@ -123,9 +123,14 @@ class Scale:
             for rotor in self.problem.engine.rotors
             if rotor.unbalance != 0 or rotor.name in self.open_rotors
         )
-        inside = [s for term in self.terms if term.measure.is_inside for s in signals(term.measure, self.best)]
-        bases = [s.reduced(ratios).base for s in (*(loads.wrench for loads in self.best.loads), *inside)]
+        bases = [signal.reduced(ratios).base for signal in self.driving]
         return int(min(bases) / self.problem.engine.cycle.base_order) if bases else 1
+
+    @property
+    def driving(self) -> list[Spectrum]:
+        """What loads the block, and what is asked of the inside of the crankcase, at every operating point."""
+        inside = [s for term in self.terms if term.measure.is_inside for s in signals(term.measure, self.best)]
+        return [*(loads.wrench for loads in self.best.loads), *inside]
 
     @property
     def open_rotors(self) -> set[str]:

@@ -144,7 +144,7 @@ class _Orders(Knob):
             found.append(LeftOut("loads " + ", ".join(idle), "nothing drives them"))
         last = min(float(fidelity.orders or 8), 12.0)
         orders = [order for order in wrenches[0].orders if 0.0 < order <= last]
-        silent = [f"{order:g}" for order in orders if not any(w.at(order).any() for w in wrenches)]
+        silent = [f"{order:g}" for order in orders if not any(s.at(order).any() for s in scale.driving)]
         if silent:
             found.append(LeftOut("orders " + ", ".join(silent), "the crank star cancels them, or nothing has them"))
         if fidelity.orders is not None:

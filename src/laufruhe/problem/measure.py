@@ -217,13 +217,15 @@ def load_rows(
     """
     blocks, weights = [], []
     for signal, share in zip(signals, measure.shares(points), strict=True):
-        if share == 0.0:
-            continue
         values = selected(measure, signal, engine).sample(samples)
+        # an engine may lack what is named: then it has no load there
+        if share == 0.0 or not values.shape[1]:
+            continue
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
         blocks.append(rows)
-        # a part of an engine may have none of the places
-        weights.append(np.full(len(rows), share / max(len(rows), 1)))
+        weights.append(np.full(len(rows), share / len(rows)))
+    if not blocks:
+        return Rows(measure.norm, np.zeros((1, 1)), Grid(np.ones(1), 1))
     return Rows(measure.norm, np.concatenate(blocks), Grid(np.concatenate(weights), samples))
 
 

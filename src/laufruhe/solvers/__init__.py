@@ -172,7 +172,8 @@ def solve(problem: Problem, say: Say = lambda _: None) -> Result:
         raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
     method = next((m for m in METHODS if kinds <= m.decides and m.suits(problem)), None)
     if method is None:
-        raise ModelError(f"no method decides {_named(kinds)} together, with what is asked here; fix one of them")
+        asked = ", ".join(dict.fromkeys(measure.name for measure in problem.measures))
+        raise ModelError(f"no method decides {_named(kinds)} together for {asked}; fix one of them, or ask for less")
     conflict = _beyond_mounts(problem, kinds) if Kind.MOUNT in method.decides else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})

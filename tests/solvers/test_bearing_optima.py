@@ -1,0 +1,190 @@
+"""Counterweights decided by what main bearings carry: the optimum against searches of its own, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+import laufruhe
+from laufruhe.errors import InputError, ModelError
+from laufruhe.problem.problem import Problem
+from problem_files import MOUNTS, PROBLEMS
+
+THREE = """
+title = "Three with bearings"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+bore = "100 mm"
+stroke = "120 mm"
+rod_ratio = 0.26
+reciprocating_mass = "2 kg"
+rotating_mass = "2.5 kg"
+cylinder_spacing = "125 mm"
+firing_order = [1, 3, 2]
+[[operating_points]]
+speed = "2600 rpm"
+[gas]
+model = "wiebe"
+imep = "6 bar"
+start = "-8 deg"
+duration = "60 deg"
+""" + "".join(f'[[main_bearings]]\nx = "{x} mm"\ndiameter = "70 mm"\nwidth = "30 mm"\n' for x in (190, 62, -62, -190))
+
+
+def web(throw: int, open_: bool = True) -> str:
+    """A counterweight opposite a throw, beside its middle."""
+    mass = '{ between = ["0 kg", "4 kg"] }' if open_ else '"0 kg"'
+    x = {1: 150, 2: 20, 3: -140}[throw]
+    return (f'[[counterweights]]\nname = "web {throw}"\nx = "{x} mm"\nopposite_throw = {throw}\nradius = "80 mm"\n'
+            f"mass = {mass}\n")  # fmt: skip
+
+
+def asked(quantity: str, narrowed: str = "") -> str:
+    return f'[objective]\nminimise = "{quantity}"\n{narrowed}\n'
+
+
+def limited(quantity: str, most: str) -> str:
+    return f'[[constraints]]\nlimit = "{quantity}"\nmax = "{most}"\n'
+
+
+WEBS = web(1) + web(2) + web(3)
+
+
+def read(tmp_path: Path, text: str) -> Problem:
+    path = tmp_path / "three.toml"
+    path.write_text(text, encoding="utf-8")
+    return laufruhe.load(path)
+
+
+def bearings_by_hand(problem: Problem, masses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Force on each bearing over the cycle: the bare crank, and each weight by the lever rule, shape (720, 4, 2)."""
+    bare = problem.design([0.0] * len(masses))
+    given = laufruhe.evaluate(bare, problem.points).final.loads[0]
+    force = laufruhe.problem.channels.MAIN_BEARING_FORCE.signal(given).sample(720)[..., 1:]
+    angles = 4.0 * np.pi * np.arange(720) / 720
+    speed, x = problem.points[0].speed, [bearing.x for bearing in problem.engine.bearings]
+    for mass, rotor in zip(masses, problem.engine.rotors[-len(masses) :], strict=True):
+        throw = {150: 1, 20: 2, -140: 3}[round(1e3 * rotor.x)]
+        at = problem.engine.slider_cranks[throw - 1].throw + np.pi
+        pull = mass * 0.080 * speed**2 * np.stack([np.sin(angles + at), np.cos(angles + at)], axis=1)
+        k = next(j for j in range(3) if x[j] >= rotor.x >= x[j + 1])
+        far = (x[k] - rotor.x) / (x[k] - x[k + 1])
+        force[:, k] += (1.0 - far) * pull
+        force[:, k + 1] += far * pull
+    return force
+
+
+NORMS = {
+    "mean": lambda rows: np.linalg.norm(rows, axis=-1).mean(),
+    "maximum": lambda rows: np.linalg.norm(rows, axis=-1).max(),
+    "rms": lambda rows: np.sqrt((rows**2).sum(axis=-1).mean()),
+}
+
+
+@pytest.mark.parametrize("norm", NORMS)
+def test_no_search_finds_less(tmp_path: Path, norm: str) -> None:
+    problem = read(tmp_path, THREE + WEBS + asked(f"{norm} main-bearing force") + limited("counterweight mass", "4 kg"))
+    result = laufruhe.solve(problem)
+    assert result.status == "optimal"
+    assert result.certificate is not None
+    value = NORMS[norm]
+    masses = np.array([d.value for d in result.decisions])
+    # a largest value is sought between these angles as well
+    assert result.objective.value == pytest.approx(value(bearings_by_hand(problem, masses)), rel=2e-4)
+    rng = np.random.default_rng(3)
+    for _ in range(4):
+        start = rng.dirichlet([1.0, 1.0, 1.0, 1.0])[:3] * 4.0
+        found = minimize(
+            lambda m: value(bearings_by_hand(problem, m)), start, method="SLSQP", bounds=[(0.0, 4.0)] * 3,
+            constraints={"type": "ineq", "fun": lambda m: 4.0 - m.sum()},
+        )  # fmt: skip
+        assert found.fun > result.certificate.lower_bound * (1.0 - 2e-4)
+        assert found.fun > result.objective.value * (1.0 - 3e-4)
+    assert result.objective.value < 0.97 * result.objective.initial
+
+
+def test_price_of_mass_is_what_more_of_it_brings(tmp_path: Path) -> None:
+    def solved(most: float) -> laufruhe.Result:
+        text = THREE + WEBS + asked("mean main-bearing force") + limited("counterweight mass", f"{most} kg")
+        return laufruhe.solve(read(tmp_path, text + "\n"))
+
+    low, middle, high = (solved(most) for most in (3.9, 4.0, 4.1))
+    slope = (low.objective.value - high.objective.value) / 0.2
+    assert slope > 100.0
+    assert middle.limits[0].shadow_price == pytest.approx(slope, rel=0.02)
+
+
+def test_more_freedom_is_never_worse(tmp_path: Path) -> None:
+    values = []
+    for text in (web(1) + web(2, open_=False) + web(3, open_=False), web(1) + web(2) + web(3, open_=False), WEBS):
+        values.append(
+            laufruhe.solve(read(tmp_path, THREE + text + asked("maximum main-bearing force"))).objective.value
+        )
+    assert values[0] >= values[1] * (1.0 - 1e-4)
+    assert values[1] >= values[2] * (1.0 - 1e-4)
+
+
+def test_mounts_and_bearings_limit_each_other(tmp_path: Path) -> None:
+    """Least bearing force under a mount force, and least mount force under that bearing force, are one design's."""
+    first = laufruhe.solve(
+        read(tmp_path, THREE + MOUNTS + WEBS + asked("mean main-bearing force") + limited("mean mount force", "600 N"))
+    )
+    most = first.objective.value
+    text = THREE + MOUNTS + WEBS + asked("mean mount force") + limited("mean main-bearing force", f"{most} N")
+    second = laufruhe.solve(read(tmp_path, text))
+    assert first.limits[0].active
+    assert second.objective.value == pytest.approx(first.limits[0].value, rel=3e-4)
+
+
+def test_pressure_is_force_over_area(tmp_path: Path) -> None:
+    force, pressure = (
+        laufruhe.solve(read(tmp_path, THREE + WEBS + asked(f"maximum main-bearing {what}"))).objective.value
+        for what in ("force", "pressure")
+    )
+    assert pressure == pytest.approx(force / (0.070 * 0.030), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        (("firing_order = [1, 3, 2]", 'throws = "open"\ncylinders = 3'), "no method decides .* star"),
+        (('x = "150 mm"', 'x = { between = ["100 mm", "150 mm"] }'), "no method decides .* place"),
+    ],
+)  # fmt: skip
+def test_what_is_not_decided_together_is_refused(tmp_path: Path, change: tuple[str, str], line: str) -> None:
+    text = (THREE + WEBS + asked("mean main-bearing force")).replace(*change)
+    with pytest.raises(ModelError, match=line):
+        laufruhe.solve(read(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        (('x = "62 mm"', 'x = "175 mm"'), r"main_bearings\[2\].x = \"175 mm\": lets its journal overlap"),
+        (('x = "62 mm"', 'x = "0 mm"'), "is the place of a crank pin"),
+        (('x = "62 mm"', 'shaft = "left"\nx = "62 mm"'), "is no shaft with cranks"),
+        (('x = "62 mm"', 'name = "1"\nx = "62 mm"'), "is the name of another bearing"),
+        (('mean main-bearing force"', 'mean main-bearing force"\nbearings = ["7"]'), "is no main bearing here"),
+        (('mean main-bearing force"', 'mean main-bearing force"\nmounts = ["a"]'), "means nothing for a main-b"),
+        (('"mean main-bearing force"', '"mean shaking force"\nbearings = ["1"]'), "means nothing for a shaking force"),
+    ],
+)  # fmt: skip
+def test_one_line_for_what_is_wrong(tmp_path: Path, change: tuple[str, str], line: str) -> None:
+    text = (THREE + WEBS + asked("mean main-bearing force")).replace(*change)
+    with pytest.raises(InputError, match=line):
+        read(tmp_path, text)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["tractor-four-bearings", "tractor-three-bearings"])
+def test_ready_problems_are_proven(name: str) -> None:
+    result = laufruhe.solve(laufruhe.load(PROBLEMS / f"{name}.toml"))
+    assert result.status == "optimal"
+    assert result.certificate is not None
+    assert result.certificate.kind == "global"
+    assert result.objective.value < 0.55 * result.objective.initial
