@@ -193,17 +193,17 @@ def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Mea
 
 
 def limits_of(tables: Sequence[ConstraintTable], scene: Scene) -> tuple[Limit, ...]:
-    """What is forbidden, limits of loads and masses before those of the mounts."""
+    """What is forbidden, limits of loads and masses before those of numbers."""
     found = [_limit(table, f"constraints[{k + 1}]", scene) for k, table in enumerate(tables)]
-    found.sort(key=lambda limit: limit.measure.is_mounting)
-    _check_together([limit for limit in found if limit.measure.is_mounting])
+    found.sort(key=lambda limit: limit.measure.channel.is_number)
+    _check_together([limit for limit in found if limit.measure.channel.is_number])
     return tuple(found)
 
 
 def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
     measure = scene.measure(table.limit, table, f"{where}.limit")
     sides, channel = measure.channel.sides, measure.channel
-    norm, remedy = not channel.is_mounting, "give " + " or ".join(sides)
+    norm, remedy = not channel.is_number, "give " + " or ".join(sides)
     for key in _SIDES:
         if getattr(table, key) is not None and key not in sides:
             rule = f"{channel}, which has a largest value only" if norm else table.limit
@@ -222,7 +222,7 @@ def _side(text: str | None, measure: Measure, where: str) -> float | None:
         return None
     value = measured(text, measure.unit, where)
     if value < 0.0:
-        rule = "is negative" if measure.is_mounting else "is negative, and no norm is"
+        rule = "is negative" if measure.channel.is_number else "is negative, and no norm is"
         raise Refused(where, text, rule, "give a value of zero or more")
     return value
 

@@ -101,6 +101,7 @@ class Channel:
     size: float = 0.0
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
+    is_number: ClassVar[bool] = False
     is_mounting: ClassVar[bool] = False
 
     def __str__(self) -> str:
@@ -142,7 +143,7 @@ class LoadChannel(Channel):
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Mounts move what they transmit, and nothing of what the block feels."""
-        return bool(set(kinds) - OF_MOUNTS) if self.part is not None else bool(kinds)
+        return bool(kinds if self.part is None and not self.is_inside else set(kinds) - OF_MOUNTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,19 +160,30 @@ class MassChannel(Channel):
 
 
 @dataclass(frozen=True, eq=False)
-class MountChannel(Channel):
-    """A block on its mounts.
+class NumberChannel(Channel):
+    """Numbers of a design, and no signal.
 
     Attributes
     ----------
     values
-        Numbers of a design; the first is the one that is shown, all of them keep a limit.
+        The first is the one that is shown, all of them keep a limit.
+    """
+
+    values: Callable[[Asked, Answered], Sequence[float]] = field(kw_only=True)
+    is_number: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, eq=False)
+class MountChannel(NumberChannel):
+    """A block on its mounts.
+
+    Attributes
+    ----------
     of_loads
-        Whether they depend on what excites the block.
+        Whether its numbers depend on what excites the block.
     """
 
     needs: Needs = Needs.ELASTIC
-    values: Callable[[Asked, Answered], Sequence[float]] = field(kw_only=True)
     of_loads: bool = False
     is_mounting: ClassVar[bool] = True
 

@@ -19,7 +19,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.problem.channels import MOUNT_FORCE, LoadChannel, MountChannel
+from laufruhe.problem.channels import MOUNT_FORCE, LoadChannel, NumberChannel
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
@@ -77,7 +77,7 @@ class Evaluation:
 
     def values(self, measure: Measure) -> Sequence[float]:
         """All numbers that a measure has of this design [SI]; the first one is its value."""
-        if isinstance(measure.channel, MountChannel):
+        if isinstance(measure.channel, NumberChannel):
             return measure.channel.values(measure, self)
         finer = 1 if measure.is_mass else measure.norm.refinement
         with np.errstate(invalid="ignore" if self.resonance else "warn"):

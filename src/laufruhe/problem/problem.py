@@ -133,7 +133,7 @@ class Problem:
     @property
     def load_limits(self) -> tuple[Limit, ...]:
         """Limits on norms of loads and masses."""
-        return tuple(limit for limit in self.limits if not limit.measure.is_mounting)
+        return tuple(limit for limit in self.limits if not limit.measure.channel.is_number)
 
     @property
     def mount_limits(self) -> tuple[Limit, ...]:
