@@ -92,7 +92,7 @@ def test_economics_by_its_command(tmp_path: Path) -> None:
     path, out = written(tmp_path, ECONOMICS, "study"), tmp_path / "out"
     answer = CliRunner().invoke(app, ["study", str(path), "--out", str(out), "--json", str(tmp_path / "s.json")])
     assert answer.exit_code == 0, answer.output
-    assert {file.name for file in out.iterdir()} == {"report.md", "three.nc", "three.csv", "three.png"}
+    assert {file.name for file in out.glob("[!.]*")} == {"report.md", "three.nc", "three.csv", "three.png"}
     data = xr.open_dataset(out / "three.nc")
     assert data["standing"].values.tolist() == ["plain", "with shafts", "more cylinders"]
     assert data["cylinders"].values.tolist() == [3, 3, 5]
@@ -134,6 +134,7 @@ def test_free_forces_count_what_agrees(tmp_path: Path) -> None:
     draw(KINDS["free forces"].picture(data))
 
 
+MINIMISED = '"objective.minimise"'
 BAD_ECONOMICS = [
     ('shafts = ["shaft"]', "shafts = []", "name its shafts"),
     ('shafts = ["shaft"]', 'shafts = ["shaft", "shaft"]', "names a shaft twice"),
@@ -158,6 +159,9 @@ BAD_ECONOMICS = [
     ('shafts.toml"', 'shafts.toml"\nequal_power_to = 4', "leave equal_power_to out"),
     ('name = "first order"\n', 'name = "first order"\ncase = "four"\n', "on case 'four'; use one of: three cylinders"),
     ('kind = "economics"', 'kind = "economy"', "is not allowed"),
+    ("tractor-three-shafts.toml", "study-soft-mounts.toml", "is missing"),
+    ('shafts.toml"', f'shafts.toml"\nset = {{ {MINIMISED} = "balancer mass" }}', "is balancer mass, which is no load"),
+    ('shafts.toml"', f'shafts.toml"\nset = {{ {MINIMISED} = "maximum mount force" }}', "objective: differs between"),
 ]
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,8 @@ from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.files.study_parts import CaseTable
 from laufruhe.files.study_paths import changed
+from laufruhe.machine import Role
+from laufruhe.problem.decision import without_rotors
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
 
@@ -82,7 +84,7 @@ class Scenes:
         return InputError(str(self.folder / case.problem), (Complaint(where, "", rule, remedy),))
 
     def problem(self, point: Point) -> Problem:
-        """The problem of a point at the power that its case asks for, with all of its shafts.
+        """The problem of a point, with its shafts, at the power that its case asks for.
 
         Raises
         ------
@@ -90,11 +92,19 @@ class Scenes:
             If the problem file is bad, has no such quantity, or what is made of it is bad.
         """
         problem = load_tables(self.tables(point), self.folder / point.case.problem)
+        if point.shafts is not None:
+            problem = with_shafts(problem, point.shafts)
         reference = point.case.equal_power_to
         if reference is None:
             return problem
         with self.blamed(point, "equal_power_to"):
             return at_equal_power(problem, reference)
+
+    def refuse_open_phasing(self, problem: Problem, case: CaseTable) -> None:
+        """Of sets of shafts: an open star has a choice of its own (`InputError`)."""
+        if problem.phasing is not None:
+            rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
+            raise self.refused(case, "phasing", rule, remedy)
 
     @contextmanager
     def named(self, case: CaseTable) -> Iterator[None]:
@@ -125,3 +135,19 @@ class Scenes:
             trace = (self.folder / point.case.problem).parent / named
             found.update(trace.read_bytes() if trace.is_file() else b"")
         return found.hexdigest()[:32]
+
+
+def shafts_of(problem: Problem) -> tuple[str, ...]:
+    """Names of the balancer shafts, in the order of the engine."""
+    return tuple(dict.fromkeys(r.shaft.name for r in problem.engine.rotors if r.role is Role.BALANCER))
+
+
+def with_shafts(problem: Problem, kept: Sequence[str]) -> Problem:
+    """The problem without the balancer shafts that are not named."""
+    unknown = set(kept) - set(shafts_of(problem))
+    if unknown:
+        raise ModelError(f"'{min(unknown)}' is no balancer shaft of this engine; name one that is")
+    rotors = tuple(r for r in problem.engine.rotors if r.role is not Role.BALANCER or r.shaft.name in kept)
+    gone = {rotor.name for rotor in problem.engine.rotors} - {rotor.name for rotor in rotors}
+    decisions = without_rotors(problem.decisions, gone)
+    return replace(problem, engine=replace(problem.engine, rotors=rotors), decisions=decisions)

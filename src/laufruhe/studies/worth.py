@@ -1,4 +1,7 @@
-"""Which shafts are worth building: the rules, argued once, and what a source says held against them.
+"""Which shafts are worth building: fronts, the rules, argued once, and what a source says held against them.
+
+Every point of a front is a whole solve: a mass limit costs no more than an unlimited design, each comes
+with its own certificate on the exact model, and the price of the limit says what the next kilogram is worth.
 
 The economics are the study's own (Hasselgruber 1964, Massenausgleich): shafts are justified
 by comparison with the engine of one more cylinder, and by what they change at the mounts.
@@ -17,19 +20,67 @@ verdict, but where a share is closer to its threshold than the gap of the proof.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import get_args
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import xarray as xr
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import SolverError
+from laufruhe.numerics.norms import NORMS
 from laufruhe.present.numbers import percent
-from laufruhe.studies.economics import Judgement, Standing
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers import solve
+from laufruhe.studies.scenes import shafts_of
 from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 
-JUDGEMENTS: tuple[Judgement, ...] = get_args(Judgement)
+MASS_ON_SHAFTS = Measure(channels.BALANCER_MASS, NORMS["mean"])
+LIMIT_NAME = "mass on shafts"
+PLAIN, SHAFTS, NEXT = "plain", "with shafts", "more cylinders"
+"""What an engine is in a comparison; the one without any of the shafts has that name too."""
+Judgement: TypeAlias = Literal["negligible", "noticeable", "better", "worth building", "not worth building"]
 _ALLOWED = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted rod ratio and gas trace move it by"
+
+
+class FrontPoint(NamedTuple):
+    """The least objective under a limit on the mass of the shafts, what no design within it falls below, and the gap.
+
+    Mass used on the shafts [kg], and the fall of the objective per kilogram more [SI / kg]; that is zero where the
+    limit does not bind, and at no mass at all, where the solver's price has nothing to vary.
+    """
+
+    force: float
+    lower_bound: float
+    gap: float
+    mass: float
+    price: float
+
+
+def best(problem: Problem, mass_limit: float = math.inf) -> FrontPoint:
+    """The proven optimum under a limit on the mass of the balancer shafts [kg]; `SolverError` where there is none."""
+    asked = shafts_of(problem) and math.isfinite(mass_limit)
+    limits = (*problem.limits, Limit(LIMIT_NAME, MASS_ON_SHAFTS, mass_limit)) if asked else problem.limits
+    result = solve(replace(problem, limits=limits))
+    if result.objective is None or result.status not in ("optimal", "feasible"):
+        within = f" with {mass_limit:g} kg on the shafts" if asked else ""
+        raise SolverError(f"'{problem.name}' has no design{within}: {result.message or result.status}")
+    value, proof = result.objective.value, result.certificate
+    mass = result.final.value(MASS_ON_SHAFTS) if shafts_of(problem) else 0.0
+    price = next((limit.shadow_price for limit in result.limits if limit.name == LIMIT_NAME), 0.0)
+    return FrontPoint(value, proof.lower_bound if proof else value, proof.gap if proof else 0.0, mass, price)
+
+
+def front(problem: Problem, mass_limits: Sequence[float]) -> list[FrontPoint]:
+    """Least objective under each limit on the mass of the shafts [kg], and last whatever they weigh.
+
+    A limit that the free optimum keeps changes nothing, so it is not solved for.
+    """
+    free = best(problem)
+    return [*(free if limit >= free.mass else best(problem, limit) for limit in mass_limits), free]
 
 
 @dataclass(frozen=True)
@@ -50,13 +101,13 @@ class Worth:
 
 def worths(data: xr.Dataset) -> tuple[Worth, ...]:
     """Every set of shafts of an economics dataset, judged by W3."""
-    return tuple(_worth(data, str(name)) for name in _named(data, Standing.SHAFTS) if _shafts(data, str(name)))
+    return tuple(_worth(data, name) for name in _named(data, SHAFTS) if _shafts(data, name))
 
 
 def _worth(data: xr.Dataset, build: str) -> Worth:
-    own, plain = _optimum(data, build), _optimum(data, _named(data, Standing.PLAIN)[0])
+    own, plain = _optimum(data, build), _optimum(data, _named(data, PLAIN)[0])
     fewer = min(_optimum(data, rival) for rival in _fewer(data, build))
-    following = _named(data, Standing.NEXT)[0]
+    following = _named(data, NEXT)[0]
     further, beside = 1.0 - own / fewer, own / _optimum(data, following)
     if further < 0.0:
         why = f"fewer shafts do better: {percent(-further)} beside the best of them"
@@ -109,15 +160,12 @@ def _judged(data: xr.Dataset, build: str, against: str, says: str) -> tuple[bool
 
 def _fewer(data: xr.Dataset, build: str) -> list[str]:
     """Builds of the same engine with fewer shafts."""
-    same = data["standing"].values != Standing.NEXT
+    same = data["standing"].values != NEXT
     return [str(b) for b in data["build"].values[same & (data["shafts"].values < _shafts(data, build))]]
 
 
-def _named(data: xr.Dataset, standing: Standing) -> list[str]:
-    found = [str(b) for b in data["build"].values[data["standing"].values == standing]]
-    if not found:
-        raise ModelError(f"a comparison of shafts needs an engine that is {standing}; name one")
-    return found
+def _named(data: xr.Dataset, standing: str) -> list[str]:
+    return [str(build) for build in data["build"].values[data["standing"].values == standing]]
 
 
 def _shafts(data: xr.Dataset, build: str) -> int:

@@ -16,8 +16,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.studies.outcome import solved
 from laufruhe.studies.part import Record
 from laufruhe.studies.picture import Picture
-from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.shafts import refuse_open_phasing, shafts_of, with_shafts
+from laufruhe.studies.scenes import Point, Scenes, shafts_of
 from laufruhe.studies.swept import SweptPart
 from laufruhe.studies.swept_shown import bars, by_point, over_sweep, swept_names
 from laufruhe.studies.text import Text
@@ -52,7 +51,7 @@ class BalancerSizing(SweptPart):
             groups = shaft_groups(problem)
             if not groups:
                 raise scenes.refused(case, "balancer_shafts", "is missing, so there is nothing to size", "add a shaft")
-            refuse_open_phasing(problem, case, scenes)
+            scenes.refuse_open_phasing(problem, case)
             if len(groups) > MOST_GROUPS:
                 rule = f"makes {len(groups)} independent shafts, {2 ** len(groups)} sets of them"
                 raise scenes.refused(case, "balancer_shafts", rule, f"study {MOST_GROUPS} or fewer")
@@ -68,7 +67,7 @@ class BalancerSizing(SweptPart):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The proven optimum of one set of shafts."""
         with scenes.blamed(point):
-            return solved(_counting(with_shafts(scenes.problem(point), point.shafts or ())))
+            return solved(_counting(scenes.problem(point)))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """As of every sweep, with the shafts of every point."""

@@ -1,12 +1,10 @@
-"""Which shafts are worth building: fronts of mass against force, and engines with more cylinders at equal power."""
+"""Least force against number and mass of shafts, beside engines with more cylinders at equal power (eqs. 14-23)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from itertools import pairwise
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -20,16 +18,51 @@ from laufruhe.files.study_parts import CaseTable
 from laufruhe.present.numbers import percent
 from laufruhe.problem.problem import Problem
 from laufruhe.studies import picture as p
-from laufruhe.studies.economics import PLAIN, Claim, Front, FrontPoint, Standing, compared, front
 from laufruhe.studies.equal_power import check_comparable
-from laufruhe.studies.part import Part, Record
-from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.shafts import refuse_open_phasing, shafts_of, with_shafts
+from laufruhe.studies.part import Part, Record, variable
+from laufruhe.studies.scenes import Point, Scenes, shafts_of
 from laufruhe.studies.text import NOTHING, Rows, Text, number, said
-from laufruhe.studies.worth import verdicts, worths
+from laufruhe.studies.worth import NEXT, PLAIN, SHAFTS, FrontPoint, Judgement, front, verdicts, worths
 
+SAME = 1e-4
+"""Relative difference of forces below which proofs cannot tell designs apart."""
 LINE = 0.052
 """Height of a line of text over that of its panel."""
+
+
+_AT_LIMITS = {
+    "force": ("least objective", "{}"),
+    "lower_bound": ("what no design falls below", "{}"),
+    "gap": ("relative gap of the proof", "1"),
+    "mass": ("mass on the shafts", "kg"),
+    "price": ("fall of the least objective per kilogram more", "{} / kg"),
+}
+_FREE = {
+    "optimum": ("force", "least objective whatever the shafts weigh", "{}"),
+    "optimum_bound": ("lower_bound", "what no design falls below, whatever the shafts weigh", "{}"),
+    "optimum_mass": ("mass", "mass on the shafts at the least objective", "kg"),
+}
+
+
+class Claim(Table):
+    """What a source says of a set of shafts; it is confirmed or not."""
+
+    says: Judgement | None = None
+    falls_by: Annotated[float, Field(gt=0.0, lt=1.0)] | None = Field(
+        default=None, description="Share by which the force is said to fall."
+    )
+    against: Name = Field(default=PLAIN, description="Build that it is compared with.")
+    where: str = Field(default="", description="Figure or passage.")
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Claim:
+        if self.says is None and self.falls_by is None:
+            raise f.refusal("claims nothing; give says, falls_by, or both")
+        return self
+
+
+NO_CLAIM = Claim.model_construct()
+_SERIES: tuple[p.Colour, ...] = ("blue", "vermilion", "green", "purple", "orange", "sky")
 
 
 class BuildTable(Table):
@@ -66,7 +99,7 @@ class Economics(Part):
     def _ascend(cls, limits: list[float]) -> list[float]:
         if len(limits) < 2:
             raise f.refusal("is no front; give two masses or more")
-        if any(b <= a for a, b in pairwise(limits)):
+        if sorted(set(limits)) != limits:
             raise f.refusal("must ascend; order the masses and name each once")
         return limits
 
@@ -115,19 +148,41 @@ class Economics(Part):
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The front of one engine."""
+        problem = scenes.problem(point)
         with scenes.blamed(point):
             try:
-                return asdict(front(with_shafts(scenes.problem(point), point.shafts or ()), self.mass_limits))
+                points = front(problem, self.mass_limits)
             except SolverError as error:
                 raise ModelError(f"{error}; leave more to its decisions, or name larger mass limits") from None
+        of = {"objective": problem.objective_name, "unit": problem.objective_unit or ""}
+        return {**of, "shafts": len(shafts_of(problem)), "cylinders": len(problem.engine.cylinders), "points": points}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
-        """Fronts side by side."""
+        """Fronts side by side, the plain engine first, with what is claimed of each."""
         following = [case.name for case in self.more_cylinders]
         names = [PLAIN, *(build.name for build in self.builds), *following]
-        fronts = {name: _front(record) for name, record in zip(names, records, strict=True)}
-        claims = {build.name: build.claim for build in self.builds if build.claim is not None}
-        return compared(fronts, claims, following).assign_attrs(self.about())
+        claims = [NO_CLAIM, *(build.claim or NO_CLAIM for build in self.builds), *(NO_CLAIM for _ in following)]
+        fronts, unit = np.array([record["points"] for record in records], dtype=float), records[0]["unit"]
+        fields = FrontPoint._fields
+        values = {
+            name: variable(("build", "mass_limit"), fronts[:, :-1, fields.index(name)], words, per.format(unit))
+            for name, (words, per) in _AT_LIMITS.items()
+        }
+        for name, (of, words, per) in _FREE.items():
+            values[name] = variable("build", fronts[:, -1, fields.index(of)], words, per.format(unit))
+        coords = {
+            "build": names,
+            "mass_limit": variable("mass_limit", self.mass_limits, "mass allowed on shafts", "kg"),
+            "shafts": variable("build", [record["shafts"] for record in records], "balancer shafts"),
+            "cylinders": ("build", [record["cylinders"] for record in records], {"units": "1"}),
+            "standing": ("build", [PLAIN, *(SHAFTS for _ in self.builds), *(NEXT for _ in following)]),
+            "claim": ("build", [claim.says or "" for claim in claims], {"long_name": "what the source says"}),
+            "claimed_fall": ("build", [claim.falls_by or np.nan for claim in claims], {"units": "1"}),
+            "claimed_against": ("build", [claim.against for claim in claims]),
+            "claimed_where": ("build", [claim.where for claim in claims]),
+        }
+        data = xr.Dataset(values, coords, self.about(objective=records[0]["objective"]))
+        return data.assign(efficient=_efficient(data))
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
@@ -140,7 +195,7 @@ class Economics(Part):
         for name in data["build"].values:
             row = data.sel(build=name)
             force, worth = float(row["optimum"]), judged.get(str(name))
-            label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == Standing.NEXT else str(name)
+            label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == NEXT else str(name)
             cells = [label, str(int(row["shafts"])), f"{float(row['optimum_mass']):.2f}", number(force)]
             change = NOTHING if force == plain else percent(force / plain - 1.0)
             cells += [number(float(row["optimum_bound"]), 6), change]
@@ -172,9 +227,6 @@ class Economics(Part):
         return p.Picture(data.attrs["title"], words, [fronts, table], credit, (5.4, 4.4), 2, 0.25, legend=legend)
 
 
-_SERIES: tuple[p.Colour, ...] = ("blue", "vermilion", "green", "purple", "orange", "sky")
-
-
 def _rebuilt(case: CaseTable, whole: Problem, scenes: Scenes) -> Point:
     """An engine with more cylinders, at the power of the whole one."""
     given = scenes.problem(Point(case))
@@ -194,9 +246,9 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
     asked: dict[str, Point] = {}
     for point in points:
         problem = scenes.problem(point)
-        refuse_open_phasing(problem, point.case, scenes)
-        objective = tuple(problem.load_terms)
-        if not objective:
+        scenes.refuse_open_phasing(problem, point.case)
+        objective = problem.load_terms
+        if not objective or any(term.measure.is_mass for term in objective):
             rule = f"is {problem.objective_name}, which is no load" if problem.objective_name else "is missing"
             remedy = "minimise a load, such as mean mount force"
             raise scenes.refused(point.case, "objective", f"{rule}, so shafts have nothing to lower", remedy)
@@ -207,9 +259,17 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
         raise scenes.refused(second.case, "objective", rule, "give all engines the same")
 
 
-def _front(record: Mapping[str, Any]) -> Front:
-    points = tuple(FrontPoint(**point) for point in record["points"])
-    return Front(**{**record, "points": points, "optimum": FrontPoint(**record["optimum"])})
+def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str, str]]:
+    """Points of the front over all builds: none has less force for no more shafts and no more mass."""
+    force, shafts = data["force"].values, data["shafts"].values
+    same = data["standing"].values != NEXT
+    on_front = np.zeros(force.shape, dtype=bool)
+    for b in np.flatnonzero(same):
+        rivals, fewer = force[same & (shafts <= shafts[b])], force[same & (shafts < shafts[b])]
+        for k in range(force.shape[1]):
+            beaten = min(rivals[:, :k].min(initial=np.inf), fewer[:, k].min(initial=np.inf))
+            on_front[b, k] = force[b, k] <= rivals[:, k].min() and force[b, k] < (1.0 - SAME) * beaten
+    return ("build", "mass_limit"), on_front, {"long_name": "whether no other design is better in every respect"}
 
 
 def _with_shafts(data: xr.Dataset) -> list[str]:
@@ -220,11 +280,9 @@ def _front_rows(data: xr.Dataset) -> list[Text]:
     """Least force by mass allowed, efficient points in bold."""
     built = _with_shafts(data)
     rows = []
-    for limit in data["mass_limit"].values:
-        here = data.sel(mass_limit=limit)
-        cells = [f"{float(here['force'].sel(build=b)):.1f}" for b in built]
-        best = [bool(here["efficient"].sel(build=b)) for b in built]
-        rows.append([f"{limit:g}", *(f"**{c}**" if b else c for c, b in zip(cells, best, strict=True))])
+    for limit, here in data.sel(build=built).groupby("mass_limit"):
+        best = zip(here["force"].values.ravel(), here["efficient"].values.ravel(), strict=True)
+        rows.append([f"{limit:g}", *(f"**{force:.1f}**" if efficient else f"{force:.1f}" for force, efficient in best)])
     words = f"Least {data.attrs['objective']} [{data['force'].attrs['units']}] by mass allowed on the shafts, every "
     words += f"number proven to {100.0 * float(data['gap'].max()):.1g} %; bold: nothing else has less force, mass and "
     return [words + "shafts.", Rows(["mass [kg]", *built], rows)]
@@ -250,12 +308,11 @@ def _lines(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:
 def _levels(data: xr.Dataset, right: float, high: float) -> list[p.Mark]:
     """Engines without shafts: grey, and dashed where they have more cylinders."""
     dashes = iter(p.DASHES * 4)
-    top = math.inf
-    marks: list[p.Mark] = []
+    top, marks = math.inf, list[p.Mark]()
     bare = data.isel(build=np.flatnonzero(data["shafts"].values == 0)).sortby("optimum", ascending=False)
     for name in bare["build"].values:
         force = float(bare["optimum"].sel(build=name))
-        more = str(bare["standing"].sel(build=name).item()) == Standing.NEXT
+        more = str(bare["standing"].sel(build=name).item()) == NEXT
         dash, colour = (next(dashes), "ink") if more else ((), "before")
         marks.append(p.Line([0.0, right], [force, force], colour, dash=dash, width=1.2, behind=True))
         # names of levels close together stand one under the other
@@ -280,8 +337,7 @@ def _told(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:
         marks.append(p.Line([0.0, 0.05], [y - 0.012] * 2, colours[worth.build], width=2.5))
         write(f"{worth.build}, {shafts} shaft{'s' if shafts > 1 else ''}", bold=True)
         y -= LINE
-        mass = float(row["optimum_mass"])
-        write(f"{float(row['optimum']):.0f} {unit} ({percent(-worth.fall)}) with {mass:.2f} kg")
+        write(f"{float(row['optimum']):.0f} {unit} ({percent(-worth.fall)}) with {float(row['optimum_mass']):.2f} kg")
         y -= LINE
         write(f"{'worth building' if worth.worth else 'not worth building'}: {worth.why}", "faint")
         for verdict in claims.get(worth.build, ()):
