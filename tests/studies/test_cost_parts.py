@@ -17,8 +17,8 @@ from laufruhe.report.study_report import markdown
 from laufruhe.studies import run
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.free_forces import printed_agree
+from laufruhe.studies.kinds.tolerance import verdicts
 from laufruhe.studies.reader import load_study
-from laufruhe.studies.tolerance import verdicts
 from laufruhe.studies.worth import worths
 from problem_files import written
 
