@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -13,11 +13,12 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from laufruhe.cli import app
-from laufruhe.plots.picture import draw
+from laufruhe.errors import ModelError
+from laufruhe.plots.picture import draw, hue
 from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.replication.expressions import ExpressionError, check, filled, numbers_of, value_of
 from laufruhe.studies.replication.judging import CONFIRMED, NOT_CONFIRMED, counted, judged, rows
-from laufruhe.studies.replication.models import StatementTable
+from laufruhe.studies.replication.models import Hue, StatementTable
 from laufruhe.studies.scenes import Scenes
 from laufruhe.studies.text import Rows
 
@@ -253,3 +254,48 @@ def test_ready_replication(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name
 def test_second_order_couple_of_five_cylinders(worth: Callable[..., Any]) -> None:
     """The textbook draws 3260 Nm; the star of 1-2-4-5-3 has 4.98 F a = 3.7 kN m."""
     assert worth("example-5", "second", "replication-five-cylinder") == pytest.approx(3686.1, abs=0.1)
+
+
+@pytest.mark.parametrize(("panel", "said"), [
+    ({"curves": [{"y": "mean['one']"}]}, "'mean['one']' has no dimension to be drawn over; give x"),
+    ({"curves": [{"y": "each['one']", "x": "[1, 2, 3]"}]}, "shape mismatch"),
+    ({"curves": [{"y": "'text'", "x": "1"}]}, "panel 1 cannot be drawn: could not convert"),
+    ({"words": [{"x": "each['one']", "y": 0, "text": "t"}]}, "'each['one']' is no single number"),
+    ({"title": "{each['one']:.1f}"}, "is no single number"),
+    ({"y": {"ends": [0, "each['one']"]}}, "is no single number"),
+    ({"bars": {"filled": "[]"}}, "cannot be drawn"),
+    ({"bars": {"filled": "[1]", "labels": ["a"], "for": {"k": [0, 1]}}}, "cannot be drawn: list index out of range"),
+    ({"x": {"names": "{mean['one']}"}}, "cannot be drawn"),
+])  # fmt: skip
+def test_what_cannot_be_drawn_is_told_in_a_line(panel: dict[str, Any], said: str) -> None:
+    part = _part(cases=[{"name": "one", "problem": "web"}], picture={"panels": [panel]})
+    with pytest.raises(ModelError) as found:
+        Replication.picture(_data(part))
+    assert said in str(found.value)
+    assert str(found.value).startswith("panel 1 cannot be drawn: ")
+    assert found.value.where == "part 'p', picture"
+
+
+@pytest.mark.parametrize("more", [{"value": "y['a']", "is": 1, "within": 0}, {"holds": "y['a'] > 1"},
+                                  {"is": "y['a']", "within": 0}, {"holds": "x", "why": "{y:.1f}"}])  # fmt: skip
+def test_statements_are_judged_by_single_numbers(more: dict[str, Any]) -> None:
+    with pytest.raises(ExpressionError, match="is no single number; take one of them"):
+        _judged(**more)
+
+
+@pytest.mark.parametrize(("key", "value"), [
+    ("colours", ["mauve"]), ("colours", []), ("marker", "zz"), ("width", -1), ("dash", [1, -1]), ("dash", [1, 2, 3]),
+])  # fmt: skip
+def test_marks_that_cannot_be_drawn_are_refused_when_read(key: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=key):
+        _part(cases=[], picture={"panels": [{"curves": [{"y": 1, key: value}]}]})
+
+
+def test_every_colour_is_one_of_the_pictures() -> None:
+    assert all(hue(name).startswith("#") for name in get_args(Hue))
+
+
+@pytest.mark.parametrize("within", ["5", "five %", "-5 %", "%"])
+def test_what_is_allowed_is_a_number_or_a_share(within: str) -> None:
+    with pytest.raises(ValueError, match="within"):
+        _judged(**{"is": 1, "within": within})

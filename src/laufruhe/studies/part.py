@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeAlias
 import xarray as xr
 from pydantic import Field
 
-from laufruhe.files.fields import Table
+from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_parts import CaseTable, Value
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
@@ -29,7 +29,7 @@ class Part(Table):
     title: Annotated[str, Field(min_length=1)]
     source: str = ""
     cases: list[CaseTable] = Field(min_length=1)
-    readings: dict[str, dict[str, Value]] = Field(
+    readings: dict[Name, dict[str, Value]] = Field(
         default_factory=dict,
         description="Where a number of the source may be misprinted: paths and values, by a name of each reading; "
         "in a replication, numbers and values.",

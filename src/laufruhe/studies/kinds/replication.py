@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -129,12 +130,10 @@ class Replication(Part):
         grids = {name: grid(name, table).values.tolist() for name, table in case.sweep.items()}
         for values in itertools.product(*grids.values()):
             swept = dict(zip(grids, values, strict=True))
-            try:
+            with self._blamed(case.name):
                 names = numbers_of({**self.numbers, **reading, **case.numbers, **swept}, {})
                 tables = filled(self._tables(case.problem, scenes), names)
                 changed = case.model_copy(update={"set": filled(case.set, names), "numbers": swept})
-            except ExpressionError as error:
-                raise self._refused(case.name, *str(error).split("; ", 1)) from None
             yield Point(changed, base=tables)
 
     def _tables(self, name: str, scenes: Scenes) -> dict[str, Any]:
@@ -171,10 +170,8 @@ class Replication(Part):
         )
         for name in self.quantities if records else ():
             data = data.merge(_along_points([record[name] for record in records], name))
-        try:
+        with self._blamed("statements"):
             return data.assign_coords(judged(self.statements, self.names(data)))
-        except ExpressionError as error:
-            raise self._refused("statements", *str(error).split("; ", 1)) from None
 
     def names(self, data: xr.Dataset) -> dict[str, dict[str, Any]]:
         """What expressions know in each reading: numbers, what every case gave, and what is defined of them."""
@@ -199,10 +196,16 @@ class Replication(Part):
         """What the file describes; the statements alone where it describes nothing."""
         part = Replication.model_validate_json(data.attrs["part"])
         assert part.picture_ is not None
-        return drawn(part.picture_, part.names(data), data)
+        with part._blamed("picture"):
+            return drawn(part.picture_, part.names(data), data)
 
-    def _refused(self, where: str, rule: str, remedy: str = "correct it") -> ModelError:
-        return ModelError(f"{rule}; {remedy}", f"part '{self.name}', {where}")
+    @contextmanager
+    def _blamed(self, where: str) -> Iterator[None]:
+        """An expression that means nothing is the fault of this part."""
+        try:
+            yield
+        except ExpressionError as error:
+            raise ModelError(str(error), f"part '{self.name}', {where}") from None
 
 
 def _case(point: Point) -> ReplicaCase:

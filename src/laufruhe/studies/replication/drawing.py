@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from laufruhe.studies.picture import Area, Axis, Bars, Line, Mark, Panel, Picture, Words, credit
-from laufruhe.studies.replication.expressions import filled, value_of
+from laufruhe.studies.replication.expressions import ExpressionError, filled, number_of, value_of
 from laufruhe.studies.replication.functions import join
 from laufruhe.studies.replication.models import AxisTable, BarsTable, CurveTable, PanelTable, PictureTable
 
@@ -24,8 +24,8 @@ Names = Mapping[str, Any]
 def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) -> Picture:
     """A picture of what the names are worth in each reading of the source."""
     panels = [
-        _panel(panel, names, "" if panel.once else reading)
-        for panel in table.panels
+        _panel(panel, names, "" if panel.once else reading, number)
+        for number, panel in enumerate(table.panels, 1)
         for reading, names in list(readings.items())[: 1 if panel.once else None]
     ]
     return Picture(
@@ -39,17 +39,25 @@ def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) 
     )
 
 
-def _panel(panel: PanelTable, names: Names, reading: str) -> Panel:
+def _panel(panel: PanelTable, names: Names, reading: str, number: int) -> Panel:
+    try:
+        return _drawn_panel(panel, names, reading)
+    except (TypeError, ValueError, LookupError) as error:
+        rule, _, remedy = str(error).partition("; ")
+        raise ExpressionError(f"panel {number} cannot be drawn: {rule}; {remedy or 'correct it'}") from None
+
+
+def _drawn_panel(panel: PanelTable, names: Names, reading: str) -> Panel:
     marks: list[Mark] = []
     for area in panel.areas:
-        x, (low, high) = ([value_of(end, names) for end in ends] for ends in (area.x, area.y))
+        x, (low, high) = ([number_of(end, names) for end in ends] for ends in (area.x, area.y))
         marks.append(Area(x, [low, low], [high, high], area.colour, filled(area.label, names)))
     for curve in panel.curves:
         marks += _curves(curve, names)
     if panel.bars:
         marks += _bars(panel.bars, names)
     for words in panel.words:
-        across, up = (float(value_of(at, names)) for at in (words.x, words.y))
+        across, up = (number_of(at, names) for at in (words.x, words.y))
         marks.append(Words(across, up, filled(words.text, names), 8.0, words.colour, words.across, words.along))
     title = ", ".join(words for words in (filled(panel.title, names), reading) if words)
     return Panel(marks, _axis(panel.x, names), _axis(panel.y, names), title)
@@ -60,7 +68,7 @@ def _axis(axis: AxisTable, names: Names) -> Axis:
     ticks = [(float(k), str(text)) for k, text in enumerate(labels)] if labels else None
     if axis.ticks is not None:
         ticks = [(float(at), f"{at:g}") for at in axis.ticks]
-    ends = None if axis.ends is None else tuple(float(value_of(end, names)) for end in axis.ends)
+    ends = None if axis.ends is None else tuple(number_of(end, names) for end in axis.ends)
     return Axis(axis.label, ends, ticks, tuple(axis.log), grid=labels is None)  # type: ignore[arg-type]
 
 
@@ -77,6 +85,8 @@ def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
         colour = curve.colours[k % len(curve.colours)]
         y = value_of(curve.y, own)
         dims: tuple[str, ...] = getattr(y, "dims", ())
+        if curve.x is None and not dims:
+            raise ExpressionError(f"'{curve.y}' has no dimension to be drawn over; give x")
         x = value_of(curve.x, {**own, **{dim: y[dim] for dim in dims}}) if curve.x is not None else y[dims[0]]
         xs, ys = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (x, y))
         xs, ys = np.broadcast_arrays(xs, ys)
@@ -94,9 +104,10 @@ def _bars(bars: BarsTable, names: Names) -> Iterator[Mark]:
     for k, (own, low, high) in enumerate(zip(series, fills, outlines, strict=True)):
         places = np.arange(len(low)) + (k - 0.5 * (len(series) - 1)) * width
         label = filled(bars.labels[k] if bars.labels else bars.label, own)
-        yield Bars(places, low, 0.9 * width, bars.colours[k], label)
+        colour = bars.colours[k % len(bars.colours)]
+        yield Bars(places, low, 0.9 * width, colour, label)
         if bars.outline:
-            yield Bars(places, high, 0.9 * width, bars.colours[k], hollow=True)
+            yield Bars(places, high, 0.9 * width, colour, hollow=True)
         for x, inner, outer in zip(places, low, high, strict=True):
             yield Words(x, outer + ABOVE * top, _number(outer, top, bars.number), 6.5, "faint", "center", "bottom")
             if bars.outline and inner > LEAST_INSIDE * top:

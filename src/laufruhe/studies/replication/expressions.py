@@ -83,20 +83,15 @@ def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str])
         If it cannot be read, or uses names, functions or cases that are not there.
     """
     nodes = _nodes(text)
-    _check_names(nodes, known)
-    for node in nodes:
-        if isinstance(node, ast.Subscript):
-            place = node.slice
-            for case in known.get(place.id, ()) if isinstance(place, ast.Name) else [getattr(place, "value", None)]:
-                if isinstance(case, str):
-                    check_among(case, cases, "case")
-
-
-def _check_names(nodes: Sequence[ast.AST], known: Collection[str]) -> None:
     called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
     for node in nodes:
         if isinstance(node, ast.Name) and id(node) not in called:
             check_among(node.id, {*CONSTANTS, *known}, "name")
+        elif isinstance(node, ast.Subscript):
+            place = node.slice
+            for case in known.get(place.id, ()) if isinstance(place, ast.Name) else [getattr(place, "value", None)]:
+                if isinstance(case, str):
+                    check_among(case, cases, "case")
 
 
 def check_among(name: str, known: Collection[str], what: str) -> None:
@@ -121,12 +116,16 @@ def value_of(text: Any, names: Mapping[str, Any]) -> Any:
     """
     if not isinstance(text, str):
         return text
-    _check_names(_nodes(text), names)
+    _nodes(text)
     try:
         # nothing but what `_nodes` let through is in the code
         return eval(_code(text), {"__builtins__": {}, **_CALLED, **CONSTANTS, **names})
     except ExpressionError:
         raise
+    except NameError as error:
+        raise ExpressionError(
+            f"'{error.name}' is no name here; {nearest(str(error.name), [*CONSTANTS, *names])}"
+        ) from None
     except (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"'{text}' has no value ({str(error).partition(chr(10))[0]}); correct it") from None
 
@@ -202,7 +201,13 @@ def filled(text: Any, names: Mapping[str, Any]) -> Any:
     parts = list(_parts(text))
     if len(parts) == 1 and not parts[0][0] and not parts[0][2]:
         return value_of(parts[0][1], names)
-    return "".join(plain + (_shown(value_of(field, names), spec) if field else "") for plain, field, spec in parts)
+    return "".join(plain + _shown(field, spec, names) for plain, field, spec in parts)
+
+
+def _shown(field: str, spec: str, names: Mapping[str, Any]) -> str:
+    if not field:
+        return ""
+    return format(number_of(field, names), spec) if spec else str(value_of(field, names))
 
 
 def _parts(text: str) -> Iterator[tuple[str, str, str]]:
@@ -217,8 +222,19 @@ def _parts(text: str) -> Iterator[tuple[str, str, str]]:
         yield plain, field or "", spec or ""
 
 
-def _shown(value: Any, spec: str) -> str:
-    return format(float(value), spec) if spec else str(value)
+def number_of(text: Any, names: Mapping[str, Any]) -> float:
+    """What an expression is worth that must be one number.
+
+    Raises
+    ------
+    ExpressionError
+        As `value_of` does, and where it is anything else.
+    """
+    value = value_of(text, names)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ExpressionError(f"'{text}' is no single number; take one of them, for example by at() or max()") from None
 
 
 def numbers_of(given: Mapping[str, Any], names: Mapping[str, Any]) -> dict[str, Any]:

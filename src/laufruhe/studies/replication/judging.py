@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.studies.replication.expressions import filled, value_of
+from laufruhe.studies.replication.expressions import filled, number_of
 from laufruhe.studies.replication.models import StatementTable
 from laufruhe.studies.text import Rows, Text
 from laufruhe.studies.verdict import UNSTATED
@@ -42,7 +42,7 @@ def judged(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[
 
 
 def _judged(one: StatementTable, names: Mapping[str, Any]) -> tuple[float, str, str]:
-    value = float(value_of(one.value, names))
+    value = number_of(one.value, names)
     own = {**names, "value": value}
     return value, verdict(one, own), filled(one.why, own)
 
@@ -52,9 +52,9 @@ def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
     if statement.printed is None:
         return BEYOND
     if statement.holds is not None:
-        holds = bool(value_of(statement.holds, names))
+        holds = bool(number_of(statement.holds, names))
     else:
-        expected, allowed = float(value_of(statement.expected, names)), statement.within
+        expected, allowed = number_of(statement.expected, names), statement.within
         if isinstance(allowed, str):
             allowed = 0.01 * float(allowed.removesuffix("%")) * abs(expected)
         holds = abs(names["value"] - expected) <= float(allowed or 0.0) * (1.0 + _SLACK)

@@ -17,6 +17,12 @@ Each: TypeAlias = Annotated[
 ]
 
 
+Hue: TypeAlias = Literal[
+    "ink", "faint", "grey", "pale", "sky", "blue", "indigo", "orange", "vermilion", "rust", "green", "leaf", "olive",
+    "mint", "purple", "white",
+]  # fmt: skip
+Inches: TypeAlias = Annotated[float, Field(ge=0.5, le=20.0)]
+Points: TypeAlias = Annotated[float, Field(ge=0.0, le=20.0)]
 EXPRESSIONS = frozenset({"x", "y", "ends", "filled", "outline", "value", "is", "holds"})
 """Keys that hold expressions; in the texts of other keys they stand in braces."""
 
@@ -54,7 +60,9 @@ class StatementTable(Table):
     value: str
     unit: str = ""
     expected: Expression | None = Field(default=None, alias="is", description="Printed number in that unit.")
-    within: int | float | str | None = Field(default=None, description='Allowed: a number in that unit, or "15 %".')
+    within: int | float | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")] | None = Field(
+        default=None, description='Allowed: a number in that unit, or "15 %".'
+    )
     holds: str | None = Field(default=None, description="Condition, with the name value, in place of is and within.")
     why: str = ""
 
@@ -74,7 +82,9 @@ class AxisTable(Table):
     ends: list[Expression] | None = Field(default=None, min_length=2, max_length=2)
     names: list[str] | str | None = Field(default=None, description="Of the places 0, 1, 2 ..., in place of numbers.")
     ticks: list[int | float] | None = None
-    log: list[float] = Field(default_factory=list, description="First figures of the ticks of a logarithmic axis.")
+    log: list[Annotated[float, Field(ge=1.0, lt=10.0)]] = Field(
+        default_factory=list, description="First figures of the ticks of a logarithmic axis."
+    )
 
 
 class CurveTable(Table):
@@ -87,10 +97,10 @@ class CurveTable(Table):
     each: Each = Field(default_factory=dict, alias="for")
     label: str = ""
     end: str = Field(default="", description="Words at the last point.")
-    colours: list[str] = Field(default=[str(name) for name in SERIES])
-    width: float = 2.0
-    dash: list[float] = Field(default_factory=list)
-    marker: str = ""
+    colours: list[Hue] = Field(default=list(SERIES), min_length=1)  # type: ignore[arg-type]
+    width: Points = 2.0
+    dash: list[Points] = Field(default_factory=list, max_length=2)
+    marker: Literal["", "o", "s", "D", "^", "v", "x", "+", "|", "."] = ""
 
 
 class BarsTable(Table):
@@ -106,7 +116,7 @@ class BarsTable(Table):
         pattern=r"^(#?(\.\d)?[efg])?$",
         description="Format of the numbers on the bars; three figures where left out.",
     )
-    colours: list[str] = Field(default=["grey", "sky", "orange", "blue", "vermilion", "green"])
+    colours: list[Hue] = Field(default=["grey", "sky", "orange", "blue", "vermilion", "green"], min_length=1)
 
 
 class WordsTable(Table):
@@ -115,7 +125,7 @@ class WordsTable(Table):
     x: Expression
     y: Expression
     text: str
-    colour: str = "faint"
+    colour: Hue = "faint"
     across: Literal["left", "center", "right"] = "left"
     along: Literal["bottom", "center", "top"] = "center"
 
@@ -125,7 +135,7 @@ class AreaTable(Table):
 
     x: list[Expression] = Field(min_length=2, max_length=2)
     y: list[Expression] = Field(min_length=2, max_length=2)
-    colour: str = "pale"
+    colour: Hue = "pale"
     label: str = ""
 
 
@@ -147,7 +157,7 @@ class PictureTable(Table):
 
     title: str | None = None
     words: str = ""
-    size: list[float] = Field(default=[7.2, 4.0], min_length=2, max_length=2, description="Of a panel [inch].")
-    columns: Annotated[int, Field(ge=1)] = 1
-    gap: float = 0.7
-    panels: list[PanelTable] = Field(min_length=1)
+    size: list[Inches] = Field(default=[7.2, 4.0], min_length=2, max_length=2, description="Of a panel [inch].")
+    columns: Annotated[int, Field(ge=1, le=8)] = 1
+    gap: Annotated[float, Field(ge=0.0, le=5.0)] = 0.7
+    panels: list[PanelTable] = Field(min_length=1, max_length=24)
