@@ -51,6 +51,7 @@ attack: export OMP_NUM_THREADS = 1
 
 attack: $(STAMP)
 	$(BIN)/python tests/attack/run_attack.py run all $(ATTACK)
+	$(BIN)/python tests/attack/run_attack.py page results/attack/*.jsonl
 
 matrix: export OMP_NUM_THREADS = 1
 

@@ -8,6 +8,7 @@ import os
 import time
 import traceback
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,15 @@ from attack.plain_loads import number
 from attack.plain_scene import Table
 from attack.rivals import Rival, best_star, convex_rival, least_broken, local_rival
 
-READING = {"gas": 6e-5}
-"""Of how a value is read, beside the error that the result states: samples of the plain model."""
 SAMPLED = 1e-5
+"""Of how a value is read, beside the error that the result states: samples of the plain model."""
+KINKED = 5e-5
+"""The same where gas acts: its kinks lie between the samples of the plain model."""
 KEPT = 3e-5
 """Share of a limit by which a design may pass it."""
 GAP = 1e-4
+SPARE = 2e-5
+"""Share of its limits that a design must have to spare before it counts against 'infeasible'."""
 
 
 @dataclass
@@ -50,6 +54,7 @@ class Verdict:
     beaten: float = 0.0
     rivals: int = 0
     wrong: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     @property
     def line(self) -> dict[str, Any]:
@@ -81,6 +86,28 @@ def silence_heard(wrong: list[str]):
         wrong.append(f"prints: {heard.getvalue().strip()[:150]}")
 
 
+def tried(verdict: Verdict, work: Callable[[], list[str]]) -> Verdict:
+    """Complaints of a piece of work that solves; an error is one."""
+    started = time.perf_counter()
+    try:
+        with silence_heard(verdict.wrong):
+            found = work()
+        verdict.wrong += [line for line in found if not line.startswith("note: ")]
+        verdict.notes += [line for line in found if line.startswith("note: ")]
+        verdict.status = "done"
+    except Exception as error:
+        verdict.status = "error"
+        verdict.wrong.append(told_of(error))
+    verdict.seconds = time.perf_counter() - started
+    return verdict
+
+
+def told_of(error: Exception) -> str:
+    """An error with the line that raised it."""
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {str(error)[:200]}"
+
+
 def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, folder: Path, most: int) -> Verdict:
     """Solve a problem and attack what is claimed of it.
 
@@ -94,11 +121,8 @@ def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, 
         with silence_heard(verdict.wrong):
             result = solved(table, folder, f"{family}-{seed}-{os.getpid()}")
     except Exception as error:
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        verdict.status = "refused" if type(error).__name__ == "InputError" else "error"
-        verdict.wrong.append(
-            f"{type(error).__name__} at {Path(where.filename).name}:{where.lineno}: {str(error)[:200]}"
-        )
+        verdict.status = "error"
+        verdict.wrong.append(told_of(error))
         return verdict
     finally:
         (folder / f"{family}-{seed}-{os.getpid()}.toml").unlink(missing_ok=True)
@@ -120,11 +144,11 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
         return
     certificate = result.certificate
     verdict.kind, verdict.gap = certificate.kind.value, certificate.gap
-    vector, told = openings.read(result.final.engine)
+    vector, told = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
     scene = openings.scene(vector, told)
     value, initial = result.objective.value, result.objective.initial
     floor = 1e-9 * (initial if np.isfinite(initial) and initial > 0.0 else 1.0)
-    reading = SAMPLED + READING["gas"] * ("gas" in table)
+    reading = KINKED if "gas" in table else SAMPLED
     _judge_value(verdict, result, scene, value, reading, floor)
     rival = _rival(openings, vector, told, value, rng, most)
     verdict.rivals = rival.looked_at if rival else 0
@@ -133,7 +157,7 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
         verdict.wrong.append(f"own design {scene.objective:.9g} lies under its bound {bound:.9g}")
     if scene.worst > KEPT:
         verdict.wrong.append(f"a limit is passed by {scene.worst:.2e} of itself")
-    given = openings.scene(*openings.read(result.initial.engine))
+    given = openings.scene(*openings.read(result.initial.engine, {d.name: d.initial for d in result.decisions}))
     if given.worst <= 0.0 and value > given.objective * (1.0 + reading) + floor:
         verdict.wrong.append(f"value {value:.9g} is worse than {given.objective:.9g} as given")
     if rival is None or rival.excess > 1e-6:
@@ -186,5 +210,6 @@ def _judge_infeasible(verdict: Verdict, openings: Openings, rng: np.random.Gener
     if rival is None:
         return
     verdict.rivals = rival.looked_at
-    if rival.excess <= -1e-6:
-        verdict.wrong.append(f"{verdict.status}, but a rival keeps every limit with {-rival.excess:.2e} to spare")
+    spare = -openings.scene(rival.vector, rival.told).worst
+    if spare > SPARE:
+        verdict.wrong.append(f"{verdict.status}, but a rival keeps every limit with {spare:.2e} to spare")

@@ -33,17 +33,21 @@ def toml(table: Table) -> str:
     for key, value in table.items():
         if isinstance(value, dict):
             tables.append(_section(f"[{key}]", value, key))
-        elif isinstance(value, list) and value and isinstance(value[0], dict):
+        elif _is_tables(value):
             tables += [_section(f"[[{key}]]", entry, key) for entry in value]
         else:
             lines.append(f"{key} = {_inline_toml(value)}")
     return "\n".join(lines + tables) + "\n"
 
 
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(v, dict) and "between" not in v for v in value)
+
+
 def _section(head: str, table: Table, name: str) -> str:
     lines, below = [head], []
     for key, value in table.items():
-        if isinstance(value, list) and value and isinstance(value[0], dict):
+        if _is_tables(value):
             below += [_section(f"[[{name}.{key}]]", entry, f"{name}.{key}") for entry in value]
         else:
             lines.append(f"{key} = {_inline_toml(value)}")
@@ -375,6 +379,179 @@ def vee_engine(rng: Generator) -> Table:
     return engine
 
 
+# --- elastic mounts
+
+
+def block(rng: Generator) -> Table:
+    return {
+        "mass": q(rng.uniform(100, 250), "kg", 4),
+        "centre_of_gravity": [q(v, "m", 3) for v in rng.uniform(-0.1, 0.1, 3)],
+        "inertia": [q(v * rng.uniform(0.8, 1.2), "kg m^2", 3) for v in (5.0, 12.0, 10.0)],
+        "inertia_products": [q(v, "kg m^2", 3) for v in rng.uniform(-0.8, 0.8, 3)],
+    }
+
+
+def elastic_mounts(rng: Generator) -> Table:
+    """Four mounts, one under each corner, alike in nothing."""
+    corners = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    held = []
+    for k, (along, aside) in enumerate(corners):
+        at = (along * rng.uniform(0.2, 0.4), aside * rng.uniform(0.15, 0.4), rng.uniform(-0.1, 0.1))
+        place: Table = {"name": f"m{k}", "position": [q(v, "m", 3) for v in at]}
+        place["stiffness"] = [q(v, "N/m", 4) for v in rng.uniform(1e5, 6e5, 3)]
+        if rng.random() < 0.4:
+            place["damping"] = [q(v, "N s/m", 3) for v in rng.uniform(0.0, 800.0, 3)]
+        if rng.random() < 0.4:
+            place["turned"] = [float(round(v, 1)) for v in rng.uniform(-30.0, 30.0, 3)]
+        held.append(place)
+    return {"kind": "elastic", "loss_factor": float(rng.choice([0.05, 0.1, 0.2])), "places": held}
+
+
+def opened_stiffness(rng: Generator, mounts: Table, count: int) -> None:
+    """So many of the twelve stiffnesses open, from a half or a fifth of theirs to two or five times as much."""
+    for k in rng.choice(12, count, replace=False):
+        stiffness, axis = mounts["places"][int(k) // 3]["stiffness"], int(k) % 3
+        own, wide = float(stiffness[axis].split()[0]), rng.choice([2.0, 5.0])
+        stiffness[axis] = {
+            "between": [q(own / wide, "N/m", 4), q(own * wide, "N/m", 4)], "start": q(own, "N/m", 4)
+        }  # fmt: skip
+
+
+def elastic_scene(rng: Generator, engine: Table | None = None) -> Table:
+    built = engine or inline(rng)
+    return {
+        "engine": built, "operating_points": points(rng, 2, 60.0, 300.0), "block": block(rng),
+        "mounts": elastic_mounts(rng),
+    }  # fmt: skip
+
+
+ELASTIC = ("mount force", "mount travel")
+SMOOTH = ("mean", "maximum", "rms")
+
+
+def limits_at(rng: Generator, table: Table, among: list[Table], share: float = 0.6) -> Table:
+    """Limits a little under or over what a random design has, so that it, or another, keeps them."""
+    from attack.openings import Openings
+
+    if rng.random() > share:
+        return table
+    openings = Openings(table)
+    scene = openings.scene(openings.random(rng))
+    limits: list[Table] = []
+    for k in rng.choice(len(among), min(len(among), int(rng.integers(1, 3))), replace=False):
+        told = dict(among[int(k)])
+        unit, side = told.pop("unit"), told.pop("side")
+        if told["limit"] == "natural frequencies":
+            f = scene.mounting.frequencies  # type: ignore[union-attr]
+            has = float(f.max() if side == "max" else f.min())
+        else:
+            has = scene.measure({**told, "quantity": told["limit"]})
+        give = rng.uniform(1.0, 1.1) if side == "max" else rng.uniform(0.9, 1.0)
+        limits.append({**told, side: q(has * give, unit, 9) if unit else round(has * give, 9), "name": f"l{k}"})
+    return {**table, "constraints": limits}
+
+
+OF_MOUNTS = [
+    {"limit": "static sag", "side": "max", "unit": "m"},
+    {"limit": "natural frequencies", "side": "max", "unit": "Hz"},
+    {"limit": "natural frequencies", "side": "min", "unit": "Hz"},
+    {"limit": "total stiffness", "side": "max", "unit": "N/m"},
+]
+OF_FORCES = [
+    {"limit": "rms mount force", "side": "max", "unit": "N"},
+    {"limit": "maximum mount travel", "side": "max", "unit": "m"},
+    {"limit": "transmissibility", "side": "max", "unit": "", "orders": [1]},
+]
+
+
+def few_stiffnesses(least: int, most: int) -> Callable[[Generator], Table]:
+    def made(rng: Generator) -> Table:
+        table = elastic_scene(rng)
+        opened_stiffness(rng, table["mounts"], int(rng.integers(least, most + 1)))
+        if rng.random() < 0.15:
+            table["objective"] = {"minimise": "transmissibility", "orders": [1]}
+        else:
+            table = with_objective(rng, table, 1, channels=ELASTIC, norms=SMOOTH)
+        return limits_at(rng, table, OF_MOUNTS + OF_FORCES)
+
+    return made
+
+
+def convex_mounts(rng: Generator) -> Table:
+    """What is asked is convex in the stiffnesses: sag, total stiffness, torque-roll residual, frequencies."""
+    table = elastic_scene(rng)
+    opened_stiffness(rng, table["mounts"], int(rng.integers(2, 10)))
+    table["objective"] = dict(
+        [
+            {"minimise": "static sag"}, {"minimise": "total stiffness"},
+            {"minimise": "torque-roll residual", "frequency": q(rng.uniform(5.0, 20.0), "Hz", 4)},
+        ][int(rng.integers(0, 3))]
+    )  # fmt: skip
+    return limits_at(rng, table, OF_MOUNTS, 1.0)
+
+
+def joint(rng: Generator) -> Table:
+    """Mounts and unbalances together."""
+    table = elastic_scene(rng)
+    table["counterweights"] = counterweights(rng, moving_mass(table["engine"]), 1)
+    opened_stiffness(rng, table["mounts"], int(rng.integers(1, 3)))
+    place = table["mounts"]["places"][1]
+    if rng.random() < 0.5:
+        x = float(place["position"][0].split()[0])
+        place["position"][0] = {"between": [q(x - 0.1, "m"), q(x + 0.1, "m")], "start": q(x, "m")}
+    elif rng.random() < 0.5:
+        place["turned"] = [{"between": [-30, 30], "start": 0}, 0, 0]
+    table = with_objective(rng, table, 1, channels=ELASTIC, norms=SMOOTH)
+    return limits_at(rng, table, OF_MOUNTS + OF_FORCES[:2], 0.4)
+
+
+def balance_on_elastic(rng: Generator) -> Table:
+    """Unbalances on mounts that are given."""
+    table = elastic_scene(rng, inline(rng) if rng.random() < 0.5 else vee(rng))
+    size = moving_mass(table["engine"])
+    table["counterweights"] = counterweights(rng, size, int(rng.integers(1, 3)))
+    if shafts := balancers(rng, size, int(rng.integers(0, 2))):
+        table["balancer_shafts"] = shafts
+    return with_objective(rng, table, 2, channels=ELASTIC)
+
+
+# --- throws between bounds, places of shafts
+
+
+def uneven(rng: Generator) -> Table:
+    """Throws in line, some of them between bounds of their own, and weights at times."""
+    engine = {"layout": "inline", **mechanism(rng), **spaced(rng)}
+    told: list[Any] = list(throws(rng, int(rng.integers(3, 6))))
+    for k in rng.choice(len(told) - 1, int(rng.integers(1, 3)), replace=False) + 1:
+        wide = rng.uniform(10.0, 60.0)
+        told[k] = {"between": [round(told[k] - wide, 3), round(told[k] + wide, 3)]}
+    engine["throws"] = told
+    table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
+    if rng.random() < 0.5:
+        table["counterweights"] = counterweights(rng, moving_mass(engine), int(rng.integers(1, 3)))
+    return with_objective(rng, table, 1, norms=SMOOTH)
+
+
+def places(rng: Generator) -> Table:
+    """A shaft or two whose height, side or unbalance's place is open; angles given or open."""
+    built = inline(rng) if rng.random() < 0.7 else vee(rng)
+    size = moving_mass(built)
+    table = {"engine": built, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
+    shafts = balancers(rng, size, int(rng.integers(1, 3)))
+    for shaft in shafts:
+        told = shaft["unbalances"][0]
+        if rng.random() < 0.6:
+            told["angle"] = angle(rng)
+        where = int(rng.integers(0, 3))
+        opened = {"between": ["-0.2 m", "0.2 m"]}
+        if where < 2:
+            shaft["position"][where] = opened
+        else:
+            told["x"] = opened
+    table["balancer_shafts"] = shafts
+    return with_objective(rng, table, 1)
+
+
 FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "inline": of_unbalances(inline),
     "vee": of_unbalances(vee),
@@ -386,6 +563,13 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "gas": with_gas,
     "stars": stars,
     "open-vees": vees,
+    "elastic-few": few_stiffnesses(1, 2),
+    "elastic-many": few_stiffnesses(3, 4),
+    "convex-mounts": convex_mounts,
+    "joint": joint,
+    "elastic-balance": balance_on_elastic,
+    "uneven": uneven,
+    "places": places,
 }
 
 
@@ -395,7 +579,7 @@ def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
     from attack.rivals import convex_rival, designs_told
 
     openings = Openings(table)
-    if openings.numbers or rng.random() > share:
+    if openings.numbers or "constraints" in table or rng.random() > share:
         return table
     told = next(iter(designs_told(openings)), None)
     if told is None:

@@ -201,13 +201,15 @@ class Openings:
             found[w.name] = (w.name, number(own["x"]), complex(z, y), w.ratio, u, w.radius, w.role)
         return list(found.values())
 
-    def read(self, engine: Any) -> tuple[np.ndarray, Table]:
+    def read(self, engine: Any, told: dict[str, float]) -> tuple[np.ndarray, Table]:
         """The vector of an engine that was decided, and its throws and angles where these are open as a whole.
+
+        Numbers of mounts are taken from what is told of decisions, by their names.
 
         An unbalance that is missing belongs to a shaft that is not built.
         """
         rotors = {r.name: r for r in engine.rotors}
-        values = [(self._number(path, engine, rotors) - low) / (high - low) for path, low, high in self.numbers]
+        values = [(self._number(path, engine, rotors, told) - low) / (high - low) for path, low, high in self.numbers]
         for w in self.weights:
             u = rotors[w.name].unbalance if w.name in rotors else 0j
             if w.entries == 2:
@@ -241,7 +243,7 @@ class Openings:
             split += math.tau
         return [p.throw + 0.5 * split for p in parts[:half]], parts[0].bank - parts[half].bank, split
 
-    def _number(self, path: Path, engine: Any, rotors: dict[str, Any]) -> float:
+    def _number(self, path: Path, engine: Any, rotors: dict[str, Any], decided: dict[str, float]) -> float:
         if path[0] == "engine":
             throws, bank, split = self._angles(engine)
             if path[1] == "throws":
@@ -251,10 +253,8 @@ class Openings:
                 return given + 360.0 * turns
             return math.degrees({"bank_angle": bank, "split_pin_angle": split}[path[1]])
         if path[0] == "mounts":
-            mount, key = engine.mounts[path[2]], path[3]
-            value = getattr(mount, {"turned": "turned"}.get(key, key))
-            value = value if key == "loss_factor" else value[path[4]]
-            return math.degrees(value) if key == "turned" else float(value)
+            label = ".".join([self.table["mounts"]["places"][path[2]]["name"], path[3], *("xyz"[k] for k in path[4:])])
+            return math.degrees(decided[label]) if path[3] == "turned" else decided[label]
         if path[-1] == "x":
             return float(rotors[next(w.name for w in self.weights if path[:-1] == w.where)].x)
         shaft = rotors[next(w.name for w in self.weights if path[:2] == w.shaft)].shaft

@@ -17,10 +17,19 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from attack.claims import Verdict, try_problem
+from attack.claims import Verdict, tried, try_problem
 from attack.families import FAMILIES, problem, toml
+from attack.page import lines_of, page
+from attack.variations import VARIATIONS
 
 ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "results" / "attack" / "README.md"
+VARIED = {
+    "prices": ("inline", "vee", "points", "gas", "stars", "elastic-balance", "convex-mounts", "elastic-few"),
+    "monotony": ("inline", "boxer", "stars", "open-vees", "elastic-balance", "joint"),
+    "invariance": ("inline", "vee", "radial", "parts", "stars", "elastic-balance", "convex-mounts", "elastic-few"),
+}
+NAMES = [*FAMILIES, *(f"{variation} of {family}" for variation, families in VARIED.items() for family in families)]
 EFFORT = 6
 """Stars that are solved one by one, at most ten times as many, and hundreds of calls of a local search."""
 
@@ -32,10 +41,14 @@ def done_in(log: Path) -> set[tuple[str, int]]:
     return {(line["family"], line["seed"]) for line in lines}
 
 
-def attacked(family: str, seed: int, effort: int = EFFORT) -> Verdict:
-    """One problem."""
+def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
+    """One problem of a family, or a variation of one: "prices of inline"."""
+    variation, _, family = name.rpartition(" of ")
     table, rng = problem(family, seed)
     with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+        if variation:
+            vary = VARIATIONS[variation]
+            return tried(Verdict(name, seed), lambda: vary(table, rng, Path(folder)))
         return try_problem(family, seed, table, rng, Path(folder), effort)
 
 
@@ -63,17 +76,22 @@ def main() -> None:
     running.add_argument("families", help="comma-separated, or all")
     running.add_argument("--from", dest="first", type=int, default=0)
     running.add_argument("--number", type=int, default=100)
-    running.add_argument("--log", type=Path, default=ROOT / "results" / "attack" / "run.jsonl")
+    running.add_argument("--log", type=Path, default=PAGE.with_name("run.jsonl"))
     running.add_argument("--seconds", type=float, default=1e9)
     running.add_argument("--effort", type=int, default=EFFORT)
     show = commands.add_parser("show", help="the problem file of a family and a seed")
     show.add_argument("families")
     show.add_argument("--from", dest="first", type=int, default=0)
+    paged = commands.add_parser("page", help="write results/attack/README.md from logs")
+    paged.add_argument("logs", nargs="+", type=Path)
     told = parser.parse_args()
+    if told.command == "page":
+        PAGE.write_text(page(lines_of(told.logs), NAMES), encoding="utf-8")
+        return
     if told.command == "show":
         print(toml(problem(told.families, told.first)[0]))
         return
-    families = sorted(FAMILIES) if told.families == "all" else told.families.split(",")
+    families = NAMES if told.families == "all" else told.families.split(",")
     run(families, told.first, told.number, told.log, told.seconds, told.effort)
 
 

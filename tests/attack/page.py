@@ -1,0 +1,96 @@
+"""The page that says what was attacked, with what figures, and what an attack of this kind cannot see."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+WANTED = 2000
+SEEDS = 3
+"""What the attack is meant to reach: so many problems of every family from so many first seeds."""
+
+HEAD = """# Random problems against an independent model
+
+Written by `python tests/attack/run_attack.py page`, from the logs of `make attack`. Nothing here is edited by hand.
+
+A seed makes a problem of a family: sizes, speeds, mounts, what is open, asked and limited. The package solves it. A plain model
+under `tests/attack` reads the same file and shares no code with the package: positions of masses, momentum and energy
+differentiated by transforms, least energy of springs, six motions of a block, a gas cycle found by trying. It evaluates
+the design that was returned and looks for a better one: cutting planes of linear programs where unbalances alone are open (a
+bound of its own), every even star one by one, else random designs, evolution and a simplex. **Wrong** is: a value or a
+limit's value off by more than the stated error and what the plain model resolves; a design below a bound; a `global` value above a
+rival by more than the gap; "infeasible" where a rival keeps all limits with 2e-5 to spare; a limit passed by more than 3e-5; a
+result worse than the design as given; `failed`, an error, a warning, or anything on the screen. **Beaten**: a `local`
+design that a rival beats by more than 1e-3; it claims nothing else, and is not counted as wrong.
+
+- *Prices* lie between the gain of a limit loosened by 1 % and the loss of one tightened by 1 %.
+- *Monotony*: a limit loosened by 5 %, or one weight more, is not worse.
+- *Invariance*: parts in another order, front and back swapped, units of mass from 1e-6 to 1e6 and of length and time from 1e-2 to
+  1e2 keep value and kind of proof.
+"""
+
+FOOT = """
+## What this attack cannot see
+
+- What the plain model shares with the documentation: both take its conventions, so a wrong convention is right to both.
+- Where a problem is not convex, that a rival was not found proves nothing: up to 600 designs are looked at, few for more than four numbers.
+- Stars are enumerated up to 60; firing orders, optional shafts and uneven intervals of open throws are not drawn.
+- Gas is the mixed cycle alone. The plain model resolves 4096 steps of a cycle: peaks to 1e-5, with gas to 5e-5.
+- Limits of an elastic block: bump stops, time integration, ranges of speeds, mirrored mounts and decoupling are not drawn.
+- Sizes are those of one car or tractor engine before rescaling: no twenty cylinders, no hundred mounts.
+- Errors that need two problems in one process, damaged files, memory and time limits have tests of their own.
+"""
+
+
+def lines_of(logs: Iterable[Path]) -> list[dict[str, Any]]:
+    """Every problem of the logs, the last entry of each."""
+    found: dict[tuple[str, int], dict[str, Any]] = {}
+    for log in logs:
+        for text in log.read_text(encoding="utf-8").splitlines():
+            if text.endswith("}"):
+                line = json.loads(text)
+                found[line["family"], line["seed"]] = line
+    return list(found.values())
+
+
+def row(name: str, lines: list[dict[str, Any]]) -> str:
+    """One family."""
+    status = Counter(line["kind"] or line["status"] for line in lines)
+    told = ", ".join(f"{count} {kind}" for kind, count in status.most_common())
+    wrong = sum(bool(line["wrong"]) for line in lines)
+    beaten = sum(line["beaten"] > 1e-3 for line in lines)
+    noted = sum(bool(line.get("notes")) for line in lines)
+    seconds = sum(line["seconds"] for line in lines) / len(lines)
+    short = WANTED * SEEDS - len(lines)
+    extra = f"{beaten} beaten" if beaten else ""
+    extra += f"{noted} noted" if noted else ""
+    return f"| {name} | {len(lines)} | {short} | {told} | {wrong} | {extra} | {seconds:.1f} |"
+
+
+def page(lines: list[dict[str, Any]], names: list[str]) -> str:
+    """Figures by family, what was wrong, and what cannot be seen."""
+    by_family = {name: [line for line in lines if line["family"] == name] for name in names}
+    every = [line for group in by_family.values() for line in group]
+    wrong = [line for line in every if line["wrong"]]
+    rows = [row(name, group) for name, group in by_family.items() if group]
+    missing = [name for name, group in by_family.items() if not group]
+    rivals = sum(line["rivals"] for line in every)
+    told = [f"| {line['family']} | {line['seed']} | {'; '.join(line['wrong'])[:300]} |" for line in wrong]
+    parts = [
+        HEAD,
+        "## What was run\n",
+        f"{len(every)} problems, {rivals} rival designs or stars; {len(wrong)} problems with something wrong. "
+        f"Meant are {WANTED} problems of each family from each of {SEEDS} first seeds; *short* is what is left of that.\n",
+        "| family | problems | short | ended as | wrong | beside | mean time of a solve [s] |",
+        "| --- | ---: | ---: | --- | ---: | --- | ---: |",
+        *rows,
+    ]
+    if missing:
+        parts += ["", f"Not run at all: {', '.join(missing)}."]
+    parts += ["", "## What was wrong\n"]
+    parts += ["| family | seed | what |", "| --- | ---: | --- |", *told] if told else ["Nothing."]
+    parts += ["", "`python tests/attack/run_attack.py show FAMILY --from SEED` prints a problem's file.", FOOT]
+    return "\n".join(parts)
