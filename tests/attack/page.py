@@ -16,30 +16,32 @@ HEAD = """# Random problems against an independent model
 
 Written by `python tests/attack/run_attack.py page`, from the logs of `make attack`. Nothing here is edited by hand.
 
-A seed makes a problem of a family: sizes, speeds, mounts, what is open, asked and limited. The package solves it. A plain model
-under `tests/attack` reads the same file and shares no code with the package: positions of masses, momentum and energy
-differentiated by transforms, least energy of springs, six motions of a block, a gas cycle found by trying. It evaluates
-the design that was returned and looks for a better one: cutting planes of linear programs where unbalances alone are open (a
-bound of its own), every even star one by one, else random designs, evolution and a simplex. **Wrong** is: a value or a
-limit's value off by more than the stated error and what the plain model resolves; a design below a bound; a `global` value above a
-rival by more than the gap; "infeasible" where a rival keeps all limits with 2e-5 to spare; a limit passed by more than 3e-5; a
-result worse than the design as given; `failed`, an error, a warning, or anything on the screen. **Beaten**: a `local`
-design that a rival beats by more than 1e-3; it claims nothing else, and is not counted as wrong.
+A seed makes a problem of a family: sizes, speeds, mounts, what is open, asked and limited. The package solves it. A
+plain model under `tests/attack` reads the same file and shares no code with the package: positions of masses,
+momentum and energy differentiated by transforms, least energy of springs, six motions of a block, a gas cycle found
+by trying. It evaluates the design that was returned and looks for a better one: cutting planes of linear programs
+where unbalances alone are open (a bound of its own), every even star one by one, else random designs, evolution and a
+simplex. **Wrong** is: a value or a limit's value off by more than the stated error and what the plain model resolves;
+a design below a bound; a `global` value above a rival by more than the gap; "infeasible" where a rival keeps all
+limits with 2e-5 to spare; a limit passed by more than 3e-5; a result worse than the design as given; `failed`, an
+error, a warning, or anything on the screen. **Beaten**: a `local` design that a rival beats by more than 1e-3; it
+claims nothing else, and is not counted as wrong.
 
 - *Prices* lie between the gain of a limit loosened by 1 % and the loss of one tightened by 1 %.
 - *Monotony*: a limit loosened by 5 %, or one weight more, is not worse.
-- *Invariance*: parts in another order, front and back swapped, units of mass from 1e-6 to 1e6 and of length and time from 1e-2 to
-  1e2 keep value and kind of proof.
+- *Invariance*: parts in another order, front and back swapped, units of mass from 1e-6 to 1e6 and of length and time
+  from 1e-2 to 1e2 keep value and kind of proof.
 """
 
 FOOT = """
 ## What this attack cannot see
 
 - What the plain model shares with the documentation: both take its conventions, so a wrong convention is right to both.
-- Where a problem is not convex, that a rival was not found proves nothing: up to 600 designs are looked at, few for more than four numbers.
+- Where a problem is not convex, that a rival was not found proves nothing: some 600 to 1,000 designs are looked at, few
+  for more than four numbers.
 - Stars are enumerated up to 60; firing orders, optional shafts and uneven intervals of open throws are not drawn.
 - Gas is the mixed cycle alone. The plain model resolves 4096 steps of a cycle: peaks to 1e-5, with gas to 5e-5.
-- Limits of an elastic block: bump stops, time integration, ranges of speeds, mirrored mounts and decoupling are not drawn.
+- Of elastic mounts, bump stops, time integration, ranges of speeds, mirrored mounts and decoupling are not drawn.
 - Sizes are those of one car or tractor engine before rescaling: no twenty cylinders, no hundred mounts.
 - Errors that need two problems in one process, damaged files, memory and time limits have tests of their own.
 """
@@ -83,7 +85,7 @@ def page(lines: list[dict[str, Any]], names: list[str]) -> str:
         HEAD,
         "## What was run\n",
         f"{len(every)} problems, {rivals} rival designs or stars; {len(wrong)} problems with something wrong. "
-        f"Meant are {WANTED} problems of each family from each of {SEEDS} first seeds; *short* is what is left of that.\n",
+        f"Meant are {WANTED} problems of each family from each of {SEEDS} first seeds; *short* is what is left.\n",
         "| family | problems | short | ended as | wrong | beside | mean time of a solve [s] |",
         "| --- | ---: | ---: | --- | ---: | --- | ---: |",
         *rows,
