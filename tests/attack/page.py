@@ -79,6 +79,7 @@ def page(lines: list[dict[str, Any]], names: list[str]) -> str:
     wrong = [line for line in every if line["wrong"]]
     rows = [row(name, group) for name, group in by_family.items() if group]
     missing = [name for name, group in by_family.items() if not group]
+    commits = Counter(line.get("commit", "") for line in every)
     rivals = sum(line["rivals"] for line in every)
     told = [f"| {line['family']} | {line['seed']} | {'; '.join(line['wrong'])[:300]} |" for line in wrong]
     parts = [
@@ -86,6 +87,8 @@ def page(lines: list[dict[str, Any]], names: list[str]) -> str:
         "## What was run\n",
         f"{len(every)} problems, {rivals} rival designs or stars; {len(wrong)} problems with something wrong. "
         f"Meant are {WANTED} problems of each family from each of {SEEDS} first seeds; *short* is what is left.\n",
+        f"Commits: {', '.join(f'{name} ({count})' for name, count in commits.most_common())}. "
+        "A problem that was run again counts by its last run.\n",
         "| family | problems | short | ended as | wrong | beside | mean time of a solve [s] |",
         "| --- | ---: | ---: | --- | ---: | --- | ---: |",
         *rows,

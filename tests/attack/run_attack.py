@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import sys
 import tempfile
 import time
@@ -34,11 +35,10 @@ EFFORT = 6
 """Stars that are solved one by one, at most ten times as many, and hundreds of calls of a local search."""
 
 
-def done_in(log: Path) -> set[tuple[str, int]]:
-    if not log.exists():
-        return set()
-    lines = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines() if line.endswith("}")]
-    return {(line["family"], line["seed"]) for line in lines}
+def commit() -> str:
+    """Of the source that is attacked; empty where that is not known."""
+    done = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
+    return done.stdout.strip()
 
 
 def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
@@ -52,21 +52,26 @@ def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
         return try_problem(family, seed, table, rng, Path(folder), effort)
 
 
-def run(families: list[str], first: int, number: int, log: Path, seconds: float, effort: int) -> None:
+def run(told: argparse.Namespace) -> None:
     """Every family in turn, seed by seed, until the number or the time is reached."""
-    log.parent.mkdir(parents=True, exist_ok=True)
-    done, until = done_in(log), time.monotonic() + seconds
-    for seed in range(first, first + number):
-        for family in families:
-            if (family, seed) in done:
-                continue
-            if time.monotonic() > until:
-                return
-            verdict = attacked(family, seed, effort)
-            with log.open("a", encoding="utf-8") as out:
-                out.write(json.dumps(verdict.line) + "\n")
-            if verdict.wrong:
-                print(family, seed, verdict.status, *verdict.wrong, sep=" | ", flush=True)
+    told.log.parent.mkdir(parents=True, exist_ok=True)
+    families = NAMES if told.families == "all" else told.families.split(",")
+    known, until, at = lines_of([told.log] if told.log.exists() else []), time.monotonic() + told.seconds, commit()
+    done = {(line["family"], line["seed"]) for line in known}
+    todo = [(name, told.first + k) for k in range(told.number) for name in families]
+    if told.again:
+        todo = [(line["family"], line["seed"]) for line in known if line["wrong"] and line["family"] in families]
+        done = set()
+    for name, seed in todo:
+        if (name, seed) in done:
+            continue
+        if time.monotonic() > until:
+            return
+        verdict = attacked(name, seed, told.effort)
+        with told.log.open("a", encoding="utf-8") as out:
+            out.write(json.dumps({**verdict.line, "commit": at}) + "\n")
+        if verdict.wrong:
+            print(name, seed, verdict.status, *verdict.wrong, sep=" | ", flush=True)
 
 
 def main() -> None:
@@ -78,6 +83,7 @@ def main() -> None:
     running.add_argument("--number", type=int, default=100)
     running.add_argument("--log", type=Path, default=PAGE.with_name("run.jsonl"))
     running.add_argument("--seconds", type=float, default=1e9)
+    running.add_argument("--again", action="store_true", help="what the log has as wrong, once more")
     running.add_argument("--effort", type=int, default=EFFORT)
     show = commands.add_parser("show", help="the problem file of a family and a seed")
     show.add_argument("families")
@@ -91,8 +97,7 @@ def main() -> None:
     if told.command == "show":
         print(toml(problem(told.families, told.first)[0]))
         return
-    families = NAMES if told.families == "all" else told.families.split(",")
-    run(families, told.first, told.number, told.log, told.seconds, told.effort)
+    run(told)
 
 
 if __name__ == "__main__":
