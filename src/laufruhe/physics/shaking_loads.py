@@ -65,12 +65,12 @@ def forget() -> None:
 
 def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
     """Inertia of the reciprocating masses: F = -m s'' along each axis, and its roll moment (L2, L3, L7)."""
-    return _star_loads(engine, speed, lambda part: mass_effects(part, fidelity))
+    return star_loads(engine, speed, lambda part: mass_effects(part, fidelity))
 
 
 def rod_inertia_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
     """Roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
-    return _star_loads(engine, speed, lambda part: rod_effects(part, fidelity))
+    return star_loads(engine, speed, lambda part: rod_effects(part, fidelity))
 
 
 def rotating_loads(engine: Engine, speed: float) -> Spectrum:
@@ -106,7 +106,7 @@ def unit_star_load(engine: Engine, order: int, coefficient: complex, roll: bool)
     series = np.zeros(order + 1, dtype=complex)
     series[order] = coefficient
     effect = Effect(Direction.ROLL if roll else Direction.AXIAL, 1.0, None, lambda: series)
-    return _star_loads(engine, 1.0, lambda part: (replace(effect, size=1.0 / part.shaft.ratio**2),))
+    return star_loads(engine, 1.0, lambda part: (replace(effect, size=1.0 / part.shaft.ratio**2),))
 
 
 def added_rotor_loads(
@@ -157,8 +157,8 @@ def inertia_coefficients(
     return out[0], out[1], out[2]
 
 
-def _star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
-    """(coefficients of one cylinder) x (phase and weight of each), summed over the star (L6)."""
+def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
+    """(coefficients of one cylinder) x (phase and weight of each), summed over the star, shape (n, 6) (L6)."""
     cycle = engine.cycle
     alike: dict[Hashable, list[tuple[SliderCrank, Effect]]] = defaultdict(list)
     for part in engine.slider_cranks:

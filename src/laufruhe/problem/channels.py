@@ -20,6 +20,7 @@ from laufruhe.physics.bearing_loads import bearing_pressures, main_bearing_force
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import PointLoads
 
@@ -223,6 +224,10 @@ def _inside(
     return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True)
 
 
+def _at_one_place(signal: Spectrum) -> Spectrum:
+    return Spectrum(signal.base, signal.coefficients[:, None, None])
+
+
 def _names_of_mounts(engine: Engine) -> Sequence[str]:
     return [mount.name for mount in engine.mounts]
 
@@ -280,6 +285,10 @@ MAIN_BEARING_PRESSURE = _inside(
     "main-bearing pressure", "Pa", AT_BEARINGS, Needs.BEARINGS, _names_of_bearings,
     lambda moving, at: bearing_pressures(moving, main_bearing_forces(moving, at.point, at.fidelity)),
 )  # fmt: skip
+CRANK_TORQUE = _inside(
+    "crank torque", "N m", ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",),
+    lambda moving, at: _at_one_place(crank_torque(moving, at.point, at.fidelity)),
+)  # fmt: skip
 CRANK_PIN_FORCE = _inside(
     "crank-pin force", "N", AT_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
     lambda moving, at: pin_forces(moving, at.point, at.fidelity),
@@ -314,7 +323,7 @@ CHANNELS: Mapping[str, Channel] = {
     channel.name: channel
     for channel in (
         MOUNT_FORCE, MOUNT_TRAVEL, SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT,
-        MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE,
+        MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_TORQUE,
         COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
         TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import MOTIONS
+from laufruhe.physics.torque import torque_facts
 from laufruhe.physics.wrench import WRENCH
 from laufruhe.present.measures import PRESENT, Array, is_met, limits_of, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
@@ -33,12 +34,13 @@ def as_dict(result: Result) -> Record:
     """The contract as plain Python values."""
     problem = result.problem
     points = [
-        {**_of(point, "name speed weight"), **_by_place(result, k), "shaking": _shaking(result.final.loads[k].wrench)}
+        {**_of(point, "name speed weight"), **_by_place(result, k), "shaking": _shaking(result.final.loads[k].wrench),
+         "torque": asdict(torque_facts(result.final.engine, point, problem.fidelity))}
         for k, point in enumerate(problem.points)
     ]  # fmt: skip
     # one operating point stands at the top already
     places = {"mounts": None} | {places.key: None for places in places_of(result)}
-    own = ("name", "speed", "weight", *((*places, "shaking") if len(points) > 1 else ()))
+    own = ("name", "speed", "weight", "torque", *((*places, "shaking") if len(points) > 1 else ()))
     return {
         "problem": problem.name,
         **_of(problem, "title source assumptions"),

@@ -1,0 +1,157 @@
+"""Torque of the crankshaft over the cycle, the energy that a flywheel has to store, and how large it must be (T1-T4).
+
+    T = -A (p - p_crankcase) ds/dphi - (1/2) w^2 dJ/dphi                     (T1; textbook eqs. 18, 19)
+
+with J the inertia of pistons and rods reduced to the crank (F3): what they store, they take from the torque. The load
+takes its mean; the rest goes into the flywheel and comes back, and what has to be stored is the largest less the
+smallest of its integral (T2; textbook eq. 24, Roetscher eq. 303).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import Engine, OperatingPoint, SliderCrank
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.mechanism import ComplexArray, Direction, Effect, resolved_orders
+from laufruhe.physics.shaking_loads import star_loads
+from laufruhe.physics.uneven_speed import crank_motion
+from laufruhe.physics.wrench import ROLL
+
+FINE = 8
+"""Times as many steps as the fidelity has, at which the work is compared."""
+_ROUNDS = 200
+
+
+@dataclass(frozen=True)
+class TorqueFacts:
+    """Torque at one operating point.
+
+    Attributes
+    ----------
+    mean
+        What the load takes [N m].
+    power
+        Mean torque times speed [W].
+    least, largest
+        Over the cycle [N m].
+    excursion
+        Work that is stored and given back within the cycle [J] (T2).
+    irregularity
+        Largest less smallest speed over the mean speed; None where the speed is taken as even (T3).
+    """
+
+    mean: float
+    power: float
+    least: float
+    largest: float
+    excursion: float
+    irregularity: float | None
+
+
+def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Torque of gas, pistons and rods on the crankshaft at even speed, as it drives the engine's output (T1).
+
+    Returns
+    -------
+    Spectrum of shape (n,) [N m].
+    """
+    gas = fidelity.gas_of(point)
+    masses = fidelity.kept(star_loads(engine, point.speed, lambda part: (_of_masses(part, fidelity),)))
+    total = masses if gas is None else masses + fidelity.kept(gas_loads(engine, gas, fidelity))
+    return Spectrum(total.base, total.coefficients @ ROLL)
+
+
+def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
+    """Torque at unit speed of the mechanism's own crank, in the sense of the output."""
+    is_rigid = fidelity.rod == "rigid"
+    alike = "torque", replace(part, name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0), is_rigid
+    return Effect(Direction.ROLL, 1.0, alike, lambda: _orders(part, is_rigid))
+
+
+def _orders(part: SliderCrank, is_rigid: bool) -> ComplexArray:
+    def torque(alpha: np.ndarray) -> tuple[np.ndarray]:
+        motion = part.motion(np, alpha)
+        total = np.zeros(len(alpha))
+        for mass, (_, velocity, acceleration) in motion.points:
+            total -= mass * (np.conj(velocity) * acceleration).real
+        for inertia, (rate, swing) in motion.swings if is_rigid else ():
+            total -= inertia * rate * swing
+        return (part.shaft.ratio * total,)
+
+    return np.asarray(resolved_orders(torque, np.ones((1, 1)), part.name)[0])
+
+
+def work_stored(torque: Spectrum, samples: int) -> float:
+    """Largest less smallest work of the torque less its mean [J], of a torque of shape (n,) (T2)."""
+    work = torque.integral.sample(samples)
+    return float(work.max() - work.min()) if len(work) else 0.0
+
+
+def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> TorqueFacts:
+    """Mean, ends and stored work of the torque, and the unevenness of the speed where that varies.
+
+    Raises
+    ------
+    ModelError
+        If the crank would stop within the cycle.
+    """
+    torque = crank_torque(engine, point, fidelity)
+    values = torque.sample(FINE * fidelity.samples)
+    mean = float(torque.coefficients[0].real)
+    uneven = crank_motion(engine, point, fidelity).unevenness if fidelity.is_uneven else None
+    return TorqueFacts(
+        mean, mean * point.speed, float(values.min()), float(values.max()),
+        work_stored(torque, FINE * fidelity.samples), uneven,
+    )  # fmt: skip
+
+
+def least_inertia(
+    engine: Engine, point: OperatingPoint, degree: float, fidelity: Fidelity = EXACT, tolerance: float = 1e-9
+) -> float:
+    """Least inertia of all that turns with the crank [kg m2] that keeps the speed as even as asked (T4).
+
+    The degree of irregularity falls as the inertia grows, so that halving an interval finds it; the
+    speed is the exact one (F2-F4), pistons and rods storing energy of their own.
+
+    Parameters
+    ----------
+    degree
+        Largest less smallest speed over the mean, wanted: 1/60 for a mill, 1/300 for electric light.
+
+    Raises
+    ------
+    ModelError
+        If the degree is not positive, or no inertia reaches it.
+    """
+    if not degree > 0.0:
+        raise ModelError(f"a degree of irregularity of {degree:g} means no change of speed; give a positive one")
+
+    def keeps(inertia: float) -> bool:
+        try:
+            return crank_motion(engine, point, replace(fidelity, crank_inertia=inertia)).unevenness <= degree
+        except ModelError:
+            # the crank would stop
+            return False
+
+    stored = work_stored(crank_torque(engine, point, fidelity), FINE * fidelity.samples)
+    high = max(stored / (degree * point.speed**2), 1e-12)
+    for _ in range(_ROUNDS):
+        if keeps(high):
+            break
+        high *= 2.0
+    else:
+        raise ModelError(f"no flywheel keeps the speed of '{engine.name}' even to {degree:g} at {point.name}")
+    low = high
+    while low > 1e-12 and keeps(low):
+        high, low = low, 0.5 * low
+    while high - low > tolerance * high:
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if keeps(middle) else (middle, high)
+    return high

@@ -1,0 +1,31 @@
+"""Torque of the crankshaft, the work that its flywheel stores, and how evenly it turns."""
+
+from __future__ import annotations
+
+from laufruhe.physics.torque import TorqueFacts, torque_facts
+from laufruhe.present.numbers import DASH, number
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import Result
+
+NOTE = (
+    "Of gas, pistons and rods, friction left out. Stored: largest less smallest work of the torque about its mean. "
+    "Irregularity: largest less smallest speed over the mean."
+)
+HEAD = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "stored [J]", "irregularity")
+
+
+def tables(result: Result) -> list[Grid]:
+    """A row an operating point, where the speed varies or the inside of the crankcase is asked for."""
+    engine, problem = result.final.engine, result.problem
+    if not problem.fidelity.is_uneven and not any(measure.is_inside for measure in problem.measures):
+        return []
+    facts = ((point.name, torque_facts(engine, point, problem.fidelity)) for point in problem.points)
+    return [Grid("Torque of the crankshaft", HEAD, tuple(_row(*pair) for pair in facts), note=NOTE)]
+
+
+def _row(name: str, facts: TorqueFacts) -> tuple[str, ...]:
+    size = max(abs(facts.least), abs(facts.largest))
+    numbers = [number(value, scale=size) for value in (facts.mean, 1e-3 * facts.power, facts.least, facts.largest)]
+    uneven = facts.irregularity
+    even = DASH if uneven is None else "0" if not uneven else f"{number(uneven, 3)} (1/{1.0 / uneven:.4g})"
+    return name, *numbers, number(facts.excursion), even
