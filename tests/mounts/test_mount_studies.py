@@ -12,8 +12,7 @@ from typer.testing import CliRunner
 from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
-from laufruhe.files.study_parts import SweepTable
-from laufruhe.files.study_sweeps import axis_of
+from laufruhe.files.study_tables import SweepTable, axis_of
 from laufruhe.solvers import solve, state
 from laufruhe.studies import run
 from laufruhe.studies.reader import load_study

@@ -13,7 +13,7 @@ import xarray as xr
 
 from laufruhe import load
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine.similarity import equal_power_scale
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels

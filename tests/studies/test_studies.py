@@ -23,7 +23,7 @@ from laufruhe.cli import app
 from laufruhe.cli import study as cli_study
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
-from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_tables import CaseTable
 from laufruhe.problem.measure import Limit
 from laufruhe.solvers import solve
 from laufruhe.studies import Point, Scenes, kinds, run, work
@@ -31,9 +31,9 @@ from laufruhe.studies.kept import NAME
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
 from laufruhe.studies.kinds.replication import Replication
-from laufruhe.studies.outcome import solved
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.swept import solved
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPEED = "operating_points.1.mean_piston_speed"
@@ -342,7 +342,10 @@ def test_every_figure_and_statement_is_on_the_page(tmp_path: Path, monkeypatch: 
     assert answer.exit_code == 0, answer.output
     folder = tmp_path / "results" / "tractor-study"
     parts = load_study(PROBLEMS / "tractor-study.toml").study.parts
-    assert {path.name for path in folder.iterdir()} == {"report.md", *(f"{p.name}.{e}" for p in parts for e in p.ends)}
+    assert {path.name for path in folder.glob("[!.]*")} == {
+        "report.md",
+        *(f"{p.name}.{e}" for p in parts for e in p.ends),
+    }
     page = (folder / "report.md").read_text(encoding="utf-8")
     for part in parts:
         assert isinstance(part, Replication)

@@ -10,9 +10,7 @@ from typer.testing import CliRunner
 from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
-from laufruhe.files.study_parts import CaseTable, SweepTable
-from laufruhe.files.study_paths import field_at
-from laufruhe.files.study_sweeps import axis_of
+from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at
 from laufruhe.studies import Point, Scenes, run
 from laufruhe.studies.reader import load_study
 

@@ -10,7 +10,7 @@ import xarray as xr
 from pydantic import Field
 
 from laufruhe.files.fields import Name, Table
-from laufruhe.files.study_parts import CaseTable, Value
+from laufruhe.files.study_tables import CaseTable, Value
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text

@@ -14,8 +14,7 @@ from laufruhe.errors import Complaint, InputError
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
 from laufruhe.files.reader import tables_of
-from laufruhe.files.study_paths import joined
-from laufruhe.files.study_sweeps import MOST_POINTS, axis_of
+from laufruhe.files.study_tables import MOST_POINTS, axis_of, joined
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.part import Part
 from laufruhe.studies.swept import SweptPart

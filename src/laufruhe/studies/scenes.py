@@ -14,8 +14,7 @@ from laufruhe import __version__
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.files.study_parts import CaseTable
-from laufruhe.files.study_paths import changed
+from laufruhe.files.study_tables import CaseTable, changed
 from laufruhe.machine import Role
 from laufruhe.problem.decision import without_rotors
 from laufruhe.problem.problem import Problem

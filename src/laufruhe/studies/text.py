@@ -1,12 +1,10 @@
-"""What a report says of a study part: paragraphs and tables, as data."""
+"""What a report says of a study part: paragraphs, tables, and statements of a source beside ours, as data."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
-
-from laufruhe.studies.verdict import Verdict
 
 NOTHING = "–"
 
@@ -21,6 +19,30 @@ class Rows:
 
 
 Text: TypeAlias = str | Rows
+
+
+UNSTATED = "not in the study"
+"""In place of the study's number, where ours goes beyond it."""
+
+NEGLIGIBLE = 0.07
+"""Change of a force that cannot be told apart in the bars of a printed figure, by which the study judges."""
+NOTICEABLE = 0.15
+"""Change that stands out in the same bars: about twice what cannot be told apart."""
+PRINTED_FALL = 0.05
+"""Allowed on a printed fall of the mean force: a rod ratio of 0.22 instead of 0.26 takes off four points, gas at
+full load five, and the study prints neither."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One statement, what the study says and what is found here, and the tolerance or the reason that decides."""
+
+    statement: str
+    paper: str
+    ours: float
+    unit: str
+    agrees: bool
+    why: str
 
 
 def number(value: float, digits: int = 5) -> str:

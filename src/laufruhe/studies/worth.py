@@ -36,7 +36,7 @@ from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from laufruhe.studies.scenes import shafts_of
-from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
+from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 
 MASS_ON_SHAFTS = Measure(channels.BALANCER_MASS, NORMS["mean"])
 LIMIT_NAME = "mass on shafts"

@@ -10,12 +10,10 @@ import numpy as np
 import xarray as xr
 
 from laufruhe.files.rotors import FACTORS
-from laufruhe.files.study_paths import at
-from laufruhe.files.study_sweeps import Axis
+from laufruhe.files.study_tables import Axis, at
 from laufruhe.studies import picture as p
-from laufruhe.studies.outcome import dataset
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import SweptPart, coordinates
+from laufruhe.studies.swept import SweptPart, coordinates, dataset
 from laufruhe.studies.swept_shown import (
     bars,
     claimed,

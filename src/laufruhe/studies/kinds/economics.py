@@ -14,7 +14,7 @@ from laufruhe.errors import ModelError, SolverError
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import nearest
 from laufruhe.files.fields import Name, Table
-from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_tables import CaseTable
 from laufruhe.present.numbers import percent
 from laufruhe.problem.problem import Problem
 from laufruhe.studies import picture as p

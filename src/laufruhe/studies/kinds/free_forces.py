@@ -19,7 +19,7 @@ from pydantic import Field
 from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Table
-from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import turning_parts

@@ -15,7 +15,7 @@ from pydantic_core import InitErrorDetails
 
 from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
-from laufruhe.files.study_paths import joined
+from laufruhe.files.study_tables import joined
 from laufruhe.solvers import Status, solve
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.picture import Picture

@@ -16,7 +16,7 @@ from laufruhe.errors import InputError
 from laufruhe.files import fields as f
 from laufruhe.files.asked import QuantityName, QuantityTable, Scene
 from laufruhe.files.complaints import Refused, measured, nearest
-from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.elastic_mounts import ResonanceError
@@ -25,9 +25,9 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure, selected
 from laufruhe.problem.problem import Problem
 from laufruhe.studies import picture as p
-from laufruhe.studies.outcome import AS_GIVEN, FAILED, decided
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.swept import AS_GIVEN, FAILED, decided
 from laufruhe.studies.text import NOTHING, Rows, Text, number
 from laufruhe.units import readable
 

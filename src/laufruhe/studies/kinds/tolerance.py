@@ -19,7 +19,7 @@ from pydantic import Field, model_validator
 
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Name, Table
-from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, Role, Rotor
 from laufruhe.physics.modes import GRAVITY
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
@@ -30,8 +30,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.text import Rows, Text, number, said
-from laufruhe.studies.verdict import NEGLIGIBLE, Verdict
+from laufruhe.studies.text import NEGLIGIBLE, Rows, Text, Verdict, number, said
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from laufruhe.machine.layouts import stations
 from laufruhe.physics.elastic_mounts import single_transmissibility
 from laufruhe.physics.modes import GRAVITY, sag_for_critical_speed, sag_frequency
-from laufruhe.studies.verdict import NEGLIGIBLE, NOTICEABLE
+from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE
 
 if TYPE_CHECKING:
     import xarray as xr

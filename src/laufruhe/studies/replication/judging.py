@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from laufruhe.studies.replication.expressions import filled, number_of
 from laufruhe.studies.replication.models import StatementTable
-from laufruhe.studies.text import Rows, Text
-from laufruhe.studies.verdict import UNSTATED
+from laufruhe.studies.text import UNSTATED, Rows, Text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Table
-from laufruhe.files.study_parts import CaseTable
+from laufruhe.files.study_tables import CaseTable
 from laufruhe.studies.picture import SERIES
 
 Expression: TypeAlias = int | float | str

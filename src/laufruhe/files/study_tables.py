@@ -1,4 +1,4 @@
-"""What is swept: the values as a problem file has them, and as numbers with a unit for axes and tables."""
+"""Scenes of a study file: cases, what is swept, and paths into the tables of a problem file."""
 
 from __future__ import annotations
 
@@ -6,17 +6,132 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, Any, Literal, TypeAlias, get_args, get_origin
 
 import numpy as np
+from pydantic import BaseModel, BeforeValidator, Field
 
 from laufruhe import units
-from laufruhe.files.complaints import Refused, measured
-from laufruhe.files.study_parts import SweepTable, Value
-from laufruhe.files.study_paths import field_at
+from laufruhe.files import fields
+from laufruhe.files.complaints import Refused, measured, nearest
+from laufruhe.files.fields import Name, Table, refusal
+from laufruhe.files.problem_file import ProblemFile
 
 MOST_POINTS = 100_000
 _DIGITS = 12
 _SIDES = {"max": "at most", "min": "at least"}
+
+
+def _single(given: object) -> object:
+    if given is not None and not isinstance(given, bool | int | float | str):
+        raise refusal("is neither a number nor a text; write one of them")
+    return given
+
+
+Value: TypeAlias = Annotated[bool | int | float | str, BeforeValidator(_single)]
+End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
+
+
+class SweepTable(Table):
+    """One quantity of the scene and the values that it takes: listed, or spaced between two ends."""
+
+    quantity: str = Field(description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
+    values: list[Value] | None = None
+    first: End = Field(default=None, alias="from")
+    last: End = Field(default=None, alias="to")
+    points: int | None = Field(default=None, description="Values from the first to the last.")
+    spacing: Literal["linear", "log"] | None = None
+
+
+class CaseTable(Table):
+    """One scene: a problem file, and what is changed of it."""
+
+    name: Name
+    problem: str
+    set: dict[str, Value] = Field(default_factory=dict, description="Paths of the problem file and their new values.")
+    without: list[str] = Field(default_factory=list, description="Tables left out, as balancer_shafts or gas.")
+    equal_power_to: Annotated[int, Field(ge=1, le=48)] | None = Field(
+        default=None, description="Rebuilt to the power that this many of its cylinders have."
+    )
+
+
+def at(tables: dict[str, Any], where: str) -> Any:
+    """What stands at a path such as counterweights.web.balance_factor; `Refused` where it leads nowhere."""
+    here: Any = tables
+    for key in keys_of(tables, where):
+        here = here[key]
+    return here
+
+
+def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
+    """Tables with another value at a path, `Refused` where it leads nowhere; the rest is shared with those given."""
+    keys = keys_of(tables, where)
+    whole = here = dict(tables)
+    for key in keys[:-1]:
+        here[key] = here[key].copy()
+        here = here[key]
+    here[keys[-1]] = value
+    return whole
+
+
+def joined(tables: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Tables with others upon them: a table within is joined in turn, anything else is replaced."""
+    both = [key for key, one in own.items() if isinstance(one, dict) and isinstance(tables.get(key), dict)]
+    return {**tables, **own, **{key: joined(tables[key], own[key]) for key in both}}
+
+
+def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
+    """The keys and places that a path goes through; `Refused` where the scene has no such quantity."""
+    here: Any = tables
+    keys = []
+    parts = where.split(".")
+    for k, part in enumerate(parts):
+        options = _options(here)
+        if part not in options:
+            remedy = nearest(part, list(options)) if options else "name a quantity of the problem file"
+            raise Refused(".".join(parts[: k + 1]), None, "is no quantity of this scene", remedy)
+        keys.append(options[part])
+        here = here[options[part]]
+    return tuple(keys)
+
+
+def _options(here: Any) -> dict[str, Any]:
+    """Names of what a table or a list holds; a list's entries by their names, or counted from one."""
+    if isinstance(here, dict):
+        return {key: key for key in here}
+    if isinstance(here, list):
+        named = {entry["name"]: k for k, entry in enumerate(here) if isinstance(entry, dict) and "name" in entry}
+        return {**{str(k + 1): k for k in range(len(here))}, **named}
+    return {}
+
+
+def field_at(where: str) -> fields.Number | None:
+    """How the number at a path is read; None where text, a list or a choice stands there."""
+    here: list[Any] = [ProblemFile]
+    for part in where.split("."):
+        here = [inner for annotation in here for inner in _inside(annotation, part)]
+    return next((found for annotation in here for found in _numbers(annotation)), None)
+
+
+def _inside(annotation: Any, part: str) -> list[Any]:
+    """Annotations of what a part of a path may mean."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        field = annotation.model_fields.get(part)
+        return [] if field is None else [Annotated[field.annotation, *field.metadata, None]]
+    if get_origin(annotation) is list:
+        return list(get_args(annotation))
+    if isinstance(annotation, fields.OrOpen):
+        return _inside(annotation.inner, part)
+    # what is annotated and its notes, or the members of a union
+    return [inner for one in get_args(annotation) for inner in _inside(one, part)]
+
+
+def _numbers(annotation: Any) -> list[fields.Number]:
+    if isinstance(annotation, fields.Number):
+        return [annotation]
+    if get_origin(annotation) is list:
+        return []
+    return [found for one in get_args(annotation) for found in _numbers(one)]
 
 
 @dataclass(frozen=True)
@@ -48,13 +163,7 @@ class Axis:
 
 
 def axis_of(sweep: SweepTable) -> Axis:
-    """The values of a sweep and their unit.
-
-    Raises
-    ------
-    Refused
-        If it is empty, holds one value or one twice, or mixes what does not fit.
-    """
+    """The values of a sweep and their unit; `Refused` where it has fewer than two, one twice, or what does not fit."""
     spaced = (sweep.first, sweep.last, sweep.points)
     if sweep.values is None:
         values, given = _spaced(sweep), "points"
