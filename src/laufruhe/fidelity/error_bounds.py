@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 REFERENCE_SAMPLES = 5760
 """Steps a cycle of the reference: what cheaper choices are compared with."""
-ROUNDING = 2e-13
+ROUNDING = 2e-12
 """Relative error that sums of a few thousand rounded terms may have (F9)."""
 
 
@@ -73,7 +73,7 @@ class Scale:
         total = 0.0
         for term in self.terms:
             pairs = zip(signals(term.measure, ours), signals(term.measure, theirs), strict=True)
-            left_out = [x + Spectrum(y.base, -y.coefficients) for x, y in pairs]
+            left_out = [x + y.each(np.negative) for x, y in pairs]
             total += term.weight * term.measure.norm.above(left_out, self._shares(term))
         return total
 
@@ -94,8 +94,8 @@ class Scale:
     def doubted(self) -> float:
         """What the reference itself may miss of gas torque between its steps (F9).
 
-        Torque bends where valves and heat act, so its orders converge with the square of
-        the step: the change from half the steps is three times what is left.
+        What corners in closed form leave falls off at least with the step: half the steps change no less than
+        what is left.
         """
         whole = self.best.fidelity
         if all(whole.gas_of(loads.point) is None for loads in self.best.loads):
@@ -189,6 +189,26 @@ def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> f
     scale, value = Scale(problem, best), _loads(problem, evaluation)
     bound = scale.lost(evaluation, best) + scale.missed(evaluation, best.samples) + scale.doubted
     return relative(bound + ROUNDING * value, value)
+
+
+def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
+    """Relative error of the objective from its samples and those of the gas, which is not exceeded (F7-F9).
+
+    Over the objective of `evaluation`, of the physics that its fidelity asks for; infinite where that is zero and the
+    bound is not.
+    """
+    scale, own = Scale(problem, evaluation), evaluation.fidelity
+    bound = scale.missed(evaluation) + ROUNDING * scale.value
+    if own.is_uneven or any(own.gas_of(loads.point) for loads in evaluation.loads):
+        # integration in time is taken as wanted, and would take long
+        mounts = "frequency" if own.mounts == "time" else own.mounts
+        given, finer = (
+            scale.evaluation(replace(own, samples=k * own.samples, gas_samples=k * own.gas_steps, mounts=mounts))
+            for k in (1, 2)
+        )
+        # what is left of twice the steps is no more than what they change
+        bound += 2.0 * scale.lost(given, finer)
+    return relative(bound, scale.value)
 
 
 def _loads(problem: Problem, evaluation: Evaluation) -> float:

@@ -21,7 +21,7 @@ from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.decision import Decision, Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Measure, Rows, load_rows, mass_rows
+from laufruhe.problem.measure import Measure, Rows, bends_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -156,7 +156,11 @@ class AffineModel:
     ----------
     bare
         The design with every decision at zero.
+    lead
+        A model whose bends are counted in place of its own.
     """
+
+    lead: AffineModel | None = None
 
     def __init__(self, problem: Problem, keep_all: bool = False, whole_cycle: bool = False) -> None:
         self.problem = problem
@@ -217,27 +221,23 @@ class AffineModel:
             slopes = [mass_rows(measure, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]
             return _stacked(bare, slopes, self._keep_all)
         averaged = averaged and measure.norm.averages
-        bare = self._rows(measure, self.bare.signals(channel), samples, averaged)
+        # what is open does not bend, but has to be known at the same angles
+        lead = [signal.over(self.base) for signal in (self.lead or self).bare.signals(channel)]
+        bends = bends_of(measure, lead, self.problem.engine)
+        bare = self._rows(measure, self.bare.signals(channel), samples, averaged, bends)
         slopes = [
-            self._rows(measure, [channel.signal(by[k]) for by in self._slopes], samples, averaged).vectors
+            self._rows(measure, [channel.signal(by[k]) for by in self._slopes], samples, averaged, bends).vectors
             for k in range(len(self._changes))
         ]
         return _stacked(bare, slopes, self._keep_all)
 
-    def _rows(self, measure: Measure, signals: Sequence[Spectrum], samples: int, averaged: bool) -> Rows:
-        finest = common_base([self.base, *(signal.base for signal in signals)])
-        step = int(self.base / finest)
-        period = [Spectrum(self.base, s.rebased(finest).coefficients[::step]) for s in signals]
+    def _rows(
+        self, measure: Measure, signals: Sequence[Spectrum], samples: int, averaged: bool, bends: Sequence[Array]
+    ) -> Rows:
+        period = [signal.over(self.base) for signal in signals]
         if averaged:
-            period = [_averaged(signal, samples) for signal in period]
-        return load_rows(measure, self.problem.points, period, self.problem.engine, samples)
-
-
-def _averaged(signal: Spectrum, samples: int) -> Spectrum:
-    """Averages under a triangle that falls to zero one step to either side: sinc^2 times each order (P7)."""
-    c = signal.coefficients
-    share = np.sinc(np.arange(len(c)) / samples) ** 2
-    return Spectrum(signal.base, c * share.reshape(-1, *(1,) * (c.ndim - 1)))
+            period = [signal.averaged(signal.period / samples) for signal in period]
+        return load_rows(measure, self.problem.points, period, self.problem.engine, samples, bends)
 
 
 def _change(problem: Problem, decision: Decision, direction: complex) -> tuple[Rotor, ...]:

@@ -24,7 +24,7 @@ from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import rotor_loads, unit_star_load
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Measure
+from laufruhe.problem.measure import Measure, bends_of
 
 Array = NDArray[np.float64]
 
@@ -107,7 +107,7 @@ class EngineFamily:
         found += [rotor_loads([rotor], 1.0, cycle) for rotor in units]
         if self._gas is not None:
             gas = gas_loads(engine, self._gas, self.fidelity)
-            found.append(Spectrum(gas.base, gas.coefficients / self._first.crank_radius))
+            found.append(gas.each(lambda loads: loads / self._first.crank_radius))
         return found
 
     def _sizes(self, arrays: EngineArrays, part: slice, coefficients: Array) -> Array:
@@ -165,13 +165,16 @@ class EngineFamily:
         engine, found = self.template, []
         maps = rigid_mounting(engine.mounts).maps if engine.mounts else np.zeros((0, 3, 6))
         for wrench in shapes:
-            forces = Spectrum(wrench.base, np.einsum("mij,nj->nmi", maps, wrench.coefficients))
-            loads = PointLoads(self._point, wrench, forces)
-            found.append(Evaluation(engine, self.fidelity, (loads,), self.fidelity.samples).rows(measure))
-        stacked = np.stack([rows.vectors for rows in found])
+            loads = PointLoads(self._point, wrench, wrench.each(lambda own: np.einsum("mij,nj->nmi", maps, own)))
+            found.append(Evaluation(engine, self.fidelity, (loads,), self.fidelity.samples))
+        bends = max(
+            (bends_of(measure, each.signals(measure.load), engine) for each in found), key=lambda own: len(own[0])
+        )
+        rows = [each.rows(measure, bends=bends) for each in found]
+        stacked = np.stack([each.vectors for each in rows])
         driven = np.any(stacked != 0.0, axis=(0, 1))
         driven[:1] |= not driven.any()
-        return BatchNorm(measure.norm, np.ascontiguousarray(stacked[:, :, driven].transpose(2, 0, 1)), found[0].grid)
+        return BatchNorm(measure.norm, np.ascontiguousarray(stacked[:, :, driven].transpose(2, 0, 1)), rows[0].grid)
 
 
 def _alike(engine: Engine) -> SliderCrank:

@@ -120,7 +120,7 @@ class StarModel:
         models = [self._whole, self._still, *self._moved.values()]
         self.base = common_base([model.base for model in models])
         for model in models:
-            model.base = self.base
+            model.base, model.lead = self.base, self._whole
         self.domains = self._whole.domains
         self._cache: dict[int, StarProblem] = {}
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from math import gcd, lcm
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from laufruhe.numerics.corners import Corners, found_corners, joined
+
+MOST_CORNERS = 24
+"""Of one function that are taken out in closed form."""
 MAX_ORDER_DENOMINATOR = 1000
 PER_ORDER = 1000
 """Orders are told apart to a thousandth of crank speed."""
@@ -41,10 +46,47 @@ class Spectrum:
         The lowest order b: 1 for a period of one turn, 1/2 for a four-stroke cycle.
     coefficients
         Shape (n, ...): c_j of order j b, j = 0 ... n-1, of a signal of any shape.
+    corners
+        Of a signal whose derivatives jump: its orders from n on are those of the corners (L5a).
     """
 
     base: Fraction
     coefficients: NDArray[np.complex128]
+    corners: Corners | None = None
+
+    @property
+    def period(self) -> float:
+        """2 pi / b [rad]."""
+        return math.tau / float(self.base)
+
+    @property
+    def smooth(self) -> Self:
+        """The signal without its corners: no order beyond its coefficients."""
+        if self.corners is None:
+            return self
+        return type(self)(
+            self.base, self.coefficients - self.corners.coefficients(len(self.coefficients), float(self.base))
+        )
+
+    @property
+    def series(self) -> Self:
+        """Its orders alone: of averages the better, for samples of what bends are off by the square of their step."""
+        return type(self)(self.base, self.coefficients)
+
+    @property
+    def bends(self) -> NDArray[np.float64]:
+        """Angles at which its slope jumps, shape (k,) [rad]."""
+        return np.zeros(0) if self.corners is None else self.corners.bending
+
+    def each(self, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> Self:
+        """Through a real linear map of its values, given as a function of arrays (n, ...)."""
+        corners = None if self.corners is None else self.corners.each(linear)
+        return type(self)(self.base, linear(self.coefficients), corners)
+
+    def averaged(self, step: float) -> Self:
+        """Averages under a triangle that falls to zero at an angle to either side: sinc^2 times each order (P7)."""
+        share = np.sinc(self.orders * step / math.tau) ** 2
+        return type(self)(self.base, self.coefficients * share.reshape(-1, *(1,) * (self.coefficients.ndim - 1)))
 
     @property
     def orders(self) -> NDArray[np.float64]:
@@ -67,6 +109,9 @@ class Spectrum:
         Orders above half the number of samples are folded, not dropped: every
         value is that of the whole series at its angle.
         """
+        if self.corners is not None:
+            angles = self.period * np.arange(samples) / samples
+            return self.smooth.sample(samples) + self.corners.values(angles, self.period)
         if len(self.coefficients) <= (samples + 1) // 2:
             # no order reaches half the number of samples, so none is folded
             half = 0.5 * samples * self.coefficients
@@ -84,14 +129,15 @@ class Spectrum:
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at any crank angles [rad], shape (len(angles), ...)."""
         waves = np.exp(1j * np.outer(angles, self.orders))
-        return np.asarray(np.tensordot(waves, self.coefficients, axes=(1, 0)).real)
+        found = np.asarray(np.tensordot(waves, self.smooth.coefficients, axes=(1, 0)).real)
+        return found if self.corners is None else found + self.corners.values(angles, self.period)
 
     @property
     def integral(self) -> Self:
         """The integral over crank angle of all but the mean, itself without a mean."""
         whole = np.zeros_like(self.coefficients)
         whole[1:] = (self.coefficients[1:].T / (1j * self.orders[1:])).T
-        return type(self)(self.base, whole)
+        return type(self)(self.base, whole, None if self.corners is None else self.corners.moved(0.0, 1))
 
     def rebased(self, base: Fraction) -> Self:
         """The same signal counted in a finer lowest order."""
@@ -103,7 +149,8 @@ class Spectrum:
         step = int(factor)
         spread = np.zeros(((len(self.coefficients) - 1) * step + 1, *self.coefficients.shape[1:]), dtype=complex)
         spread[::step] = self.coefficients
-        return type(self)(base, spread)
+        corners = None if self.corners is None else self.corners.repeated(self.period, step)
+        return type(self)(base, spread, corners)
 
     def reduced(self, also: tuple[Fraction, ...] = ()) -> Self:
         """The same signal over its own shortest period.
@@ -117,24 +164,35 @@ class Spectrum:
         orders = [int(j) * self.base for j in used if j > 0] + [order for order in also if order > 0]
         if not orders:
             return type(self)(Fraction(1), self.coefficients[:1])
-        base = common_base(orders)
+        return self.over(common_base(orders))
+
+    def over(self, base: Fraction) -> Self:
+        """The same signal over another period of its own, that of the lowest order `base`."""
         fine = self.rebased(_common(base, self.base))
         step = int(base / fine.base)
-        return type(self)(base, fine.coefficients[::step])
+        corners = None if fine.corners is None else fine.corners.folded(fine.period / step, step)
+        return type(self)(base, fine.coefficients[::step], corners)
 
     def kept(self, highest: float) -> Self:
-        """The signal without the orders above `highest`."""
-        return type(self)(
-            self.base, self.coefficients[: int(np.sum(_thousandths(self.orders) <= _thousandths(highest)))]
-        )
+        """The signal without the orders above `highest`; its corners are gone where any is left out."""
+        count = int(np.sum(_thousandths(self.orders) <= _thousandths(highest)))
+        return self if count == len(self.coefficients) else type(self)(self.base, self.coefficients[:count])
 
     def __add__(self, other: Self) -> Self:
         base = _common(self.base, other.base)
-        a, b = self.rebased(base).coefficients, other.rebased(base).coefficients
-        longer, shorter = (a, b) if len(a) >= len(b) else (b, a)
-        total = longer.copy()
-        total[: len(shorter)] += shorter
-        return type(self)(base, total)
+        a, b = self.rebased(base), other.rebased(base)
+        count = max(len(a.coefficients), len(b.coefficients))
+        corners = joined([a.corners, b.corners])
+        return type(self)(base, a._padded(count) + b._padded(count), corners)
+
+    def _padded(self, count: int) -> NDArray[np.complex128]:
+        """So many coefficients, those that corners have among them."""
+        own = self.coefficients
+        out = np.zeros((count, *own.shape[1:]), dtype=complex)
+        if self.corners is not None and count > len(own):
+            out += self.corners.coefficients(count, float(self.base))
+        out[: len(own)] = own
+        return out
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:
@@ -160,6 +218,32 @@ def spectrum_of(samples: NDArray[np.float64], base: Fraction) -> Spectrum:
     if count % 2 == 0:
         coefficients[-1] /= 2.0
     return Spectrum(base, coefficients)
+
+
+def bent_spectrum(
+    signal: Callable[[NDArray[np.float64]], NDArray[np.float64]], samples: int, base: Fraction,
+    breaks: NDArray[np.float64], most: int = MOST_CORNERS,
+) -> Spectrum:  # fmt: skip
+    """Coefficients of a function of the angle whose derivatives jump (L5a).
+
+    Parameters
+    ----------
+    signal
+        From angles (n,) [rad] to values (n, ...).
+    samples
+        Steps over the period.
+    breaks
+        Angles where a derivative may jump, shape (k,) [rad]; the strongest corners are taken out.
+    """
+    period = math.tau / float(base)
+    angles = period * np.arange(samples) / samples
+    corners = found_corners(signal, breaks, period)
+    if corners is not None:
+        corners = corners.strongest(most)
+    if corners is None:
+        return spectrum_of(signal(angles), base)
+    smooth = spectrum_of(signal(angles) - corners.values(angles, period), base).coefficients
+    return Spectrum(base, smooth + corners.coefficients(len(smooth), float(base)), corners)
 
 
 def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:

@@ -6,12 +6,15 @@ four-stroke cycle includes its gas exchange.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, GasModel, PressureTrace, Seiliger, SliderCrank
+from laufruhe.physics.cylinder_volume import dead_centres
 from laufruhe.physics.pressure_trace import trace_pressure
-from laufruhe.physics.seiliger_cycle import seiliger_pressure
+from laufruhe.physics.seiliger_cycle import cut_off_angle, seiliger_pressure
 from laufruhe.physics.wiebe_cycle import wiebe_pressure
 
 
@@ -23,9 +26,27 @@ def cylinder_pressure(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: i
     ModelError
         If the model cannot meet its indicated mean pressure, or a trace does not cover the cycle.
     """
-    angles = cycle.angle * np.arange(samples) / samples
+    return pressure_at(gas, part, cycle, cycle.angle * np.arange(samples) / samples)
+
+
+def pressure_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """As `cylinder_pressure`, at any crank angles from the firing dead centre [rad], shape of `angles`."""
     if isinstance(gas, PressureTrace):
         return trace_pressure(gas, cycle, angles)
     if isinstance(gas, Seiliger):
         return seiliger_pressure(gas, part, cycle, angles)
     return wiebe_pressure(gas, part, cycle, angles)
+
+
+def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:
+    """Angles from the firing dead centre at which a derivative of the pressure jumps [rad] (G13).
+
+    Ends of strokes, where valves open and heat comes at once; cut-off; begin and end of a burn; points of a trace.
+    """
+    if isinstance(gas, PressureTrace):
+        return np.array(gas.angles)
+    top, bottom = dead_centres(part)
+    ends = [bottom - math.tau, top, bottom, top + math.tau]
+    if isinstance(gas, Seiliger):
+        return np.array([*ends, cut_off_angle(gas, part, cycle)])
+    return np.array([*ends, gas.start, gas.start + gas.duration])

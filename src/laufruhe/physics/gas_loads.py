@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Hashable
+from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
-from laufruhe.numerics.spectrum import Spectrum, spectrum_of
+from laufruhe.numerics.corners import joined
+from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
 from laufruhe.numerics.turns import Turn, as_turn, star_sum
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import cylinder_pressure
+from laufruhe.physics.gas_cycle import pressure_at, pressure_breaks
 from laufruhe.physics.wrench import ROLL
 
 
@@ -29,7 +32,12 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
         delays: list[Turn] = [-as_turn(part.firing_angle) / turns for part in parts]
         multiples = np.arange(len(torque.coefficients))
         star = star_sum(np.tile(ROLL, (len(parts), 1)), delays, multiples)
-        total = total + Spectrum(engine.cycle.base_order, torque.coefficients[:, None] * star)
+        load = Spectrum(engine.cycle.base_order, torque.coefficients[:, None] * star)
+        if torque.corners is not None:
+            rolling = torque.corners.each(lambda jumps: jumps[:, None] * ROLL)
+            corners = joined([rolling.moved(part.firing_angle) for part in parts] if rolling else [])
+            load = replace(load, corners=corners and corners.folded(load.period, 1))
+        total = total + load
     return total
 
 
@@ -38,7 +46,20 @@ def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: F
 
     A cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
     """
-    return fidelity.kept_of_gas(spectrum_of(gas_torque(gas, part, cycle, fidelity.gas_steps), cycle.base_order))
+    return fidelity.kept_of_gas(_one_cylinder(gas, part, cycle, fidelity.gas_steps))
+
+
+@lru_cache(maxsize=64)
+def _one_cylinder(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> Spectrum:
+    """The same at every speed, its corners taken out before the transform (L5a)."""
+    found = bent_spectrum(
+        lambda angles: _torque_at(gas, part, cycle, angles),
+        samples,
+        cycle.base_order,
+        pressure_breaks(gas, part, cycle),
+    )
+    found.coefficients.setflags(write=False)
+    return found
 
 
 def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:
@@ -48,6 +69,11 @@ def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> 
     -------
     Shape (samples,) [N m], at equal steps over the cycle from the firing dead centre.
     """
-    pressure = cylinder_pressure(gas, part, cycle, samples) - gas.crankcase_pressure
-    alpha = part.fires_at + part.shaft.ratio * cycle.angle * np.arange(samples) / samples
+    return _torque_at(gas, part, cycle, cycle.angle * np.arange(samples) / samples)
+
+
+def _torque_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """As `gas_torque`, at any crank angles from the firing dead centre [rad]."""
+    pressure = pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure
+    alpha = part.fires_at + part.shaft.ratio * angles
     return np.asarray(-part.shaft.ratio * part.piston_area * pressure * part.velocity(np, alpha))

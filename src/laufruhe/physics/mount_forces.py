@@ -47,8 +47,7 @@ class RigidMounting:
             If the wrench drives a direction that no mount carries.
         """
         self.check_carried(wrench)
-        forces = wrench.coefficients @ self.maps.reshape(-1, 6).T
-        return Spectrum(wrench.base, forces.reshape(-1, len(self.maps), 3))
+        return wrench.each(lambda loads: (loads @ self.maps.reshape(-1, 6).T).reshape(-1, len(self.maps), 3))
 
     def check_carried(self, wrench: Spectrum) -> None:
         """Refuse a wrench that some direction lets through."""

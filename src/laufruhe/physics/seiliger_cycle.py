@@ -83,6 +83,22 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
     )
 
 
+def cut_off_angle(gas: Seiliger, part: SliderCrank, cycle: Cycle) -> float:
+    """Crank angle from the firing dead centre at which the heat ends [rad] (G5)."""
+    from scipy.optimize import brentq
+
+    top, bottom = dead_centres(part)
+    cylinder = ChargedCylinder(gas, part, cycle)
+    wanted = cylinder.smallest * seiliger_cut_off(gas, cycle)
+
+    def beyond(angle: float) -> float:
+        return float(cylinder.volume(np.array([angle]))[0]) - wanted
+
+    if beyond(top) >= 0.0 or beyond(bottom) <= 0.0:
+        return top if beyond(top) >= 0.0 else bottom
+    return float(brentq(beyond, top, bottom, xtol=1e-15, rtol=1e-15))
+
+
 def compression_end_pressure(gas: Seiliger) -> float:
     """Pressure at the smallest volume before heat comes [Pa] (G4)."""
     return float(gas.intake_pressure * gas.compression_ratio**gas.compression_exponent)

@@ -8,7 +8,7 @@ left, the energy at the start of the cycle, and the mean speed determines it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor, SliderCrank
-from laufruhe.numerics.spectrum import Spectrum, spectrum_of
+from laufruhe.numerics.spectrum import Spectrum, bent_spectrum, spectrum_of
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_loads
@@ -32,7 +32,7 @@ _CONVERGED = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class CrankMotion:
-    """Crank angle phi, and its derivatives, at equal steps of time over one cycle [rad, rad/s, rad/s2]."""
+    """Crank angle phi, and its derivatives, at times over one cycle [rad, rad/s, rad/s2]."""
 
     angle: Array
     speed: Array
@@ -44,29 +44,68 @@ class CrankMotion:
         return float((self.speed.max() - self.speed.min()) / self.speed.mean())
 
 
+@dataclass(frozen=True, eq=False)
+class _Turning:
+    """What the motion at any time follows from (F2-F4); times are angles at the mean speed [rad]."""
+
+    engine: Engine
+    fidelity: Fidelity
+    torque: Spectrum
+    start: float
+    pace: Spectrum
+
+    @property
+    def bends(self) -> Array:
+        """Times at which the torque of the gas bends, and with it the acceleration."""
+        if self.torque.corners is None:
+            return np.zeros(0)
+        angles, shift = self.torque.corners.angles, self.pace.integral
+        return np.asarray(angles + shift.values(angles) - shift.values(np.zeros(1)))
+
+    def at(self, times: Array) -> CrankMotion:
+        """Of all rotors the same, so found once."""
+        return _motion_at(self, times.tobytes())
+
+    def loads(self, wrench: Callable[[CrankMotion], Array]) -> Spectrum:
+        """Loads (n, 6) that follow from the motion (F5), in orders of the mean speed."""
+        steps, bends = self.fidelity.samples, self.bends
+        return bent_spectrum(lambda times: wrench(self.at(times)), steps, self.torque.base, bends, len(bends))
+
+
 def crank_motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankMotion:
-    """Motion under gas and inertia torque against a constant load torque (F2-F4).
+    """Motion under gas and inertia torque against a constant load torque, at equal steps of time (F2-F4).
 
     Raises
     ------
     ModelError
         If the crank would stop within the cycle: the flywheel is too small for the speed.
     """
+    return _turning(engine, point, fidelity).at(_steps(engine, fidelity))
+
+
+def _steps(engine: Engine, fidelity: Fidelity) -> Array:
+    return engine.cycle.angle * np.arange(fidelity.samples) / fidelity.samples
+
+
+def _turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
     # rotors and mounts do not move the crank; without them a motion is found once for all designs
-    return _motion(replace(engine, rotors=(), mounts=()), point, fidelity)
+    return _found_turning(replace(engine, rotors=(), mounts=()), point, fidelity)
 
 
 @lru_cache(maxsize=32)
-def _motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankMotion:
-    count = fidelity.samples
-    phi = engine.cycle.angle * np.arange(count) / count
-    torque = _alternating_torque(engine, point, fidelity)
-    work, (inertia, _) = torque.integral, _inertia(engine, fidelity, phi)
-    start = _start_energy(work.sample(count), inertia, point.speed)
-    pace = spectrum_of(point.speed / np.sqrt(2.0 * (start + work.sample(count)) / inertia), engine.cycle.base_order)
-    angle = _angles_at(pace, phi)
-    inertia, slope = _inertia(engine, fidelity, angle)
-    square = 2.0 * (start + work.values(angle)) / inertia
+def _found_turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
+    phi, torque = _steps(engine, fidelity), _alternating_torque(engine, point, fidelity)
+    work, (inertia, _) = torque.integral.sample(fidelity.samples), _inertia(engine, fidelity, phi)
+    start = _start_energy(work, inertia, point.speed)
+    pace = spectrum_of(point.speed / np.sqrt(2.0 * (start + work) / inertia), engine.cycle.base_order)
+    return _Turning(engine, fidelity, torque, start, pace)
+
+
+@lru_cache(maxsize=64)
+def _motion_at(turning: _Turning, times: bytes) -> CrankMotion:
+    torque, angle = turning.torque, _angles_at(turning.pace, np.frombuffer(times))
+    inertia, slope = _inertia(turning.engine, turning.fidelity, angle)
+    square = 2.0 * (turning.start + torque.integral.values(angle)) / inertia
     # d/d phi of J w^2 / 2 = torque less load (F2)
     acceleration = (torque.values(angle) - 0.5 * slope * square) / inertia
     motion = CrankMotion(angle, np.sqrt(square), acceleration)
@@ -80,20 +119,22 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
 
     Its sums are taken at sampled times: what a star cancels is zero to rounding only.
     """
-    motion = crank_motion(engine, point, fidelity)
-    wrench = sum(
-        (_slider_loads(part, motion, fidelity) for part in engine.slider_cranks), np.zeros((len(motion.angle), 6))
-    )
-    wrench = wrench + _rotor_loads((*engine.pins, *engine.rotors), motion)
-    wrench[:, 3] += _torque(engine, point, fidelity).values(motion.angle)
+    torque = _torque(engine, point, fidelity)
+
+    def wrench(motion: CrankMotion) -> Array:
+        total = _rotor_loads((*engine.pins, *engine.rotors), motion)
+        for part in engine.slider_cranks:
+            total += _slider_loads(part, motion, fidelity)
+        total[:, 3] += torque.values(motion.angle)
+        return total
+
     last_rotor = max((math.ceil(abs(rotor.shaft.ratio)) for rotor in engine.rotors), default=1)
-    return fidelity.kept(spectrum_of(wrench, engine.cycle.base_order), last_rotor)
+    return fidelity.kept(_turning(engine, point, fidelity).loads(wrench), last_rotor)
 
 
 def uneven_rotor_loads(rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     """Loads of rotors alone on an engine whose motion they do not change; linear in their unbalances (F5)."""
-    motion = crank_motion(engine, point, fidelity)
-    return spectrum_of(_rotor_loads(rotors, motion), engine.cycle.base_order)
+    return _turning(engine, point, fidelity).loads(lambda motion: _rotor_loads(rotors, motion))
 
 
 def _torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -101,13 +142,13 @@ def _torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectr
     gas, cycle = fidelity.gas_of(point), engine.cycle
     if gas is None:
         return Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
-    return Spectrum(cycle.base_order, gas_loads(engine, gas, fidelity).coefficients[:, 3])
+    return gas_loads(engine, gas, fidelity).each(lambda loads: loads[:, 3])
 
 
 def _alternating_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     """Torque of the gas less that of the load, which takes the mean of it (F2)."""
     torque = _torque(engine, point, fidelity)
-    return Spectrum(torque.base, np.concatenate([[0.0], torque.coefficients[1:]]))
+    return replace(torque, coefficients=np.concatenate([[0.0], torque.coefficients[1:]]))
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:

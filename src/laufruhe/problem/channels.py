@@ -195,7 +195,7 @@ class MountChannel(NumberChannel):
 
 def _on_block(name: str, unit: str, part: slice, lever: int | None = None) -> LoadChannel:
     def signal(loads: PointLoads) -> Spectrum:
-        return Spectrum(loads.wrench.base, loads.wrench.coefficients[:, None, part])
+        return loads.wrench.each(lambda wrench: wrench[:, None, part])
 
     return LoadChannel(name, unit, signal=signal, part=part, feels_gas=lever is None, lever=lever)
 

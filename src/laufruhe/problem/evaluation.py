@@ -26,6 +26,7 @@ from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
+NO_MOUNTS = "an engine without mounts has no mount forces"
 BETWEEN = NORMS["maximum"].refinement
 """Times as many samples as are asked for, among which maxima of mounts are sought (M6)."""
 
@@ -59,8 +60,8 @@ class Evaluation:
         """In the order of the engine."""
         return [mount.name for mount in self.engine.mounts]
 
-    def rows(self, measure: Measure, samples: int | None = None) -> Rows:
-        """Rows whose norm a measure is, over the whole cycle."""
+    def rows(self, measure: Measure, samples: int | None = None, bends: Sequence[Array] | None = None) -> Rows:
+        """Rows whose norm a measure is, over the whole cycle; of a peak where it bends too, or at angles given."""
         if not measure.is_load:
             return mass_rows(measure, self.engine.rotors)
         return load_rows(
@@ -69,6 +70,7 @@ class Evaluation:
             over(self.engine.cycle.base_order, self.signals(measure.load)),
             self.engine,
             samples or self.samples,
+            bends,
         )
 
     def signals(self, channel: LoadChannel) -> list[Spectrum]:
@@ -190,10 +192,12 @@ def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE)
     signal = channel.signal(evaluation.loads[k])
     if not np.all(np.isfinite(signal.coefficients)):
         return [CycleMeasures(math.inf, math.inf, math.inf)] * signal.coefficients.shape[1]
-    fine = _one_period(evaluation, signal, BETWEEN)
-    coarse = fine[::BETWEEN]
-    most = lengths(fine).max(axis=0)
-    return [replace(cycle_measures(coarse[:, m]), max=float(most[m])) for m in range(fine.shape[1])]
+    fine, coarse = (lengths(_one_period(evaluation, each, BETWEEN)) for each in (signal, signal.series))
+    most = np.maximum(fine.max(axis=0), lengths(signal.values(signal.bends)).max(axis=0, initial=0.0))
+    return [
+        replace(cycle_measures(own[:, None]), max=float(top))
+        for own, top in zip(coarse[::BETWEEN].T, most, strict=True)
+    ]
 
 
 def _one_period(evaluation: Evaluation, signal: Spectrum, finer: int) -> Array:

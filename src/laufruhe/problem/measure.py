@@ -198,9 +198,10 @@ class Rows:
 
 
 def load_rows(
-    measure: Measure, points: Sequence[OperatingPoint], signals: Sequence[Spectrum], engine: Engine, samples: int
-) -> Rows:
-    """Rows of a load at equal steps of its period.
+    measure: Measure, points: Sequence[OperatingPoint], signals: Sequence[Spectrum], engine: Engine, samples: int,
+    bends: Sequence[Array] | None = None,
+) -> Rows:  # fmt: skip
+    """Rows of a load at equal steps of its period, and of a peak where it bends.
 
     Parameters
     ----------
@@ -210,34 +211,49 @@ def load_rows(
         Whose mounts, bearings or cylinders stand along the second axis.
     samples
         Steps over the period of the signals.
+    bends
+        Per point as many angles [rad]; those of `bends_of` when left out.
 
     Returns
     -------
-    Rows of (points, places, samples) in that order; weights add up to one.
+    Rows of (points, places, samples and bends) in that order; weights add up to one.
     """
     blocks, weights = [], []
-    for signal, share in zip(signals, measure.shares(points), strict=True):
-        values = selected(measure, signal, engine).sample(samples)
+    bends = bends_of(measure, signals, engine) if bends is None else bends
+    for signal, share, own in zip(signals, measure.shares(points), bends, strict=True):
+        counted = selected(measure, signal, engine)
         # an engine may lack what is named: then it has no load there
-        if share == 0.0 or not values.shape[1]:
+        if share == 0.0 or not counted.coefficients.shape[1]:
             continue
+        if measure.norm.refinement == 1:
+            values = counted.series.sample(samples)
+        else:
+            values = np.concatenate([counted.sample(samples), counted.values(own)])
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
         blocks.append(rows)
         weights.append(np.full(len(rows), share / len(rows)))
     if not blocks:
         return Rows(measure.norm, np.zeros((1, 1)), Grid(np.ones(1), 1))
-    return Rows(measure.norm, np.concatenate(blocks), Grid(np.concatenate(weights), samples))
+    count = len(bends[0])
+    return Rows(measure.norm, np.concatenate(blocks), Grid(np.concatenate(weights), samples + count, count))
+
+
+def bends_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> list[Array]:
+    """Angles at which a peak may stand between any steps, as many for every operating point (L5a)."""
+    if measure.norm.refinement == 1:
+        return [np.zeros(0)] * len(signals)
+    found = [selected(measure, signal, engine).bends for signal in signals]
+    most = max(map(len, found))
+    return [np.resize(own, most) if len(own) else np.zeros(most) for own in found]
 
 
 def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
     """The places and orders of a signal (n, places, d) that count, its directions weighted."""
-    c = signal.coefficients
     if measure.at is not None:
-        c = c[:, measure.places(measure.load.places(engine)), :]
+        signal = signal.each(lambda values: values[:, measure.places(measure.load.places(engine)), :])
     if measure.direction_weights is not None:
-        c = c * np.array(measure.direction_weights)
-    counted = Spectrum(signal.base, c)
-    return counted if measure.orders is None else counted.only(measure.orders)
+        signal = signal.each(lambda values: values * np.array(measure.direction_weights))
+    return signal if measure.orders is None else signal.only(measure.orders)
 
 
 def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:

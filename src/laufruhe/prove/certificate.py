@@ -212,11 +212,18 @@ def _inside(problem: AffineProblem, x: Array) -> Array:
 
 def _spread(fine: AffineNorm, samples: int, z: Array) -> Array:
     """Dual rows at `samples` angles on a finer grid; masses have no angles and stay."""
-    times, rest = divmod(len(fine.grid.weights), max(len(z), 1))
+    signals, bends = len(fine.grid.weights) // fine.grid.steps, fine.grid.bends
+    times, rest = divmod(len(fine.grid.weights) - signals * bends, max(len(z) - signals * bends, 1))
     if rest:
         # rows of another basis say nothing here
         return np.zeros_like(fine.constant)
-    return z if times <= 1 else fine.norm.spread(z, samples, times)
+    if times <= 1:
+        return z
+    # rows where the signals bend stay
+    own = z.reshape(signals, -1, z.shape[-1])
+    steps, kept = own[:, : own.shape[1] - bends], own[:, own.shape[1] - bends :]
+    spread = fine.norm.spread(steps.reshape(-1, z.shape[-1]), samples, times).reshape(signals, -1, z.shape[-1])
+    return np.concatenate([spread, kept], axis=1).reshape(-1, z.shape[-1])
 
 
 def kkt_residual(problem: AffineProblem, x: Array, bound: Bound, whole: float | None = None) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from laufruhe.fidelity.automatic import choose
-from laufruhe.fidelity.error_bounds import error_bound, reference
+from laufruhe.fidelity.error_bounds import error_bound, reference, sampling_error
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
@@ -15,7 +15,7 @@ _ROUNDS = 4
 
 
 def error_of(problem: Problem, evaluation: Evaluation) -> float:
-    """Relative error of the objective: from sampling, or against the reference where that was asked.
+    """Relative error of the objective, not exceeded: from sampling, or against the reference where that was asked.
 
     A fidelity chosen by hand is taken as wanted, so that only its samples are judged.
     """
@@ -24,17 +24,6 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
     if problem.fidelity.tolerance is None:
         return sampling_error(problem, evaluation)
     return error_bound(problem, evaluation, reference(problem, evaluation.engine))
-
-
-def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
-    """Relative change of the objective when every second angle is left out."""
-    samples = evaluation.samples
-    terms = problem.load_terms
-    whole = sum(term.weight * evaluation.value(term.measure) for term in terms)
-    if samples % 2 or not whole:
-        return 0.0
-    half = sum(term.weight * evaluation.rows(term.measure, samples // 2).value for term in terms)
-    return abs(half - whole) / whole
 
 
 def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result:

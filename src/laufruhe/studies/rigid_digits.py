@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from laufruhe.machine import Engine, GasModel, Mount, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import NORMS
-from laufruhe.numerics.spectrum import Spectrum, spectrum_of
+from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.numerics.turns import Turn, as_turn
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.gas_loads import gas_torque
+from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.mechanism import cylinder_wrench
 from laufruhe.physics.rigid_body import point_motion
 from laufruhe.physics.wrench import plane_wrench
@@ -34,7 +34,9 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 DIGITS = 50
-STEPS, GAS_STEPS = 24, 360
+STEPS, GAS_ORDERS = 24, 90
+# as many orders as are kept have no corners
+KEPT = Fidelity(samples=STEPS, gas_samples=4 * GAS_ORDERS, gas_orders=GAS_ORDERS)
 FREE = 1e-20
 """Of a stiffness over the largest: what is under it is a direction that no mount carries."""
 WHOLE_LOADS = Measure(channels.SHAKING_FORCE, NORMS["mean"]), Measure(channels.ROLL_MOMENT, NORMS["mean"])
@@ -65,7 +67,7 @@ def rigid_part(problem: Problem) -> RigidPart:
     shaking force and roll moment.
     """
     own = tuple(term.measure for term in problem.objective if _is_covered(term.measure, problem.engine))
-    used = replace(problem, fidelity=Fidelity(samples=STEPS, gas_samples=GAS_STEPS))
+    used = replace(problem, fidelity=KEPT)
     if not own:
         used = replace(used, points=problem.points[:1])
     evaluation, errors, names = evaluate(used), [], []
@@ -127,9 +129,9 @@ def _rotor(rotor: Rotor, unbalance: Any, ahead: Any, turn: Any, speed: float) ->
 
 def _gas_torque(engine: Engine, gas: GasModel) -> Digits:
     """Roll moment of the gas at every step, every firing in its place (L5)."""
-    series: list[Any] = [mpmath.mpc(0)] * (GAS_STEPS // 2 + 1)
+    series: list[Any] = [mpmath.mpc(0)] * (2 * GAS_ORDERS + 1)
     for part in engine.slider_cranks:
-        torque = spectrum_of(gas_torque(gas, part, engine.cycle, GAS_STEPS), engine.cycle.base_order).coefficients
+        torque = gas_coefficients(gas, part, engine.cycle, KEPT).coefficients
         late = -_exact(as_turn(part.firing_angle)) / engine.cycle.turns
         for h, value in enumerate(torque):
             series[h] += mpmath.mpc(complex(value)) * mpmath.expjpi(2 * h * late)

@@ -15,12 +15,13 @@ from laufruhe.numerics.norms.norm import (
     Norm,
     OrderBounds,
     SmoothProgram,
+    amplitudes,
     curvature,
     fine_lengths,
     lengths,
     softened_lengths,
 )
-from laufruhe.numerics.spectrum import Spectrum, order_amplitude
+from laufruhe.numerics.spectrum import Spectrum
 
 
 class Maximum(Norm):
@@ -81,7 +82,7 @@ class Maximum(Norm):
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Not above the sum of the orders' amplitudes."""
         used = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
-        return max((_amplitudes(signal) for signal in used), default=0.0)
+        return max((float(amplitudes(signal).max(initial=0.0)) for signal in used), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
         """Compared at every place where the samples could have stood, and what curvature lets these miss."""
@@ -90,17 +91,15 @@ class Maximum(Norm):
         for signal, share in zip(signals, shares, strict=True):
             if share > 0.0:
                 size, step = fine_lengths(signal, coarse, times)
-                bends.append(step**2 / 8.0 * _amplitudes(curvature(signal)))
-                errors.append(float((size.max(axis=(0, 1)) - size.max(axis=0).min(axis=0)).max(initial=0.0)))
+                bends.append(step**2 / 8.0 * float(curvature(signal)[0].max(initial=0.0)))
+                bent = lengths(signal.values(signal.bends)).max(axis=0, initial=0.0)
+                most, least = size.max(axis=(0, 1)), size.max(axis=0).min(axis=0)
+                errors.append(float((np.maximum(most, bent) - np.maximum(least, bent)).max(initial=0.0)))
         return max(errors) + max(bends)
 
     def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
         """No less than the root mean square at any operating point."""
         return math.sqrt(max((sum(each.values()) for each in squares), default=0.0))
-
-
-def _amplitudes(signal: Spectrum) -> float:
-    return float(order_amplitude(signal.coefficients).sum(axis=0).max(initial=0.0))
 
 
 def in_place(z: Array, steps: int, times: int) -> Array:

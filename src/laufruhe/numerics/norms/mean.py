@@ -96,9 +96,9 @@ class Mean(Norm):
             if share == 0.0:
                 continue
             size, step = fine_lengths(signal, steps, times)
-            shifted = size.mean(axis=(0, 2))
-            bend = step**2 / 8.0 * float(np.sqrt(mean_square(curvature(signal))).mean())
-            total += share * (float(np.abs(shifted - shifted.mean()).max()) + bend)
+            shifted = fine_lengths(signal.series, steps, times)[0].mean(axis=(0, 2))
+            bend = step**2 / 8.0 * float(curvature(signal)[1].mean())
+            total += share * (float(np.abs(shifted - size.mean()).max()) + bend)
         return float(total)
 
     def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 
 Array = NDArray[np.float64]
 
@@ -38,12 +38,15 @@ class Grid:
     weights
         w_k, shape (k,).
     steps
-        Rows of one signal that follow each other at equal steps of its period; rows come
-        in groups of as many.
+        Rows of one signal; rows come in groups of as many.
+    bends
+        The last rows of every signal, at angles where it bends; those before follow each other at equal steps of its
+        period.
     """
 
     weights: Array
     steps: int
+    bends: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,15 +219,32 @@ def mean_square(signal: Spectrum) -> Array:
     c = signal.coefficients
     power = 0.5 * np.sum(np.abs(c) ** 2, axis=(0, 2))
     # the steady part does not alternate
-    return np.asarray(power - 0.5 * np.sum(np.abs(c[0]) ** 2, axis=-1) + np.sum(c[0].real ** 2, axis=-1))
+    own = power - 0.5 * np.sum(np.abs(c[0]) ** 2, axis=-1) + np.sum(c[0].real ** 2, axis=-1)
+    if signal.corners is None:
+        return np.asarray(own)
+    return np.asarray(own + lengths(signal.corners.beyond(len(c), float(signal.base))[1]) ** 2)
 
 
-def curvature(signal: Spectrum) -> Spectrum:
-    """The second derivative over crank angle, its sign left out."""
-    return Spectrum(signal.base, signal.coefficients * (signal.orders**2)[:, None, None])
+def amplitudes(signal: Spectrum) -> Array:
+    """What the signal does not exceed at every place, shape (places,): the sum of the orders' amplitudes."""
+    own = order_amplitude(signal.coefficients).sum(axis=0)
+    if signal.corners is None:
+        return np.asarray(own)
+    return np.asarray(own + lengths(signal.corners.beyond(len(signal.coefficients), float(signal.base))[0]))
+
+
+def curvature(signal: Spectrum) -> tuple[Array, Array]:
+    """Bounds of the second derivative over crank angle between bends, and of its mean with these, shape (places,)."""
+    smooth = signal.smooth
+    bent = Spectrum(smooth.base, smooth.coefficients * (smooth.orders**2)[:, None, None])
+    most, mean = amplitudes(bent), np.sqrt(mean_square(bent))
+    if signal.corners is None:
+        return most, mean
+    size = lengths(signal.corners.curvature(signal.period))
+    bends = lengths(np.abs(signal.corners.jumps[:, 0]).sum(axis=0)) / signal.period
+    return most + size.max(axis=0), mean + size.mean(axis=0) + bends
 
 
 def fine_lengths(signal: Spectrum, steps: int, times: int) -> tuple[Array, float]:
     """Lengths at `steps` samples from each of `times` first angles, (steps, times, places); and the step [rad]."""
-    step = 2.0 * np.pi / float(signal.base) / (steps * times)
-    return lengths(signal.sample(steps * times)).reshape(steps, times, -1), step
+    return lengths(signal.sample(steps * times)).reshape(steps, times, -1), signal.period / (steps * times)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,11 +23,12 @@ from laufruhe.numerics.norms.norm import (
     Norm,
     OrderBounds,
     SmoothProgram,
+    amplitudes,
     curvature,
     lengths,
     softened_lengths,
 )  # fmt: skip
-from laufruhe.numerics.spectrum import Spectrum, order_amplitude
+from laufruhe.numerics.spectrum import Spectrum
 
 SAME = 1e-13
 """Share of a radius by which a point may stand outside a ball that holds it."""
@@ -120,10 +122,10 @@ class PeakToPeak(Norm):
                 continue
             samples = signal.sample(coarse * times).swapaxes(0, 1)
             step = 2.0 * math.pi / float(signal.base) / (coarse * times)
-            bends.append(step**2 / 8.0 * _swing(curvature(signal)))
-            for place in samples:
-                whole = 2.0 * _ball(place)[0]
-                errors.append(max(whole - 2.0 * _ball(place[first::times])[0] for first in range(times)))
+            bends.append(step**2 / 8.0 * 2.0 * float(curvature(signal)[0].max(initial=0.0)))
+            for place, bent in zip(samples, signal.values(signal.bends).swapaxes(0, 1), strict=True):
+                whole, starts = _reach(place, bent), (place[first::times] for first in range(times))
+                errors.append(max(whole - _reach(start, bent) for start in starts))
         return max(errors) + max(bends)
 
     def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
@@ -137,7 +139,13 @@ def _signals(rows: Array, steps: int) -> Array:
 
 
 def _swing(signal: Spectrum) -> float:
-    return 2.0 * float(order_amplitude(signal.coefficients[1:]).sum(axis=0).max(initial=0.0))
+    alternating = replace(signal, coefficients=np.concatenate([0.0 * signal.coefficients[:1], signal.coefficients[1:]]))
+    return 2.0 * float(amplitudes(alternating).max(initial=0.0))
+
+
+def _reach(steps: Array, bent: Array) -> float:
+    """Diameter of the ball that holds a signal at equal steps and where it bends."""
+    return 2.0 * _ball(np.concatenate([steps, bent]))[0]
 
 
 def _ball(points: Array) -> tuple[float, Array, np.ndarray, Array]:

@@ -13,10 +13,10 @@ from pydantic import Field
 
 from laufruhe.files.asked import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
-from laufruhe.physics.metrics import cycle_measures, turning_parts
+from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import samples_of
+from laufruhe.problem.evaluation import measured, samples_of
 from laufruhe.problem.measure import MEASURES
 from laufruhe.solvers.result import Result
 from laufruhe.studies.replication.expressions import check_among
@@ -90,8 +90,7 @@ def _signal(result: Result, _: AskedTable) -> Labelled:
 
 
 def _by_mount(measure: str, result: Result, _: AskedTable) -> Labelled:
-    forces = samples_of(result.final, 0)
-    values = [getattr(cycle_measures(forces[:, m]), measure) for m in range(forces.shape[1])]
+    values = [getattr(one, measure) for one in measured(result.final, 0)]
     return Labelled(values, {"mount": result.final.mount_names})
 
 

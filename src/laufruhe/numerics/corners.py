@@ -1,0 +1,213 @@
+"""Corners of a periodic signal: angles at which its derivatives jump, in closed form (L5a).
+
+No sum of finitely many orders bends at an angle; it cuts the corner off. The function of period P
+whose m-th derivative jumps by one at zero, and by nothing else anywhere, is a polynomial between its jumps,
+
+    f_m(phi) = -P^m B_(m+1)(phi / P) / (m + 1)!,    c_j = (2 / P) / (i j b)^(m+1),    b = 2 pi / P,
+
+B the Bernoulli polynomials. With the jumps of its first derivatives taken away so, a signal is smooth,
+and its orders fall off fast.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DEGREES = 3
+"""Derivatives whose jumps are found."""
+_SAME_ANGLE = 1e-10
+_WIDTH = 0.06
+"""Longest stretch beside a corner from which its derivatives are taken [rad]."""
+_NODES = 6
+_PLACES = 0.5 - 0.5 * np.cos(math.pi * (np.arange(_NODES) + 0.5) / _NODES)
+# least stretch, and the degree of a polynomial whose coefficients it determines to enough digits
+_DEGREES_OF = ((0.01, _NODES - 1), (1e-3, 3), (1e-5, 2), (0.0, 1))
+_CANCELLED = 1e-12
+_STEPS = 360
+_BLOCK = 1 << 16
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """Jumps of the derivatives of a signal.
+
+    Attributes
+    ----------
+    angles
+        Shape (k,) [rad], each within one period.
+    jumps
+        Of the derivatives 1, 2, ... by the angle, shape (k, degrees, ...), of a signal of any shape.
+    """
+
+    angles: Array
+    jumps: Array
+
+    @property
+    def bending(self) -> Array:
+        """Angles at which the slope itself jumps, where a peak may stand."""
+        slopes = np.abs(self.jumps[:, 0].reshape(len(self.angles), -1)).max(axis=1, initial=0.0)
+        # what is left of the jumps of higher derivatives is a rounding
+        return np.asarray(self.angles[slopes > 1e-6 * np.abs(self.jumps).max(initial=0.0)])
+
+    def values(self, angles: Array, period: float, derivative: int = 0) -> Array:
+        """Sum of f_m times the jumps, or a derivative of it, shape (len(angles), ...)."""
+        k, degrees = self.jumps.shape[:2]
+        powers = [m - derivative for m in range(1, degrees + 1)]
+        table: Array = np.array([period**m * _kernel(m, degrees + 2) for m in powers])
+        # of every power one row a corner
+        weights = np.einsum("mp,kmd->pkd", table, self.jumps.reshape(k, degrees, -1))
+        out = np.empty((len(angles), weights.shape[2]))
+        step = max(_BLOCK // k, 1)
+        for start in range(0, len(angles), step):
+            x = np.mod((angles[start : start + step, None] - self.angles) / period, 1.0) - 0.5
+            found, power = weights[0].sum(axis=0), np.ones_like(x)
+            for own in weights[1:]:
+                power *= x
+                found = found + power @ own
+            out[start : start + step] = found
+        return out.reshape(len(angles), *self.jumps.shape[2:])
+
+    def coefficients(self, count: int, base: float) -> NDArray[np.complex128]:
+        """Orders 0, b, ... (count - 1) b, shape (count, ...); none at order zero."""
+        orders = np.arange(count) * base
+        waves = np.exp(-1j * np.outer(orders, self.angles))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = base / math.pi / (1j * orders[:, None]) ** np.arange(2, 2 + self.jumps.shape[1])
+        shares[:1] = 0.0
+        table = (waves[:, :, None] * shares[:, None, :]).reshape(count, -1)
+        total, size = table @ self._flat, np.abs(table) @ np.abs(self._flat)
+        # what a star cancels is nothing, and not a rounding
+        return np.where(np.abs(total) > _CANCELLED * size, total, 0.0).reshape(count, *self.jumps.shape[2:])
+
+    def beyond(self, count: int, base: float) -> tuple[Array, Array]:
+        """What all orders from `count` b on can hold at most: their sum, and the root of their mean square."""
+        total = power = np.zeros(self.jumps.shape[2:])
+        for m, jumps in enumerate(np.abs(self.jumps).sum(axis=0), 1):
+            unit, last = jumps / (math.pi * base**m), max(count - 1, 0.5)
+            total = total + unit / (m * last**m)
+            power = power + unit / math.sqrt((4 * m + 2) * last ** (2 * m + 1))
+        return total, power
+
+    def curvature(self, period: float) -> Array:
+        """The second derivative over one period, on both sides of every corner and at steps between, shape (n, ...)."""
+        steps = period * np.arange(_STEPS) / _STEPS
+        return self.values(np.concatenate([steps, self.angles - _SAME_ANGLE, self.angles + _SAME_ANGLE]), period, 2)
+
+    def each(self, linear: Callable[[Array], Array]) -> Corners | None:
+        """Through a real linear map of values (n, ...); None where nothing bends any more."""
+        k, degrees = self.jumps.shape[:2]
+        flat = np.asarray(linear(self.jumps.reshape(k * degrees, *self.jumps.shape[2:])))
+        return merged(self.angles, flat.reshape(k, degrees, *flat.shape[1:]))
+
+    def moved(self, by: float, degrees: int = 0) -> Self:
+        """Later by an angle, and integrated as often as `degrees` says."""
+        none = np.zeros((len(self.angles), degrees, *self.jumps.shape[2:]))
+        return type(self)(self.angles + by, np.concatenate([none, self.jumps], axis=1))
+
+    def repeated(self, period: float, times: int) -> Corners | None:
+        """Of the same signal counted over so many of its periods."""
+        return joined([self.moved(k * period) for k in range(times)])
+
+    def folded(self, period: float, times: int) -> Corners | None:
+        """Of a signal that repeats so often within the period it was counted over, after its own."""
+        return merged(_within(self.angles, period), self.jumps / times)
+
+    def strongest(self, count: int) -> Corners | None:
+        """The few that bend most over a degree."""
+        steps = math.radians(1.0) ** np.arange(1, self.jumps.shape[1] + 1)
+        size = np.einsum("km,m->k", np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2), steps)
+        kept = np.sort(np.argsort(-size, kind="stable")[:count])
+        return merged(self.angles[kept], self.jumps[kept])
+
+    @property
+    def _flat(self) -> Array:
+        return self.jumps.reshape(self.jumps.shape[0] * self.jumps.shape[1], -1)
+
+
+def joined(parts: Sequence[Corners | None]) -> Corners | None:
+    """Corners of a sum of signals."""
+    found = [corners for corners in parts if corners is not None]
+    if not found:
+        return None
+    degrees = max(corners.jumps.shape[1] for corners in found)
+    jumps = [_pad(corners.jumps, degrees) for corners in found]
+    return merged(np.concatenate([corners.angles for corners in found]), np.concatenate(jumps))
+
+
+def _pad(jumps: Array, degrees: int) -> Array:
+    out = np.zeros((len(jumps), degrees, *jumps.shape[2:]))
+    out[:, : jumps.shape[1]] = jumps
+    return out
+
+
+def merged(angles: Array, jumps: Array) -> Corners | None:
+    """Corners at one angle as one; None where nothing is left of any."""
+    _, first, inverse = np.unique(np.round(angles / _SAME_ANGLE), return_index=True, return_inverse=True)
+    total = np.zeros((len(first), *jumps.shape[1:]))
+    np.add.at(total, inverse, jumps)
+    used = np.any(total.reshape(len(total), -1) != 0.0, axis=1)
+    return Corners(angles[first][used], total[used]) if used.any() else None
+
+
+def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float) -> Corners | None:
+    """Corners of a function of the angle at the angles where its derivatives may jump.
+
+    The derivatives on either side are those of polynomials through values beside the corner.
+
+    Parameters
+    ----------
+    signal
+        From angles (n,) to values (n, ...), smooth between the breaks.
+    breaks
+        Shape (k,) [rad].
+    """
+    at = _within(breaks, period)
+    at = at[np.unique(np.round(at / _SAME_ANGLE), return_index=True)[1]]
+    if not len(at):
+        return None
+    # a stretch ends at the next corner
+    after = np.diff(at, append=at[0] + period)
+    stretches = np.minimum(np.stack([after, np.roll(after, 1)], axis=1), _WIDTH)
+    sides = np.array([1.0, -1.0])
+    angles = at[:, None, None] + (sides * stretches)[:, :, None] * _PLACES
+    values = np.asarray(signal(angles.ravel()))
+    values = values.reshape(len(at), 2, _NODES, *values.shape[1:])
+    jumps = np.zeros((len(at), DEGREES, *values.shape[3:]))
+    for k, side in np.ndindex(len(at), 2):
+        stretch = sides[side] * stretches[k, side]
+        degree = next(degree for least, degree in _DEGREES_OF if stretches[k, side] >= least)
+        series = np.tensordot(_fit(degree), values[k, side], axes=1)
+        for m in range(1, min(degree, DEGREES) + 1):
+            jumps[k, m - 1] += sides[side] * series[m] * math.factorial(m) / stretch**m
+    return merged(at, jumps)
+
+
+def _within(angles: Array, period: float) -> Array:
+    """Of one period; what ends it within a rounding begins it."""
+    return np.asarray(np.mod(angles + 0.5 * _SAME_ANGLE, period) - 0.5 * _SAME_ANGLE)
+
+
+@lru_cache(maxsize=8)
+def _fit(degree: int) -> Array:
+    """Coefficients of the powers of t from values at the nodes, shape (degree + 1, nodes)."""
+    return np.asarray(np.linalg.pinv(np.vander(_PLACES, degree + 1, increasing=True)))
+
+
+@lru_cache(maxsize=64)
+def _kernel(degree: int, count: int) -> Array:
+    """f_m over P^m as coefficients of the powers of phi / P - 1/2, between -1/2 and 1/2."""
+    own = [-1.0]
+    for _ in range(degree + 1):
+        own = [0.0, *(c / k for k, c in enumerate(own, 1))]
+        # the mean of y^k is 2^-k / (k + 1) where k is even
+        own[0] = -sum(c * 0.5**k / (k + 1) for k, c in enumerate(own) if k % 2 == 0)
+    return np.array(own + [0.0] * (count - len(own)))
