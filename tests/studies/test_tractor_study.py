@@ -328,6 +328,17 @@ def test_no_compression_ratio_saves_the_printed_mass(worth: Worth) -> None:
         assert own == pytest.approx([float(printed.sel(eps=17.0)), float(meant.sel(eps=17.0))], rel=1e-9)
 
 
+def test_one_trace_meets_all_five_with_2_25_kg(worth: Worth) -> None:
+    """Compression ratio 18, as docs/tractor-study.md says; 1.25 kg meet the fall by the force pair alone."""
+    allowed = {"twice": (1.7, 2.3), "cancel": (6.5, 7.5), "force": (-75, -65), "rest": (-58, -48), "share": (40, 60)}
+    met = {
+        mass: [low <= float(worth("reciprocating-mass", f"{name}_by").sel(m=mass, eps=18.0)) <= high
+               for name, (low, high) in allowed.items()]
+        for mass in (1.25, 2.25)
+    }  # fmt: skip
+    assert met == {1.25: [False, False, True, False, False], 2.25: [True] * 5}
+
+
 def test_bars_carry_their_numbers(figure: Data) -> None:
     """Four series of five groups: the mean inside, the largest above."""
     words = [text.get_text() for text in draw(Replication.picture(figure("fig-13"))).axes[0].texts]
