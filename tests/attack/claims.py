@@ -139,7 +139,9 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
     verdict.status = result.status.value
     if verdict.status == "failed":
         verdict.wrong.append(f"failed: {result.message[:150]}")
-    if result.objective is None:
+    if verdict.status in ("infeasible", "failed"):
+        if result.objective is not None or result.certificate is not None:
+            verdict.wrong.append(f"{verdict.status}, yet a value and a certificate are told")
         _judge_infeasible(verdict, openings, rng, most)
         return
     certificate = result.certificate

@@ -386,7 +386,7 @@ def block(rng: Generator) -> Table:
     return {
         "mass": q(rng.uniform(100, 250), "kg", 4),
         "centre_of_gravity": [q(v, "m", 3) for v in rng.uniform(-0.1, 0.1, 3)],
-        "inertia": [q(v * rng.uniform(0.8, 1.2), "kg m^2", 3) for v in (5.0, 12.0, 10.0)],
+        "inertia": [q(v * rng.uniform(0.95, 1.1), "kg m^2", 3) for v in (5.0, 12.0, 10.0)],
         "inertia_products": [q(v, "kg m^2", 3) for v in rng.uniform(-0.8, 0.8, 3)],
     }
 

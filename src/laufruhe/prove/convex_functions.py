@@ -144,12 +144,11 @@ class Residual:
 
 @dataclass(frozen=True, eq=False)
 class ConvexLimit:
-    """function <= maximum, the limit of the problem that it comes from, and which side of it."""
+    """function <= maximum, and the limit of the problem that it comes from."""
 
     function: ConvexFunction
     maximum: float
     source: int
-    side: str = "at most"
 
 
 @dataclass(frozen=True, eq=False)

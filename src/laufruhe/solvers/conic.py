@@ -1,6 +1,6 @@
 """Least weighted sum of norms under limits, as a second-order cone program in arrays for Clarabel (P1).
 
-Nothing is kept between two solves, so a result hangs on its own problem alone. Norms that nothing
+Nothing is kept between two solves, so a result hangs on its own problem alone. Terms that nothing
 open acts on, and limits that every design keeps, are no part of the program. Where the solver stops
 without an answer it is asked again with other settings, and where none of these helps, for the best
 it had: whatever it says is judged by the exact model, and bounds are taken from its dual rows anew.
@@ -137,13 +137,11 @@ def solve_cones(problem: AffineProblem, held: tuple[Array, Array] | None = None)
 
 
 def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
-    """Whether some design may break a limit that decisions act on; a triangle of norms tells."""
-    if not norm.slope.any():
-        return False
+    """Whether some design may break a limit; a triangle of norms tells."""
     most = norm.norm.value(norm.grid, norm.constant)
     for column, scale in enumerate(problem.scales):
         most += scale * norm.norm.value(norm.grid, norm.slope[..., column])
-    return most > maximum
+    return most > maximum * (1.0 + FEASIBLE)
 
 
 def _solved(problem: AffineProblem, held: tuple[Array, Array] | None) -> ConicSolution:
