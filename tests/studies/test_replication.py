@@ -217,7 +217,6 @@ def test_picture_says_what_the_file_says() -> None:
 
 
 @pytest.mark.parametrize(("more", "said"), [
-    ({"problems": {"a": {"like": "b"}, "b": {"like": "a"}}}, "is like itself"),
     ({"define": {"a": "b", "b": "1"}}, "'b' is no name here"),
     ({"readings": {"r": {"mass": 2}}}, "'mass' is no number here"),
     ({"picture": {"panels": [{"curves": [{"y": "mean['given'] / kq"}]}]}}, "'kq' is no name here"),
@@ -299,3 +298,10 @@ def test_every_colour_is_one_of_the_pictures() -> None:
 def test_what_is_allowed_is_a_number_or_a_share(within: str) -> None:
     with pytest.raises(ValueError, match="within"):
         _judged(**{"is": 1, "within": within})
+
+
+@pytest.mark.parametrize("like", ["a", "b", ["a"], 3])
+def test_a_problem_like_itself_is_refused_before_anything_is_computed(like: Any) -> None:
+    part = _part(problems={"a": {"like": "b"}, "b": {"like": like}}, cases=[{"name": "c", "problem": "a"}])
+    with pytest.raises(ModelError, match="is like itself, or is no name; correct a like"):
+        part.points(Scenes(PROBLEMS))

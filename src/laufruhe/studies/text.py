@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from laufruhe.present.numbers import trimmed
+
 NOTHING = "–"
 
 
@@ -29,8 +31,8 @@ NEGLIGIBLE = 0.07
 NOTICEABLE = 0.15
 """Change that stands out in the same bars: about twice what cannot be told apart."""
 PRINTED_FALL = 0.05
-"""Allowed on a printed fall of the mean force: a rod ratio of 0.22 instead of 0.26 takes off four points, gas at
-full load five, and the study prints neither."""
+"""Allowed on a printed fall of the mean force: a rod ratio of 0.22 instead of 0.26 takes off four points, a compression
+ratio of 20.5 instead of 17 five, and the study prints neither."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Verdict:
 
 def number(value: float, digits: int = 5) -> str:
     """A number of a table; a dash where there is none."""
-    return NOTHING if value != value else f"{value:.{digits}g}"
+    return NOTHING if value != value else trimmed(value, digits)
 
 
 def said(found: Sequence[Verdict]) -> list[Text]:

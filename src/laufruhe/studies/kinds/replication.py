@@ -75,8 +75,6 @@ class Replication(Part):
         for reading, numbers in self.readings.items():
             for name in numbers:
                 yield ("readings", reading), name, partial(check_among, known=self.numbers, what="number")
-        for name, tables in self.problems.items():
-            yield ("problems", name, "like"), tables.get("like", ""), partial(self._check_like, name)
         for name, what in self.quantities.items():
             yield ("quantities", name), what, check_asked
         cases = [case.name for case in self.cases]
@@ -87,17 +85,6 @@ class Replication(Part):
         yield from checks_in(self.statements, {**known, "value": ()}, cases, at=("statements",))
         places = [*DIMENSIONS, *(name for case in self.cases for name in case.sweep)]
         yield from checks_in(self.picture_, known, cases, places, ("picture",))
-
-    def _check_like(self, name: str, _: str) -> None:
-        seen: list[str] = []
-        while name in self.problems:
-            if name in seen:
-                raise ModelError(f"problem '{name}' is like itself; take out one like")
-            seen.append(name)
-            like = self.problems[name].get("like", "")
-            if not isinstance(like, str):
-                raise ModelError(f"problem '{name}' is like what is no name; write it in quotes")
-            name = like
 
     def each_reading(self) -> list[Part]:
         """One part shows all readings side by side."""
@@ -136,13 +123,15 @@ class Replication(Part):
                 changed = case.model_copy(update={"set": filled(case.set, names), "numbers": swept})
             yield Point(changed, base=tables)
 
-    def _tables(self, name: str, scenes: Scenes) -> dict[str, Any]:
+    def _tables(self, name: Any, scenes: Scenes, *seen: Any) -> dict[str, Any]:
         """Tables of a problem under `problems`, upon those of what it is like; else of a file."""
+        if name in seen or not isinstance(name, str):
+            raise ExpressionError(f"problem '{name}' is like itself, or is no name; correct a like")
         if name not in self.problems:
             return scenes.file(name)
         own = {key: value for key, value in self.problems[name].items() if key != "like"}
         like = self.problems[name].get("like")
-        return own if like is None else joined(self._tables(like, scenes), own)
+        return own if like is None else joined(self._tables(like, scenes, name, *seen), own)
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Every quantity of one scene, at its optimum where something is open."""

@@ -253,7 +253,7 @@ class Tolerance(Part):
             nominal, worst = float(row["nominal"]) / GRAVITY, float(row["worst"]) / GRAVITY
             parts = [f"{float(row['worst_' + cause.replace(' ', '_')]) / GRAVITY:.1f}" for cause in CAUSES]
             often = float(row["random"].sel(share=0.95, method="nearest")) / GRAVITY
-            cells = [str(name), f"{nominal:.3g}", f"{worst:.1f}", *parts, f"{float(row['mean']) / GRAVITY:.1f}"]
+            cells = [str(name), number(nominal, 3), f"{worst:.1f}", *parts, f"{float(row['mean']) / GRAVITY:.1f}"]
             cells += [f"{often:.1f}", f"{nominal / worst:.2g}", number(float(row["mount"]) / GRAVITY, 3)]
             rows.append([*cells, percent(rise_of(row))])
         return [Rows(head, rows), *said(verdicts(data))]
@@ -320,7 +320,7 @@ def _row(row: xr.Dataset, k: int) -> list[p.Mark]:
         p.Line([worst], [k - 0.3], "after", marker="|", size=14.0, width=0.0),
         p.Words(worst * 1.08, k - 0.3, f"{worst:.0f}", 8.0, "after"),
         p.Line([at], [k - 0.3], marker="D", width=0.0),
-        p.Words(at * 1.12, k - 0.3, f"{nominal:.3g}", 8.0),
+        p.Words(at * 1.12, k - 0.3, number(nominal, 3), 8.0),
     ]
 
 
