@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import laufruhe
-from laufruhe.studies.kept import NAME
+from laufruhe.studies.runner import KEPT
 
 PROBLEM = Path(__file__).parents[2] / "problems" / "tractor-single.toml"
 STUDY = """
@@ -118,7 +118,7 @@ def uninterrupted(folder: Path) -> Whole:
     """One run in a new folder, left alone."""
     began = time.monotonic()
     process = started(prepared(folder))
-    while not (folder / "out" / NAME).exists() and process.poll() is None:
+    while not (folder / "out" / KEPT).exists() and process.poll() is None:
         time.sleep(0.01)
     first = time.monotonic() - began
     said = process.communicate()[1]
@@ -143,7 +143,7 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
         running = [started(folder) for _ in range(rng.choice((1, 2)))]
         told.tried[f"runs of {len(running)} at once"] += 1
         _stopped(running, rng, whole, seed, told)
-        told.tried[f"kept points: {damage(folder / 'out' / NAME, rng)}"] += 1
+        told.tried[f"kept points: {damage(folder / 'out' / KEPT, rng)}"] += 1
     last = started(folder)
     said = last.communicate()[1]
     if last.returncode or said:

@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 
 from laufruhe.studies import run
-from laufruhe.studies.kept import NAME, KeptPoints
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import KEPT, KeptPoints
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 MARKS = [f"{k:032x}" for k in range(5)]
@@ -48,15 +48,15 @@ def trusted(path: Path) -> list[int]:
 
 
 def test_points_are_read_as_they_were_kept(tmp_path: Path) -> None:
-    written(tmp_path / NAME)
-    assert trusted(tmp_path / NAME) == [0, 1, 2, 3, 4]
-    with KeptPoints(tmp_path / NAME, MARKS[1:3]) as store:
+    written(tmp_path / KEPT)
+    assert trusted(tmp_path / KEPT) == [0, 1, 2, 3, 4]
+    with KeptPoints(tmp_path / KEPT, MARKS[1:3]) as store:
         assert list(store.records) == MARKS[1:3]
 
 
 def test_a_byte_changed_anywhere_costs_one_point(tmp_path: Path) -> None:
     """A point is as it was kept, or it is none; an end of line may be lost without harm, there are two."""
-    path = tmp_path / NAME
+    path = tmp_path / KEPT
     content = written(path)
     rng = random.Random(1)
     for place in range(0, len(content), 3):
@@ -69,7 +69,7 @@ def test_a_byte_changed_anywhere_costs_one_point(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_lines_in_any_disorder(tmp_path: Path, seed: int) -> None:
-    path, rng = tmp_path / NAME, random.Random(seed)
+    path, rng = tmp_path / KEPT, random.Random(seed)
     lines = [line for line in written(path).splitlines(keepends=True) if line.strip()]
     whole = [*lines, rng.choice(lines)]
     rng.shuffle(whole)
@@ -89,7 +89,7 @@ def test_lines_in_any_disorder(tmp_path: Path, seed: int) -> None:
                 b'["a", 1, {}]\n', b'["' + b"0" * 32 + b'", 0.25, {"objective": 1.0}]\n', b"9" * 5000 + b"\n"],
 )  # fmt: skip
 def test_what_is_no_point_is_passed_over(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / NAME
+    path = tmp_path / KEPT
     path.write_bytes(content)
     assert trusted(path) == []
     with KeptPoints(path, MARKS) as store:
@@ -99,7 +99,7 @@ def test_what_is_no_point_is_passed_over(tmp_path: Path, content: bytes) -> None
 
 def test_two_at_once_keep_whole_lines(tmp_path: Path) -> None:
     """One that found the end of the file before the other added to it."""
-    path = tmp_path / NAME
+    path = tmp_path / KEPT
     with KeptPoints(path, MARKS) as one, KeptPoints(path, MARKS) as other:
         for k in range(5):
             (one if k % 2 else other).keep(MARKS[k], 0.25, RECORDS[k])
@@ -109,7 +109,7 @@ def test_two_at_once_keep_whole_lines(tmp_path: Path) -> None:
 
 def test_a_changed_figure_is_solved_again(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
-    study, path = load_study(tmp_path / "s.toml"), tmp_path / "kept" / NAME
+    study, path = load_study(tmp_path / "s.toml"), tmp_path / "kept" / KEPT
 
     def computed() -> xr.Dataset:
         return run(study, PROBLEMS, path)[0]["p"]

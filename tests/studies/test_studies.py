@@ -26,13 +26,13 @@ from laufruhe.files.reader import load
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.problem.measure import Limit
 from laufruhe.solvers import solve
-from laufruhe.studies import Point, Scenes, kinds, run, work
-from laufruhe.studies.kept import NAME
+from laufruhe.studies import Point, Scenes, kinds, run, runner
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
 from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import KEPT
 from laufruhe.studies.swept import solved
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -65,7 +65,7 @@ def swept(quantity: str, text: str) -> str:
 
 
 def computed(path: Path, folder: Path = PROBLEMS, jobs: int = 1, kept: Path | None = None) -> xr.Dataset:
-    return run(load_study(path), folder, kept or path.parent / "kept" / NAME, jobs=jobs)[0]["p"]
+    return run(load_study(path), folder, kept or path.parent / "kept" / KEPT, jobs=jobs)[0]["p"]
 
 
 def points_in(content: bytes) -> set[str]:
@@ -187,7 +187,7 @@ def test_a_scene_of_two_names_is_solved_once_and_shown_twice(tmp_path: Path) -> 
     data = computed(study(tmp_path, text))
     assert data["case"].values.tolist() == ["boxer-four", "b"]
     assert np.ptp(data["objective"].values) == 0.0
-    assert len(points_in((tmp_path / "kept" / NAME).read_bytes())) == 1
+    assert len(points_in((tmp_path / "kept" / KEPT).read_bytes())) == 1
 
 
 def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
@@ -201,11 +201,11 @@ def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
 
 def test_goes_on_from_a_file_cut_anywhere(tmp_path: Path, small: Path) -> None:
     path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(5)))
-    kept = tmp_path / "kept" / NAME
+    kept = tmp_path / "kept" / KEPT
     whole = computed(path, small, kept=kept)
     content = kept.read_bytes()
     assert len(points_in(content)) == 5
-    cut = tmp_path / "cut" / NAME
+    cut = tmp_path / "cut" / KEPT
     cut.parent.mkdir()
     for length in (1, len(content) // 2, len(content) - 1):
         cut.write_bytes(content[:length])
@@ -246,7 +246,7 @@ def test_points_hang_on_all_that_they_use(tmp_path: Path, monkeypatch: pytest.Mo
 
 @pytest.fixture
 def pool_at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(work, "POOL_PAYS", 0.0)
+    monkeypatch.setattr(runner, "POOL_PAYS", 0.0)
     return
 
 
@@ -267,8 +267,8 @@ def test_progress_says_how_long_is_left(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.slow
 def test_cores_change_nothing(tmp_path: Path, small: Path, pool_at_once: None) -> None:
     path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(12)))
-    one = computed(path, small, 1, tmp_path / "1" / NAME)
-    two = computed(path, small, 2, tmp_path / "2" / NAME)
+    one = computed(path, small, 1, tmp_path / "1" / KEPT)
+    two = computed(path, small, 2, tmp_path / "2" / KEPT)
     assert one.identical(two)
 
 
@@ -278,7 +278,7 @@ def test_what_a_worker_refuses_is_one_line(tmp_path: Path, small: Path, pool_at_
     values = '["9 kp/cm^2", "8 kp/cm^2", "400 kp/cm^2", "7 kp/cm^2", "6 kp/cm^2"]'
     path = study(tmp_path, part("counterweight fraction", ["single"], swept("gas.imep", f"values = {values}")))
     with pytest.raises(InputError, match=r"gas.imep = 400 kp/cm\^2") as caught:
-        computed(path, small, 2, tmp_path / "2" / NAME)
+        computed(path, small, 2, tmp_path / "2" / KEPT)
     assert "\n" not in str(caught.value)
 
 
@@ -303,7 +303,7 @@ def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals
     # a test run in the background has its interrupts ignored, and hands that on
     heard = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
-    kept = out / NAME
+    kept = out / KEPT
     for _ in range(2000):
         if kept.is_file() and len(points_in(kept.read_bytes())) >= 3:
             break

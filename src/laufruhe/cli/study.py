@@ -13,8 +13,8 @@ from laufruhe.report import files
 from laufruhe.report.strict_json import strict
 from laufruhe.report.study_report import as_json, file_names, write_study
 from laufruhe.studies import Scenes, run
-from laufruhe.studies.kept import NAME
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import KEPT
 
 SAID_EVERY = 0.2
 
@@ -27,9 +27,9 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
     started = time.perf_counter()
     study = load_study(path)
     folder = out if out is not None else Path("results") / path.stem
-    kept = folder / NAME
+    kept = folder / KEPT
     option, names = "--out" if out is not None else "results", file_names(study)
-    with files.staged(files.Set(folder, option, "study", names, beside=[NAME])) as stage:
+    with files.staged(files.Set(folder, option, "study", names, beside=[KEPT])) as stage:
         datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or processors())
         # late: pictures are not needed where the study is refused
         from laufruhe.plots.picture import save_picture

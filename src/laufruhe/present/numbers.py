@@ -60,9 +60,11 @@ def percent(share: float) -> str:
     return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH
 
 
-def price_of(price: float, unit: str, of: str) -> str:
-    """A shadow price in readable units: N per kg; N alone for a plain number."""
-    if not price:
+def price_of(price: float, unit: str, of: str, counts: bool = False) -> str:
+    """A shadow price in readable units: N per kg; N alone for a plain number. One of zero where it `counts`."""
+    if math.isnan(price):
+        return "not known"
+    if not price and not counts:
         return DASH
     (name, factor), (of_name, of_factor) = readable(unit), readable(of)
     units = f"{name} per {of_name}".strip() if of_name else name

@@ -89,6 +89,8 @@ class Channel:
         That a limit may have.
     minimised
         Whether it may be an objective.
+    of_loads
+        Whether it depends on what excites the block.
     size
         Of what cancels in it where it is zero; zero where loads, masses or nothing do.
     """
@@ -100,6 +102,7 @@ class Channel:
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
     size: float = 0.0
+    of_loads: bool = False
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
     is_number: ClassVar[bool] = False
@@ -176,16 +179,9 @@ class NumberChannel(Channel):
 
 @dataclass(frozen=True, eq=False)
 class MountChannel(NumberChannel):
-    """A block on its mounts.
-
-    Attributes
-    ----------
-    of_loads
-        Whether its numbers depend on what excites the block.
-    """
+    """A block on its mounts."""
 
     needs: Needs = Needs.ELASTIC
-    of_loads: bool = False
     is_mounting: ClassVar[bool] = True
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:

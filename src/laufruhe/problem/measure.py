@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,6 +174,9 @@ class Limit:
             sides.append(max((low - value, low, "at most"), (value - high, high, "at least")))
         return min(((room / (abs(edge) or 1.0), edge, side) for room, edge, side in sides), default=(math.inf, 0.0, ""))
 
+
+Side: TypeAlias = tuple[Limit, str]
+"""A limit, and which of its sides: "at most" or "at least"."""
 
 MEAN_MOUNT_FORCE = Measure(MOUNT_FORCE)
 

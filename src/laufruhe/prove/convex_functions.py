@@ -144,11 +144,12 @@ class Residual:
 
 @dataclass(frozen=True, eq=False)
 class ConvexLimit:
-    """function <= maximum, and the limit of the problem that it comes from."""
+    """function <= maximum, the limit of the problem that it comes from, and which side of it."""
 
     function: ConvexFunction
     maximum: float
     source: int
+    side: str = "at most"
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,6 +34,7 @@ WORK = 4e6
 MOST_BOXES = 20_000
 # numbers held at once
 HELD = 3e6
+MOST_PLACES = 3
 HALVINGS = 45
 # of the gap that counts as proven: what small orders may take of it, and what is left for roundings
 LEFT_OUT, NEARLY = 0.05, 0.9
@@ -49,10 +50,13 @@ class Divided:
         No design allowed has a smaller objective; zero where nothing is known.
     boxes
         That were looked at.
+    places
+        Middles of the least of those that are left.
     """
 
     bound: float
     boxes: int
+    places: tuple[Array, ...] = ()
 
 
 def divides(problem: Problem) -> bool:
@@ -70,7 +74,7 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
     problem
         That `divides`.
     value
-        Objective of the best design known.
+        Objective of the best design known; infinite where none is, and then the bound tells whether there is one.
     room
         Difference that counts as none [SI].
     """
@@ -78,7 +82,7 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
     most = search.most_boxes
     if not most or not search.is_sampled_fully:
         return Divided(0.0, 0)
-    enough = value - NEARLY * room
+    enough = value - NEARLY * room if value < math.inf else math.inf
     lower, upper = search.model.lower, search.model.upper
     bounds, sides = search.bounds(lower[None], upper[None])
     heap = [(float(bounds[0]), 0, lower, upper, int(sides[0]))]
@@ -97,7 +101,8 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
             seen += 1
             if max(known, float(bound)) < enough:
                 heapq.heappush(heap, (max(known, float(bound)), seen, low, high, int(side)))
-    return Divided(min(heap[0][0] if heap else enough, enough), seen)
+    left = tuple(0.5 * (low + high) for bound, _, low, high, _ in heapq.nsmallest(MOST_PLACES, heap) if bound < enough)
+    return Divided(min(heap[0][0] if heap else enough, enough), seen, left)
 
 
 class _Search:

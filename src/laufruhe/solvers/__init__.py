@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.channels import OF_MOUNTS, MountChannel
+from laufruhe.problem.channels import OF_MOUNTS
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.measure import Term
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
@@ -105,8 +105,7 @@ def _nothing_inside(problem: Problem) -> bool:
 
 def _asks_loads(problem: Problem) -> bool:
     """Whether nothing that is asked of the mounts depends on loads: it holds for every design, or for none."""
-    asked = [measure.channel for measure in problem.measures]
-    return not any(isinstance(channel, MountChannel) and channel.of_loads for channel in asked)
+    return not any(measure.channel.of_loads for measure in problem.measures)
 
 
 _U, _P, _K, _M, _S = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
-from laufruhe.problem.measure import Limit
+from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
@@ -79,7 +78,7 @@ class Shown:
     kkt_residual, method
         As in a certificate.
     prices
-        Fall of the objective per unit by which each limit is relaxed.
+        Fall of the objective per unit by which a side of a limit is relaxed, of those that are known.
     slopes
         Of the bound over the columns of a decision, by its name: they price the decision's own bounds.
     """
@@ -88,7 +87,7 @@ class Shown:
     reach: Reach
     kkt_residual: float
     method: str
-    prices: Sequence[float] = ()
+    prices: Mapping[Side, float] = field(default_factory=dict)
     slopes: Mapping[str, Array] = field(default_factory=dict)
 
 
@@ -200,21 +199,21 @@ def _broken(problem: Problem, design: Design) -> str:
 
 
 def limit_values(
-    problem: Problem, evaluation: Evaluation, prices: Sequence[float] = (), value: float = 0.0
+    problem: Problem, evaluation: Evaluation, prices: Mapping[Side, float] | None = None, value: float = 0.0
 ) -> tuple[LimitValue, ...]:
     """How a design stands to the limits (E15); a price that would not move the objective by its rounding is none."""
-    known = itertools.chain(prices, itertools.repeat(0.0))
-    return tuple(
-        _limit_value(limit, evaluation, price, value, problem.tolerance)
-        for limit, price in zip(problem.limits, known, strict=False)
-    )
+    return tuple(_limit_value(limit, evaluation, prices, value, problem.tolerance) for limit in problem.limits)
 
 
-def _limit_value(limit: Limit, evaluation: Evaluation, price: float, value: float, tolerance: float) -> LimitValue:
+def _limit_value(
+    limit: Limit, evaluation: Evaluation, prices: Mapping[Side, float] | None, value: float, tolerance: float
+) -> LimitValue:
     found = evaluation.standing(limit)
+    # an active side without a price has one that nothing here tells
+    price = 0.0 if prices is None else prices.get((limit, found.side), math.nan)
     told = price * abs(found.edge) > _TOLD * value and found.excess >= -tolerance
     active = bool(found.excess >= -ACTIVE or told)
-    price = price if active and price * abs(found.edge) > _FELT * value else 0.0
+    price = 0.0 if not active or price * abs(found.edge) <= _FELT * value else price
     return LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side)
 
 
@@ -222,7 +221,7 @@ def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
     """A result with limits beside its own that nothing open acts on, in the order given."""
     problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
     shown = tuple(
-        known.get(limit) or _limit_value(limit, result.final, 0.0, 0.0, problem.tolerance) for limit in limits
+        known.get(limit) or _limit_value(limit, result.final, None, 0.0, problem.tolerance) for limit in limits
     )
     resonant = not known and result.final.resonance
     return replace(result, problem=problem.changed(limits=limits), limits=() if resonant else shown)

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import casadi as ca
+
+from laufruhe.problem.measure import Side
+
+Slope: TypeAlias = tuple[Side, float] | None
+"""A side of a limit, and the slope of a constraint's side over it."""
 
 
 @dataclass
@@ -16,7 +21,7 @@ class Gathered:
     Attributes
     ----------
     slopes
-        Of each constraint's side over the limit that it comes from.
+        Of each constraint's lower and upper side over the side of the limit that it comes from.
     heads
         Further variables, each with where it stands at a given point (E22).
     floors
@@ -27,19 +32,21 @@ class Gathered:
     lower: list[float] = field(default_factory=list)
     upper: list[float] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
-    slopes: list[float] = field(default_factory=list)
+    slopes: list[tuple[Slope, Slope]] = field(default_factory=list)
     heads: list[tuple[Any, Any]] = field(default_factory=list)
     floors: list[float] = field(default_factory=list)
 
-    def add(self, expression: Any, lower: float, upper: float, name: str, slope: float = 0.0) -> None:
-        """One constraint, or a column of them."""
+    def add(
+        self, expression: Any, lower: float, upper: float, name: str, least: Slope = None, most: Slope = None
+    ) -> None:
+        """One constraint, or a column of them; what its sides are of which limit where that has a price."""
         expression = ca.MX(expression)
         count = expression.numel()
         self.expressions.append(expression.reshape((count, 1)))
         self.lower += [lower] * count
         self.upper += [upper] * count
         self.names += [name] * count
-        self.slopes += [slope] * count
+        self.slopes += [(least, most)] * count
 
     def named(self, name: str, symbol: Any = ca.MX) -> Named:
         """What a norm adds to, under the name of its measure."""

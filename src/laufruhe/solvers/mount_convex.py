@@ -16,7 +16,7 @@ from laufruhe.physics.mount_numbers import torque_roll_rows
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import STIFFNESS, Decision
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
@@ -103,13 +103,13 @@ def _limits(limit: Limit, k: int, matrices: Matrices, mounting: ElasticMounting,
         if limit.maximum < math.inf:
             found.append(ConvexLimit(Eigenvalue(matrices, 1.0), (math.tau * limit.maximum) ** 2, k))
         if limit.minimum > -math.inf:
-            found.append(ConvexLimit(Eigenvalue(matrices, -1.0), -((math.tau * limit.minimum) ** 2), k))
+            found.append(ConvexLimit(Eigenvalue(matrices, -1.0), -((math.tau * limit.minimum) ** 2), k, "at least"))
         return found
     function = _function(limit.measure, matrices, mounting, problem)
     if limit.maximum < math.inf:
         found.append(ConvexLimit(function, limit.maximum, k))
     if limit.minimum > -math.inf and isinstance(function, Linear):
-        found.append(ConvexLimit(Linear(-function.constant, -function.gradient), -limit.minimum, k))
+        found.append(ConvexLimit(Linear(-function.constant, -function.gradient), -limit.minimum, k, "at least"))
     return found
 
 
@@ -138,16 +138,16 @@ def solve_convex_mounts(problem: Problem) -> Result:
     return concluded(design, initial, shown, {**timing, "evaluate": time.perf_counter() - solved})
 
 
-def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> list[float]:
-    """Fall of the objective per unit by which each limit is relaxed, in the limit's own unit."""
-    prices = [0.0] * len(problem.limits)
+def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dict[Side, float]:
+    """Fall of the objective per unit by which each side of a limit is relaxed, in the limit's own unit."""
+    prices: dict[Side, float] = {}
     for limit, price in zip(program.limits, duals.prices, strict=True):
         source = problem.limits[limit.source]
         slope = 1.0
         if source.measure.channel is channels.FREQUENCIES:
             # the limit is on the square of 2 pi f
             slope = 2.0 * math.tau * math.sqrt(abs(limit.maximum))
-        prices[limit.source] += price * slope
+        prices[source, limit.side] = price * slope
     return prices
 
 

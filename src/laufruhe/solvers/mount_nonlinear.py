@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.problem import channels
 from laufruhe.problem.decision import domains_of
@@ -19,31 +19,22 @@ from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Reach, room_of
+from laufruhe.prove.certificate import Reach, gap_of, room_of
 from laufruhe.prove.subdivision import Divided, divided_bound, divides
 from laufruhe.prove.transmitted_bound import transmitted_bound
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Design, Shown, concluded, judged, none_within
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, none_within
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
-from laufruhe.solvers.mount_starts import columns_of, start_points, unbalances_of
-from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear
+from laufruhe.solvers.mount_search import Found, MountSearch, judged_at
+from laufruhe.solvers.mount_starts import columns_of, unbalances_of
+from laufruhe.solvers.nonlinear import LocalOptimum, distinct
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth_program import SmoothProgram
 from laufruhe.solvers.unbalances import solve_unbalances
 
 Array = NDArray[np.float64]
 
-SLACK = 1e-5
 WORTH_SAYING = 1.01
-MOST_MARGINS = 3
-ITERATIONS = 150
-MOST_AROUND = 3
-# share of the size that a search counted in from which it is done again in a smaller one, and how often
-SMALL = 1e-2
-MOST_SIZES = 3
-SPREAD = 0.4
-# of the throws that a search starts from, about their star [rad]
-NUDGE = 0.02
+MOST_DIVISIONS = 3
 
 
 def solve_mounts(problem: Problem, workers: int | None = None) -> Result:
@@ -97,113 +88,37 @@ def _solved(
     """Result, and deviations of the throws."""
     started = time.perf_counter()
     initial = evaluate_start(problem)
-    points, size = start_points(problem)
-    points = points if first is None else [first, *points[1:]]
-    joint = SmoothProgram(problem, size, moves=moves)
+    search = MountSearch(problem, initial, workers, moves, first)
     modelled = time.perf_counter()
-    optima = _searched(problem, joint, points, workers)
-    best, design = _first_allowed(joint, optima)
-    nothing = nothing_of(problem)
-    for _ in range(MOST_SIZES):
-        if best is None or design is None or design.value >= SMALL * size or size <= nothing:
-            break
-        # a search ends at a share of the size that it counts in: again, beside what was found
-        size = max(design.value, nothing)
-        joint = SmoothProgram(problem, size, moves=moves)
-        mounts, _ = joint.split(best.x)
-        optima = _searched(problem, joint, [(mounts, _columns(joint, best.x)), *points[1:]], workers)
-        best, design = _first_allowed(joint, optima)
-    if design is not None and design.excess > FEASIBLE:
-        best, design = _tightened(problem, joint, best, design)
+    search.run()
+    divided = _divided(problem, search)
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
-    if best is None or design is None:
-        return _none(problem, joint, initial, optima, timing), np.zeros(0 if moves is None else moves.size)
-    proven = _rebalanced(design)
-    design = design if proven is None or proven[0].value >= design.value else proven[0]
-    return _result(problem, joint, initial, design, best, optima, proven, timing), joint.turns(best.x)
+    found = search.chosen
+    if found is None or found.design.excess > KEPT:
+        return _none(problem, search, initial, divided, timing), search.turns
+    proven = _rebalanced(found.design)
+    design = found.design if proven is None or proven[0].value >= found.design.value else proven[0]
+    return _result(search, initial, replace(found, design=design), proven, divided, timing), search.turns
 
 
-def _searched(
-    problem: Problem, joint: SmoothProgram, points: Sequence[tuple[list[float], Array]], workers: int | None
-) -> tuple[LocalOptimum, ...]:
-    """Local optima from the points, and from others drawn around the best of them."""
-    generator = np.random.default_rng(problem.search.seed)
-    starts = [joint.start(mounts, columns, _nudged(joint, generator, k)) for k, (mounts, columns) in enumerate(points)]
-    optima = solve_nonlinear(joint.program, starts, workers, ITERATIONS)
-    around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
-    if not around or len(points) < 2:
-        return optima
-    decisions = problem.mount_decisions
-    low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
-    again = []
-    for k in range(max(len(points) // 2, 1)):
-        x = around[k % len(around)].x
-        found = np.array(joint.split(x)[0])
-        mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
-        again.append(joint.start(np.clip(mounts, low, high).tolist(), _columns(joint, x), joint.turns(x)))
-    more = solve_nonlinear(joint.program, again, workers, ITERATIONS)
-    moved = [replace(optimum, start=optimum.start + len(points)) for optimum in more]
-    return tuple(sorted((*optima, *moved), key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
-
-
-def _columns(joint: SmoothProgram, x: Array) -> Array:
-    """Of the unbalances, as the program has them."""
-    first = len(joint.problem.mount_decisions)
-    return x[first : first + joint.columns]
-
-
-def _nudged(joint: SmoothProgram, generator: np.random.Generator, k: int) -> Array:
-    """Throws to start from: on their star first, then beside it, for a star that is its own image may be a saddle."""
-    if joint.moves is None or k == 0:
-        return joint.turns(np.zeros(joint.program.x.numel()))
-    nudge = NUDGE * generator.normal(size=joint.moves.size)
-    return np.clip(nudge, joint.moves.lower, joint.moves.upper)
-
-
-def _judged(problem: Problem, mounts: list[float], unbalances: list[complex]) -> Design | None:
-    found = iter(mounts), iter(unbalances)
-    values: list[Value] = [next(found[1]) if decision.is_affine else next(found[0]) for decision in problem.decisions]
-    try:
-        return judged(problem, values)
-    except ModelError:
-        # a resonance without damping is no design
-        return None
+def _divided(problem: Problem, search: MountSearch) -> Divided:
+    """A bound by boxes of stiffness, and searches from where these are least until nothing better comes of it."""
+    divided = Divided(0.0, 0)
+    if search.moves is not None or not divides(problem):
+        return divided
+    for _ in range(MOST_DIVISIONS):
+        found = search.chosen
+        value = found.design.value if found is not None and found.design.excess <= KEPT else math.inf
+        room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
+        divided = divided_bound(problem, value, room)
+        if not divided.places or not search.again(divided.places):
+            break
+    return divided
 
 
 def _mounts(design: Design) -> list[float]:
     pairs = zip(design.problem.decisions, design.values, strict=True)
     return [value.real for decision, value in pairs if not decision.is_affine]
-
-
-def _first_allowed(joint: SmoothProgram, optima: Sequence[LocalOptimum]) -> tuple[LocalOptimum | None, Design | None]:
-    """The best optimum by the exact model: within limits first, then by value."""
-    found = []
-    for optimum in optima:
-        if optimum.usable:
-            design = _judged(joint.designed(optimum.x), *joint.split(optimum.x))
-            if design is not None:
-                found.append((optimum, design))
-    if not found:
-        return None, None
-    return min(found, key=lambda pair: (max(pair[1].excess, SLACK), pair[1].value))
-
-
-def _tightened(
-    problem: Problem, loose: SmoothProgram, best: LocalOptimum | None, design: Design
-) -> tuple[LocalOptimum | None, Design | None]:
-    """Again with limits a little tighter: a peak between the samples breaks its limit by a little."""
-    margin = 0.0
-    for _ in range(MOST_MARGINS):
-        if best is None or design.excess <= FEASIBLE or design.excess > 0.05:
-            break
-        margin += 1.05 * design.excess
-        joint = SmoothProgram(problem, loose.unit, margin, loose.moves)
-        again = solve_nonlinear(joint.program, [best.x], workers=1)
-        better, allowed = _first_allowed(joint, again)
-        if better is None or allowed is None:
-            break
-        best, design = better, allowed
-    return best, design
 
 
 def _rebalanced(design: Design) -> tuple[Design, float] | None:
@@ -219,7 +134,8 @@ def _rebalanced(design: Design) -> tuple[Design, float] | None:
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return None
     values = unbalances_of(problem, result)
-    again = _judged(problem, _mounts(design), values)
+    given, own = iter(_mounts(design)), iter(values)
+    again = judged_at(problem, [next(own) if d.is_affine else next(given) for d in problem.decisions])
     return None if again is None or again.excess > KEPT else (again, result.certificate.gap)
 
 
@@ -262,28 +178,25 @@ def _bound(problem: Problem) -> float:
 
 
 def _result(
-    problem: Problem,
-    joint: SmoothProgram,
+    search: MountSearch,
     initial: Evaluation,
-    design: Design,
-    best: LocalOptimum,
-    optima: Sequence[LocalOptimum],
+    found: Found,
     proven: tuple[Design, float] | None,
+    divided: Divided,
     timing: dict[str, float],
 ) -> Result:
-    nothing, divided = nothing_of(problem, design.evaluation.engine), Divided(0.0, 0)
-    room = room_of(design.value, problem.tolerance, nothing)
-    if joint.moves is None and design.excess <= KEPT and divides(problem):
-        divided = divided_bound(problem, design.value, room)
+    problem, design, optimum = search.problem, found.design, found.optimum
+    nothing = nothing_of(problem, design.evaluation.engine)
+    bound = divided.bound
     # throws that move are not in the bound
-    if joint.moves is None and design.value - divided.bound > room:
-        divided = replace(divided, bound=max(divided.bound, _bound(problem)))
+    if search.moves is None and gap_of(design.value, bound, nothing) > problem.tolerance:
+        bound = max(bound, _bound(problem))
     shown = Shown(
-        bound=divided.bound,
+        bound=bound,
         reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
-        kkt_residual=best.kkt_residual,
-        method=_method(optima, max(design.value, nothing), proven, divided),
-        prices=[joint.price(limit.name, best.multipliers) for limit in problem.limits],
+        kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
+        method=_method(search.optima, max(design.value, nothing), proven, divided),
+        prices=found.joint.prices(optimum) if optimum is not None else {},
     )
     return concluded(design, initial, shown, timing)
 
@@ -303,24 +216,32 @@ def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, 
 
 
 def _none(
-    problem: Problem,
-    joint: SmoothProgram,
-    initial: Evaluation,
-    optima: Sequence[LocalOptimum],
-    timing: dict[str, float],
+    problem: Problem, search: MountSearch, initial: Evaluation, divided: Divided, timing: dict[str, float]
 ) -> Result:
-    """No start ended at a design within the limits: not a proof, unless the convex limits alone contradict."""
+    """No start ended at a design within the limits: a proof where the convex limits, or all boxes, tell of none."""
     conflict = _proven_conflict(problem)
+    if not conflict and divided.bound == math.inf:
+        conflict = _ruled_out(problem)
     result = none_within(problem, initial, conflict, timing)
     if conflict:
         return result
-    nearest = min(optima, key=lambda o: o.violation)
-    names = _broken(joint, nearest)
+    nearest = min(search.optima, key=lambda o: o.violation)
+    names = _broken(search.joint, nearest)
     message = (
-        f"no design found: from {len(optima)} starts none meets {names or 'the limits'} "
+        f"no design found: from {len(search.optima)} starts none meets {names or 'the limits'} "
         f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
     )
     return replace(result, status=Status.FAILED, message=message)
+
+
+def _ruled_out(problem: Problem) -> tuple[str, ...]:
+    """Limits that no box keeps together, each needed for that."""
+    kept = problem.limits
+    for limit in problem.limits:
+        fewer = tuple(other for other in kept if other is not limit)
+        if fewer and divided_bound(replace(problem, limits=fewer), math.inf, math.inf).bound == math.inf:
+            kept = fewer
+    return tuple(limit.name for limit in kept)
 
 
 def _broken(joint: SmoothProgram, optimum: LocalOptimum) -> str:

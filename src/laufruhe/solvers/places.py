@@ -85,7 +85,7 @@ def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) 
         reach=Reach.WHOLE,
         kkt_residual=certificate.kkt_residual if certificate is not None else 0.0,
         method=f"second-order cones over {boxes} box{'es' * (boxes > 1)} of places",
-        prices=[limit.shadow_price for limit in own.limits] if own is not None else (),
+        prices=own.prices if own is not None else {},
     )
     return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from laufruhe.problem.evaluation import Evaluation, objective_value
+from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.ranking import PhasingResult
@@ -49,7 +50,7 @@ class LimitValue:
     Attributes
     ----------
     shadow_price
-        Fall of the objective per unit by which the limit is relaxed.
+        Fall of the objective per unit by which the limit is relaxed; not a number where that is not known.
     side
         "at most" or "at least".
     """
@@ -124,6 +125,12 @@ class Result:
     error_estimate: float = 0.0
     timing: dict[str, float] = field(default_factory=dict)
     phasing: PhasingResult | None = None
+
+    @property
+    def prices(self) -> dict[Side, float]:
+        """Shadow prices of the limits, at the sides that the design stands at."""
+        pairs = zip(self.problem.limits, self.limits, strict=True)
+        return {(limit, shown.side): shown.shadow_price for limit, shown in pairs}
 
     def __repr__(self) -> str:
         lines = [f"<Result {self.problem.name}: {self.status}"]

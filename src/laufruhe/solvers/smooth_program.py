@@ -14,6 +14,7 @@ largest value is a variable that no sample exceeds (E22); a mean of lengths is s
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,7 +22,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
@@ -36,13 +36,14 @@ from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import torque_roll_rows
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
-from laufruhe.problem.channels import motion_indices, mounting_in
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import domains_of
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.gathered import Gathered
-from laufruhe.solvers.nonlinear import NonlinearProgram
+from laufruhe.solvers.nonlinear import LocalOptimum, NonlinearProgram
+from laufruhe.solvers.smooth_modes import ModeVariables
 
 Array = NDArray[np.float64]
 
@@ -51,6 +52,7 @@ SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
 WIDE = 100.0
 # orders that a complaint names
 MOST_NAMED = 6
+SIDES = ("at least", "at most")
 # a typical deviation of a throw [rad]
 TURN = 0.1
 
@@ -65,7 +67,7 @@ class SmoothProgram:
     unit
         Size of the objective.
     margin
-        Share by which limits on largest values are tightened, for they are kept at samples.
+        Share by which limits on loads are tightened, for they are kept at few samples.
     moves
         Throws that may leave the star of the problem; none when left out.
     slack
@@ -92,10 +94,7 @@ class SmoothProgram:
         self._loads = self._loads_of(moves)
         self._e = ca.MX.sym("softness")
         self._held = Gathered()
-        self._modal = any(
-            limit.measure.channel in (channels.FREQUENCIES, channels.DECOUPLING) for limit in problem.limits
-        )
-        self._vectors, self._squares = ca.MX.sym("V", 36 * self._modal), ca.MX.sym("l", 6 * self._modal)
+        self._modes = ModeVariables(problem, self._held)
         self.unit = unit
         self._points: list[PointResponse] = []
         if problem.asks_mounts:
@@ -103,7 +102,7 @@ class SmoothProgram:
             self._along, self._root = torque_roll_rows(self._mounting)
             self._mounts = symbolic_mounts(problem, self._mounting.block, self._d)
             self._points = self._responses()
-            self._square_unit = float(np.trace(self._root @ self._mounting.stiffness @ self._root.T)) / 6.0
+            self._modes.hold(self._mounts.stiffness, self._root, self._mounting)
         self.program = self._built()
 
     def _loads_of(self, moves: ThrowMoves | None) -> Loads:
@@ -117,8 +116,6 @@ class SmoothProgram:
         least = ca.MX(0.0)
         for term in self.problem.objective:
             least += term.weight * self._least(term.measure)
-        if self._modal:
-            self._hold_modes()
         for limit in self.problem.limits:
             self._limit(limit)
         self._hold_unbalances()
@@ -130,7 +127,7 @@ class SmoothProgram:
         lower, upper = self._bounds()
         constraints = ca.vertcat(*self._held.expressions) if self._held.expressions else None
         return NonlinearProgram(
-            ca.vertcat(self._v, self._u, self._t, self._vectors, self._squares, tops),
+            ca.vertcat(self._v, self._u, self._t, self._modes.symbols, tops),
             least,
             lower,
             upper,
@@ -156,7 +153,7 @@ class SmoothProgram:
         if self.moves is not None:
             low += self.moves.lower.tolist()
             high += self.moves.upper.tolist()
-        modes = 42 * self._modal
+        modes = self._modes.symbols.numel()
         free = np.full(modes + len(self._held.floors), np.inf)
         below = -free
         below[modes:] = self._held.floors
@@ -202,12 +199,12 @@ class SmoothProgram:
         if measure.is_mounting:
             self._limit_mounts(limit)
             return
-        tight = 1.0 - self._slack - self._margin * (measure.norm.refinement > 1)
+        tight = 1.0 - self._slack - self._margin
         rows, grid = self._rows(measure)
         unit = limit.maximum * tight or self.unit
         held = self._held.named(limit.name)
         value, most, slope = measure.norm.limited(held, grid, rows / unit, limit.maximum * tight / unit, self._softest)
-        self._held.add(value, -np.inf, most, limit.name, slope / unit)
+        self._held.add(value, -np.inf, most, limit.name, most=((limit, "at most"), slope / unit))
 
     def _hold_unbalances(self) -> None:
         """Discs and sectors of the unbalances (P4)."""
@@ -248,55 +245,31 @@ class SmoothProgram:
             self._held.add(force / firm - top * top, -np.inf, 0.0, quantity.name)
         return top
 
-    def _hold_modes(self) -> None:
-        """The modes are modes (E21)."""
-        v = ca.reshape(self._vectors, 6, 6)
-        unit = v.T @ v - ca.DM.eye(6)
-        apart = v.T @ (self._mounts.stiffness / self._square_unit) @ v - ca.diag(self._squares)
-        lower = [(j, k) for j in range(6) for k in range(j + 1)]
-        for matrix in (unit, apart):
-            self._held.add(ca.vertcat(*(matrix[j, k] for j, k in lower)), 0.0, 0.0, "modes")
-
     def _limit_mounts(self, limit: Limit) -> None:
         quantity = limit.measure
-        if quantity.channel is channels.FREQUENCIES:
-            self._limit_frequencies(limit)
-        elif quantity.channel is channels.DECOUPLING:
-            # share of motion j in column j: the columns are set to their motions at the start (E24)
-            v = ca.reshape(self._vectors, 6, 6)
-            shapes, momenta = ca.DM(self._root.T) @ v, ca.DM(np.linalg.inv(self._root)) @ v
-            for j in motion_indices(quantity):
-                self._held.add(shapes[j, j] * momenta[j, j], max(limit.minimum, 0.0), np.inf, limit.name, 1.0)
-        elif quantity.channel is channels.TRANSMISSIBILITY:
+        if self._modes.limit(limit):
+            return
+        if quantity.channel is channels.TRANSMISSIBILITY:
             most = limit.maximum
             for force, firm in transmitted(self._points, quantity):
-                self._held.add(ca.sqrt(force / firm), -np.inf, most, limit.name, 1.0)
+                self._held.add(ca.sqrt(force / firm), -np.inf, most, limit.name, most=((limit, "at most"), 1.0))
         else:
             unit = (limit.maximum if limit.maximum < math.inf else limit.minimum) or 1.0
             low, high = limit.minimum / unit, limit.maximum / unit
-            self._held.add(self._mount_number(quantity) / unit, low, high, limit.name, 1.0 / unit)
-
-    def _limit_frequencies(self, limit: Limit) -> None:
-        def scaled(frequency: float) -> float:
-            return (math.tau * frequency) ** 2 / self._square_unit
-
-        low = scaled(limit.minimum) if limit.minimum > -math.inf else -math.inf
-        high = scaled(limit.maximum) if limit.maximum < math.inf else math.inf
-        side = limit.maximum if limit.maximum < math.inf else limit.minimum
-        if math.isfinite(side):
-            unit = scaled(side)
-            slope = 2.0 * math.tau**2 * side / (self._square_unit * unit)
-            self._held.add(self._squares / unit, low / unit, high / unit, limit.name, slope)
-        if limit.outside is not None:
-            a, b = (scaled(edge) for edge in limit.outside)
-            self._held.add((self._squares - a) * (self._squares - b) / (b * b), 0.0, np.inf, limit.name)
+            slopes = (((limit, side), 1.0 / unit) for side in SIDES)
+            self._held.add(self._mount_number(quantity) / unit, low, high, limit.name, *slopes)
 
     # between variables and decisions
 
-    def price(self, name: str, multipliers: Array) -> float:
-        """Fall of the objective per unit by which a limit is relaxed; 0 for a band of frequencies."""
-        pairs = zip(self._held.names, self._held.slopes, multipliers, strict=True)
-        return abs(float(sum(slope * m for other, slope, m in pairs if other == name)))
+    def prices(self, optimum: LocalOptimum) -> dict[Side, float]:
+        """Fall of the objective per unit by which each side of a limit is relaxed."""
+        found: dict[Side, float] = defaultdict(float)
+        for (least, most), m in zip(self._held.slopes, optimum.multipliers, strict=True):
+            for held, own in ((least, max(-m, 0.0)), (most, max(m, 0.0))):
+                if held is not None:
+                    found[held[0]] += float(held[1] * own)
+        first, symbols = self._turned.stop, self._modes.symbols.numel()
+        return found | self._modes.prices(optimum.x[first : first + symbols], optimum.multipliers)
 
     def _inner(self, mounts: Sequence[float]) -> Array:
         """Decisions about mounts as the program has them: by ratio where bounds lie far apart."""
@@ -329,19 +302,10 @@ class SmoothProgram:
         """Variables at given decisions: modes and largest values follow from them."""
         turns = np.zeros(self._t.numel()) if turns is None else turns
         parts: list[Array] = [self._inner(mounts), columns, turns]
-        if self._modal:
-            parts += self._modes_at(mounts)
+        if self._modes.asked:
+            parts += self._modes.start(mounting_in(self.problem.design(list(mounts), self._decisions)))
         if self._held.heads:
             given = [self._v, self._u, self._t]
             values = ca.Function("tops", given, [ca.vertcat(*(value for _, value in self._held.heads))])
             parts.append(1.05 * np.asarray(values(self._inner(mounts), columns, turns), dtype=float).reshape(-1))
         return np.concatenate(parts)
-
-    def _modes_at(self, mounts: Sequence[float]) -> list[Array]:
-        """Modes, each in the column of the motion that is most its own."""
-        engine = self.problem.design(list(mounts), self._decisions)
-        modes = mounting_in(engine).modes
-        motions, columns = linear_sum_assignment(-modes.energy)
-        order = columns[np.argsort(motions)]
-        vectors = np.linalg.solve(self._root.T, modes.shapes)[:, order]
-        return [np.asarray(vectors.T.reshape(-1), dtype=np.float64), modes.squares[order] / self._square_unit]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.problem.evaluation import BETWEEN, evaluate
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import ROUNDING, nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_of, kkt_residual
@@ -79,9 +80,8 @@ def solve_unbalances(problem: Problem) -> Result:
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     design = judged(problem, values, cycle_samples)
     initial = replace(initial, samples=cycle_samples)
-    return concluded(
-        design, initial, _shown(optimum, design.value), {**timing, "evaluate": time.perf_counter() - solved}
-    )
+    timing["evaluate"] = time.perf_counter() - solved
+    return concluded(design, initial, _shown(problem.load_limits, optimum, design.value), timing)
 
 
 def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[_Optimum | None, int]:
@@ -225,15 +225,15 @@ def _triangle(slope: Array) -> Array:
     return triangle / (float(np.abs(triangle).max()) or 1.0)
 
 
-def _shown(optimum: _Optimum, value: float) -> Shown:
-    bound = optimum.bound
+def _shown(limits: Sequence[Limit], optimum: _Optimum, value: float) -> Shown:
+    bound, prices = optimum.bound, optimum.bound.multipliers.shadow_prices(optimum.problem)
     unit = value if value > optimum.nothing else optimum.nothing / ROUNDING
     return Shown(
         bound=bound.value,
         reach=Reach.WHOLE,
         kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
         method=f"second-order cones at {optimum.samples} angles, dual bound at {optimum.problem.samples}",
-        prices=bound.multipliers.shadow_prices(optimum.problem),
+        prices={(limit, "at most"): price for limit, price in zip(limits, prices, strict=True)},
         slopes={domain.decision.name: bound.gradient[domain.columns] for domain in optimum.problem.domains},
     )
 

@@ -17,13 +17,8 @@ _FRACTION, _LENGTH, _MASS, _UNBALANCE = "", "m", "kg", "kg m"
 def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
     """The problem with every cylinder rebuilt so that the engine has the reference's power.
 
-    Brake mean pressure and mean piston speed stay, so the gas model is untouched.
-
-    Raises
-    ------
-    ModelError
-        If its cylinders differ in bore or stroke: one scale would not fit them. If it stands on
-        elastic mounts: the rules have none for a block and its springs.
+    Brake mean pressure and mean piston speed stay, so the gas model is untouched. `ModelError` where cylinders differ
+    in bore or stroke, or stand on elastic mounts: the rules have none for a block and its springs.
     """
     cylinders = problem.engine.slider_cranks
     if problem.engine.block is not None:
@@ -40,14 +35,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
 
 
 def check_comparable(problem: Problem, reference: Problem) -> None:
-    """Whether rebuilding a problem by number of cylinders gives it the reference's power.
-
-    Raises
-    ------
-    ModelError
-        If cycle, bore, stroke, speed or gas differ before it is rebuilt: power would not
-        follow from the number of cylinders (eqs. 14-17).
-    """
+    """`ModelError` where rebuilding by number of cylinders does not give the reference's power (eqs. 14-17)."""
     own, other = _power_of(problem), _power_of(reference)
     differ = [what for what in own if own[what] != other[what]]
     if differ:

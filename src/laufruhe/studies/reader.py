@@ -63,13 +63,7 @@ def _once(found: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple[Compla
 
 
 def load_study(path: Path) -> StudyFile:
-    """Read and check a study file.
-
-    Raises
-    ------
-    InputError
-        With one line for everything wrong: file, key, value, rule, remedy.
-    """
+    """Read and check a study file; `InputError` with one line for everything wrong: file, key, value, rule, remedy."""
     tables = tables_of(path)
     if "study" not in tables:
         raise _refused(path, "study", "", "is missing, so this is no study file", "use laufruhe solve for a problem")

@@ -50,13 +50,7 @@ class Scenes:
         self._files: dict[Path, dict[str, Any]] = {}
 
     def tables(self, point: Point) -> dict[str, Any]:
-        """Tables of the problem of a point; not to be changed.
-
-        Raises
-        ------
-        InputError
-            If the problem file has no such table or quantity.
-        """
+        """Tables of the problem of a point, not to be changed; `InputError` where it has no such table or quantity."""
         case = point.case
         tables = dict(self.file(case.problem) if point.base is None else point.base)
         for name in case.without:
@@ -83,13 +77,7 @@ class Scenes:
         return InputError(str(self.folder / case.problem), (Complaint(where, "", rule, remedy),))
 
     def problem(self, point: Point) -> Problem:
-        """The problem of a point, with its shafts, at the power that its case asks for.
-
-        Raises
-        ------
-        InputError
-            If the problem file is bad, has no such quantity, or what is made of it is bad.
-        """
+        """The problem of a point, with its shafts, at the power that its case asks for; `InputError` where bad."""
         problem = load_tables(self.tables(point), self.folder / point.case.problem)
         if point.shafts is not None:
             problem = with_shafts(problem, point.shafts)

@@ -179,10 +179,7 @@ class SweptPart(Part):
     def checked(self, scenes: Scenes) -> list[Problem]:
         """The first scene of every case, after the ends of every sweep were tried on each.
 
-        Raises
-        ------
-        InputError
-            If a scene cannot be made, a number is told twice, or the cases' metrics are of different dimensions.
+        `InputError` where one cannot be made, tells a number twice, or has a metric of another dimension.
         """
         axes = self.axes()
         first = {axis.quantity: axis.values[0] for axis in axes}
@@ -217,13 +214,7 @@ class SweptPart(Part):
             told[keys] = "is swept twice"
 
     def check_moved_by_loads(self, problems: Sequence[Problem], scenes: Scenes, what: str) -> None:
-        """Whether balancing can change what is minimised: sag and stiffness know no loads.
-
-        Raises
-        ------
-        InputError
-            If loads neither make up an objective nor are limited beside it.
-        """
+        """`InputError` where balancing cannot change what is minimised: sag and stiffness know no loads."""
         for case, problem in zip(self.cases, problems, strict=True):
             asked = problem.measures
             if all(measure.is_mounting and measure.channel is not channels.TRANSMISSIBILITY for measure in asked):

@@ -111,13 +111,7 @@ class Trade:
 
 
 def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trade:
-    """Measure every fidelity.
-
-    Raises
-    ------
-    ModelError
-        If the problem has no objective.
-    """
+    """Measure every fidelity; `ModelError` where the problem has no objective."""
     if not problem.objective:
         raise ModelError("a trade needs an objective; add [objective]")
     best = reference(problem)

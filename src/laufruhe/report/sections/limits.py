@@ -14,17 +14,18 @@ PRICES = "Shadow price: by how much the objective falls for each unit by which t
 def tables(result: Result) -> list[Grid]:
     """A row a limit."""
     limits = limits_of(result)
-    rows = tuple(_row(limit, objective_unit(result)) for limit in limits)
+    decided = result.certificate is not None
+    rows = tuple(_row(limit, objective_unit(result), decided) for limit in limits)
     sides = {limit.side for limit in limits}
     head = ("limit", "value", sides.pop() if len(sides) == 1 else "bound", "state", "shadow price")
     title = "Limits" if changed(result) else "Limits, and the design as given"
     return [Grid(title, head, rows, note=PRICES if any(limit.shadow_price for limit in limits) else "")]
 
 
-def _row(limit: LimitValue, unit: str) -> tuple[str, ...]:
+def _row(limit: LimitValue, unit: str, decided: bool) -> tuple[str, ...]:
     name, factor = readable(limit.unit)
     state = "broken" if not is_met(limit) else "active" if limit.active else "slack"
     value = f"{number(limit.value * factor, scale=limit.limit * factor)} {name}"
     side = "" if limit.side == "at most" else f"{limit.side} "
     bound = side + with_unit(limit.limit, limit.unit)
-    return limit.name, value, bound, state, price_of(limit.shadow_price, unit, limit.unit)
+    return limit.name, value, bound, state, price_of(limit.shadow_price, unit, limit.unit, limit.active and decided)

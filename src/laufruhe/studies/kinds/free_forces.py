@@ -57,12 +57,8 @@ class FreeLoad:
 def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
     """Free force and couple of the reciprocating masses in an order, about the middle of the engine.
 
-    Order of crank speed; the spacing is the unit of length of the couples [m].
-
-    Raises
-    ------
-    ModelError
-        If cylinders differ in mechanism: there is no one cylinder to compare with.
+    Order of crank speed; the spacing is the unit of length of the couples [m]. `ModelError` where cylinders differ in
+    mechanism: there is no one cylinder to compare with.
     """
     shapes = {(p.crank_radius, p.rod_length, p.offset, p.reciprocating_mass) for p in engine.slider_cranks}
     if len(shapes) > 1:
