@@ -14,6 +14,7 @@ import numpy as np
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.machine import Engine
 from laufruhe.problem.channels import MountChannel
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
@@ -22,9 +23,9 @@ from laufruhe.prove.certificate import Proof, gap_of, room_of
 from laufruhe.solvers import Result, Status
 from matrix.cells import Document, Open, OpenThrows, document_of, written
 
-TRIES = 24
-# relative excess over a limit at which a design counts as allowed
-ALLOWED = 1e-5
+TRIES, FINE = 24, 2880
+# relative excess over a limit at which a design that is told counts as allowed, and one that is set against it
+ALLOWED, STRICTLY = 1e-5, 1e-9
 # share of a value by which another way of computing it may differ
 SAME = 1e-6
 
@@ -67,7 +68,10 @@ def judged(cell: Any, folder: Path) -> Verdict:
     kind = str(result.certificate.kind) if result.certificate else ""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        broken = tuple(_broken(document, problem, result, folder))
+        try:
+            broken = tuple(_broken(document, problem, result, folder))
+        except (InputError, ModelError) as error:
+            broken = (f"decided, and cannot be evaluated: {error}",)
     return Verdict(broken=broken, status=str(result.status), kind=kind)
 
 
@@ -90,7 +94,7 @@ def _broken(document: Document, problem: Problem, result: Result, folder: Path) 
         yield "nothing was decided"
         return
     yield from _own_claims(document, problem, result, folder)
-    bound, value = result.certificate.lower_bound, result.objective.value
+    bound, value = result.certificate.lower_bound, _evaluated(problem, result.final.engine, _fine(result))[0]
     best = min((other for other, allowed in others if allowed), default=math.inf)
     nothing = nothing_of(problem, result.final.engine)
     if best < bound - room_of(value, SAME, nothing):
@@ -191,11 +195,10 @@ def _other_designs(
     document: Document, problem: Problem, result: Result, folder: Path
 ) -> Iterator[tuple[float, bool]]:  # fmt: skip
     """Objective of designs as given, drawn and next to the one decided, and whether limits allow them."""
-    generator = random.Random(problem.title)
-    samples = result.final.samples
+    generator, samples = random.Random(problem.title), _fine(result)
     found = evaluate(problem, samples=samples)
     if problem.phasing is None or problem.phasing.throws is not None:
-        yield objective_value(problem, found), found.excess(problem.limits) <= ALLOWED
+        yield objective_value(problem, found), found.excess(problem.limits) <= STRICTLY
     held = _values(result)
     for k in range(TRIES):
         values = _drawn(document, generator)
@@ -205,7 +208,8 @@ def _other_designs(
         if problem.phasing is not None:
             found = _of_star(document, values, result, generator, folder)
         else:
-            found = _evaluated(problem, [_value(decision, values) for decision in problem.decisions], samples)
+            engine = problem.design([_value(decision, values) for decision in problem.decisions])
+            found = _evaluated(problem, engine, samples)
         if found is not None:
             yield found
 
@@ -226,16 +230,21 @@ def _of_star(
     phasing = result.problem.phasing
     if phasing is not None and not phasing.intervals.holds(other.engine.firing_intervals):
         return None
-    return _evaluated(other, other.start, result.final.samples)
+    return _evaluated(other, other.engine, _fine(result))
 
 
-def _evaluated(problem: Problem, values: Any, samples: int) -> tuple[float, bool] | None:
-    """Of one design; None where it has no loads."""
+def _fine(result: Result) -> int:
+    """Angles at which designs are set against each other: a bound holds for the whole cycle."""
+    return max(result.final.samples, FINE)
+
+
+def _evaluated(problem: Problem, engine: Engine, samples: int) -> tuple[float, bool]:
+    """Objective of one design, infinite where it has no loads, and whether limits allow it."""
     try:
-        found = evaluate(problem, problem.design(values), samples)
-        return objective_value(problem, found), found.excess(problem.limits) <= ALLOWED
+        found = evaluate(problem, engine, samples)
+        return objective_value(problem, found), found.excess(problem.limits) <= STRICTLY
     except ModelError:
-        return None
+        return math.inf, False
 
 
 def _value(decision: Any, values: Mapping[str, float]) -> complex | float:

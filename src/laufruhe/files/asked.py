@@ -15,6 +15,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, measured, nearest, one_of
 from laufruhe.files.fields import Name, Table
 from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.machine.clearances import shafts_of
 from laufruhe.problem.channels import Channel, LoadChannel, Needs
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Term, counted_rotors, radius_of
 
@@ -64,12 +65,12 @@ class ConstraintTable(QuantityTable):
 
     limit: QuantityName
     max: f.Side | None = Field(default=None, description="With the unit of the quantity.", examples=["6 kg"])
-    min: f.Side | None = f.told("Of natural frequencies, decoupling or sag.")
+    min: f.Side | None = f.told("Of natural frequencies, decoupling, sag or distance.")
     outside: f.Pair[f.Side] | None = Field(
         default=None, description="A band that holds no natural frequency.", examples=[["12 Hz", "20 Hz"]]
     )
     name: Name | None = None
-    of: list[str] | None = f.told("Counterweights or balancers whose mass counts.")
+    of: list[str] | None = f.told("Counterweights or balancers whose mass counts, or shafts.")
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,11 @@ class Scene:
         )  # fmt: skip
         if found.is_mass:
             self._counts(found, of, at)
+        if channel.is_placing:
+            shafts = shafts_of(self.engine)
+            _known(of, shafts, f"{at}.of", "shaft")
+            if not shafts:
+                raise Refused(f"{at}", name, "counts balancer shafts, and there are none", "add one, or leave it out")
         return found
 
     def _check_keys(self, channel: Channel, table: QuantityTable, at: str) -> None:
@@ -148,7 +154,7 @@ class Scene:
 def _stray(key: str, channel: Channel) -> str:
     """Why a key means nothing for a channel."""
     if key == "of":
-        return "goes with masses only"
+        return "goes with masses and places of shafts only"
     if channel.is_mass:
         return "means nothing for a mass"
     if channel.is_load and key in _PLACES:

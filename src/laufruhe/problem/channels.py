@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 from laufruhe.machine import Engine, Role
+from laufruhe.machine.clearances import Span, distances, reaches
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.bearing_loads import bearing_pressures, main_bearing_forces, pin_forces
@@ -21,41 +22,9 @@ from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.torque import crank_torque
+from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import PointLoads
-
-
-class Asked(Protocol):
-    """How a measure narrows its channel."""
-
-    @property
-    def points(self) -> tuple[str, ...] | None:
-        """Operating points that count."""
-
-    @property
-    def orders(self) -> tuple[float, ...] | None:
-        """Orders that count."""
-
-    @property
-    def motions(self) -> tuple[str, ...] | None:
-        """Motions that are to have a mode of their own."""
-
-    @property
-    def frequency(self) -> float:
-        """Wanted about the torque-roll axis [Hz]."""
-
-
-class Answered(Protocol):
-    """A design and its loads."""
-
-    @property
-    def engine(self) -> Engine:
-        """The design."""
-
-    @property
-    def loads(self) -> tuple[PointLoads, ...]:
-        """Per operating point."""
-
 
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders")
@@ -93,6 +62,8 @@ class Channel:
         Whether it depends on what excites the block.
     size
         Of what cancels in it where it is zero; zero where loads, masses or nothing do.
+    span
+        Least and largest of its numbers while shafts stand between their places in two engines, if it is of these.
     """
 
     name: str
@@ -103,10 +74,12 @@ class Channel:
     minimised: bool = True
     size: float = 0.0
     of_loads: bool = False
+    span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
     is_number: ClassVar[bool] = False
     is_mounting: ClassVar[bool] = False
+    is_placing: ClassVar[bool] = False
 
     def __str__(self) -> str:
         return self.name
@@ -189,6 +162,19 @@ class MountChannel(NumberChannel):
         return bool(kinds) if self.of_loads else bool(set(kinds) & OF_MOUNTS)
 
 
+@dataclass(frozen=True, eq=False)
+class PlaceChannel(NumberChannel):
+    """Where balancer shafts stand."""
+
+    keys: tuple[str, ...] = ("of",)
+    minimised: bool = False
+    is_placing: ClassVar[bool] = True
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Places alone."""
+        return Kind.PLACE in kinds
+
+
 def _on_block(name: str, unit: str, part: slice, lever: int | None = None) -> LoadChannel:
     def signal(loads: PointLoads) -> Spectrum:
         return loads.wrench.each(lambda wrench: wrench[:, None, part])
@@ -268,6 +254,13 @@ def motion_indices(measure: Asked) -> tuple[int, ...]:
     return tuple(MOTIONS.index(name) for name in measure.motions or MOTIONS)
 
 
+def _of_places(name: str, sides: tuple[str, ...], span: Callable[[Asked, Engine, Engine], Sequence[Span]]) -> Channel:
+    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+        return [least for least, _ in span(measure, evaluation.engine, evaluation.engine)]
+
+    return PlaceChannel(name, "m", sides=sides, values=values, span=span)
+
+
 MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
 SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3), lever=0)
@@ -314,6 +307,9 @@ TOTAL_STIFFNESS = MountChannel(
     "total stiffness", "N/m", sides=("min", "max"),
     values=_of_mounting(lambda mounting, _: mount_numbers.total_stiffness(mounting.mounts)),
 )  # fmt: skip
+SHAFT_DISTANCE = _of_places("shaft distance", ("min", "max"), lambda m, a, b: distances(m.rotors, a, b, False))
+SHAFT_CLEARANCE = _of_places("shaft clearance", ("min",), lambda m, a, b: distances(m.rotors, a, b, True))
+ENVELOPE_RADIUS = _of_places("envelope radius", ("max",), lambda m, a, b: reaches(m.rotors, a, b))
 
 CHANNELS: Mapping[str, Channel] = {
     channel.name: channel
@@ -322,5 +318,6 @@ CHANNELS: Mapping[str, Channel] = {
         MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_TORQUE,
         COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
         TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
+        SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS,
     )
 }  # fmt: skip

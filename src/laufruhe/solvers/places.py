@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import heapq
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, islice, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -31,6 +32,12 @@ SHARE = 0.25
 NEARLY = 0.99
 # [m]
 EXACT = 1e-6
+# [m], by which a limit on a distance may be missed, and by which it is kept where places are moved for it
+REACH, INSIDE = 1e-9, 1e-7
+# of the part of a side that is cut away
+HALVINGS = 10
+# of a box, from which allowed places are sought
+MOST_CORNERS = 16
 # of a side, that a cut keeps from its ends
 EDGE = 0.1
 
@@ -124,7 +131,8 @@ class _Search:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.conflict: tuple[str, ...] = ()
-        self.relaxation = Relaxation(problem, SHARE)
+        self.relaxation = Relaxation(problem.changed(limits=problem.load_limits), SHARE)
+        self._envelope = [limit for limit in problem.limits if limit.measure.channel.is_placing]
         self.places = self.relaxation.places
 
     @property
@@ -150,16 +158,85 @@ class _Search:
 
     def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | None:
         """The bound of a box, and where its program puts the places; None where no design is allowed."""
+        beyond = self._beyond(lower, upper)
+        if beyond:
+            self._told(beyond)
+            return None
+        lower, upper = self._shrunk(lower, upper)
         relaxed = self.relaxation.program(lower, upper)
         result = solve_unbalances(relaxed)
         if result.status is Status.INFEASIBLE:
-            # what cannot be met in one box may be in another: all boxes together tell
-            told = {*self.conflict, *result.conflict}
-            self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in told)
+            self._told(result.conflict)
             return None
         bound = result.certificate.lower_bound if result.certificate is not None else 0.0
         middle, spread = self.relaxation.placing(relaxed, result, lower, upper)
-        return _Box(lower, upper, max(bound, floor), middle, spread)
+        allowed = self._pushed(middle, lower, upper)
+        # what the program does not know of moves the places too
+        moved = upper - lower if allowed is None else np.abs(allowed - middle)
+        return _Box(lower, upper, max(bound, floor), middle if allowed is None else allowed, np.maximum(spread, moved))
+
+    def _told(self, conflict: Sequence[str]) -> None:
+        """What cannot be met in one box may be in another: all boxes together tell."""
+        told = {*self.conflict, *conflict}
+        self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in told)
+
+    def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
+        """Least and largest of each distance that is limited, with its places in a box."""
+        ends = [self.problem.design([float(x) for x in end], self.places) for end in (lower, upper)]
+        for limit in self._envelope:
+            for least, most in limit.measure.channel.span(limit.measure, *ends):
+                yield limit, least, most
+
+    def _beyond(self, lower: Array, upper: Array) -> tuple[str, ...]:
+        """A limit on distances that is broken all over a box; none where there is no such."""
+        for limit, least, most in self._spans(lower, upper):
+            if least > limit.maximum + REACH or most < limit.minimum - REACH:
+                return (limit.name,)
+        return ()
+
+    def _shrunk(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """A box without slices at its sides in which a limit on distances is broken everywhere."""
+        lower, upper = lower.copy(), upper.copy()
+        for side, at_top in product(range(len(lower)) if self._envelope else (), (True, False)):
+            low, high, width = 0.0, 1.0, upper[side] - lower[side]
+            for _ in range(HALVINGS):
+                share = 0.5 * (low + high)
+                first, last = lower.copy(), upper.copy()
+                if at_top:
+                    first[side] = upper[side] - share * width
+                else:
+                    last[side] = lower[side] + share * width
+                low, high = (share, high) if self._beyond(first, last) else (low, share)
+            if at_top:
+                upper[side] -= low * width
+            else:
+                lower[side] += low * width
+        return lower, upper
+
+    def _pushed(self, middle: Array, lower: Array, upper: Array) -> Array | None:
+        """Places in a box that keep the limits on distances, near its middle; None where none are found."""
+
+        def room(places: Array) -> Array:
+            spans = self._spans(places, places)
+            sides = [(limit.maximum - at, at - limit.minimum) for limit, at, _ in spans]
+            return np.asarray(np.minimum(np.array(sides).ravel(), 1.0))
+
+        if not self._envelope or room(middle).min() >= -REACH:
+            return middle
+        from scipy.optimize import NonlinearConstraint, minimize
+
+        kept = NonlinearConstraint(room, INSIDE, np.inf)
+        width, sides = np.where(upper > lower, upper - lower, 1.0), list(zip(lower, upper, strict=True))
+
+        def away(places: Array) -> float:
+            return float(np.square((places - middle) / width).sum())
+
+        corners = [np.array(corner) for corner in islice(product(*sides), MOST_CORNERS)]
+        found = []
+        for start in (middle, *corners):
+            pushed = minimize(away, start, method="SLSQP", bounds=sides, constraints=[kept])
+            found += [at for at in (np.clip(pushed.x, lower, upper), start) if room(at).min() >= -REACH]
+        return min(found, key=away, default=None)
 
     def _at(self, places: Array) -> _Found:
         """The best design with its places given."""

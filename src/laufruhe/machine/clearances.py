@@ -1,0 +1,80 @@
+"""Where the shafts of an engine stand, how far apart, and what they sweep; over boxes of places too."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from laufruhe.machine.engine import Engine
+from laufruhe.machine.rotor import CRANKSHAFT, Role, Shaft
+
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class _Swept:
+    """A shaft, the radius that its weights or throws sweep [m], and whether it is a balancer shaft."""
+
+    shaft: Shaft
+    radius: float = 0.0
+    balances: bool = False
+
+
+def _shafts(engine: Engine) -> dict[str, _Swept]:
+    turning = [(part.shaft, part.crank_radius, False) for part in engine.slider_cranks]
+    turning += [(rotor.shaft, rotor.radius or 0.0, rotor.role is Role.BALANCER) for rotor in engine.rotors]
+    found: dict[str, _Swept] = {}
+    for shaft, radius, balances in turning:
+        known = found.get(shaft.name, _Swept(shaft))
+        found[shaft.name] = _Swept(shaft, max(radius, known.radius), balances or known.balances)
+    return found
+
+
+def shafts_of(engine: Engine) -> tuple[str, ...]:
+    """Names of all shafts; none where there is no balancer shaft."""
+    shafts = _shafts(engine)
+    return tuple(shafts) if any(each.balances for each in shafts.values()) else ()
+
+
+def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: bool) -> list[Span]:
+    """Least and largest distance of every two axes that count, with shafts between their places in two engines [m].
+
+    Parameters
+    ----------
+    names
+        Shafts that count: one alone from the crankshaft, all where None. One of two is a balancer shaft.
+    swept
+        Whether what the weights and throws of both sweep is taken off.
+    """
+    low, high = _shafts(lower), _shafts(upper)
+    counted = low if names is None else (*names, CRANKSHAFT.name) if len(names) == 1 else names
+    out = []
+    for a, b in itertools.combinations(counted, 2):
+        if low[a].balances or low[b].balances:
+            taken = low[a].radius + low[b].radius if swept else 0.0
+            least, most = _apart((low[a].shaft, low[b].shaft), (high[a].shaft, high[b].shaft))
+            out.append((least - taken, most - taken))
+    return out
+
+
+def reaches(names: Sequence[str] | None, lower: Engine, upper: Engine) -> list[Span]:
+    """Least and largest distance of what every balancer shaft sweeps from the origin, as `distances` [m]."""
+    low, high, origin = _shafts(lower), _shafts(upper), Shaft("origin")
+    out = []
+    for name in low if names is None else names:
+        if low[name].balances:
+            least, most = _apart((low[name].shaft, origin), (high[name].shaft, origin))
+            out.append((least + low[name].radius, most + low[name].radius))
+    return out
+
+
+def _apart(lower: tuple[Shaft, Shaft], upper: tuple[Shaft, Shaft]) -> Span:
+    """Least and largest distance of two axes, either of them anywhere between its two places."""
+    (a, b), (c, d) = lower, upper
+    spans = []
+    for own, other in (((a.y, c.y), (b.y, d.y)), ((a.z, c.z), (b.z, d.z))):
+        least, most = min(own) - max(other), max(own) - min(other)
+        spans.append((max(least, -most, 0.0), max(abs(least), abs(most))))
+    return math.hypot(spans[0][0], spans[1][0]), math.hypot(spans[0][1], spans[1][1])

@@ -1,0 +1,44 @@
+"""What a channel is asked, and of what."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from laufruhe.machine import Engine
+from laufruhe.problem.loads import PointLoads
+
+
+class Asked(Protocol):
+    """How a measure narrows its channel."""
+
+    @property
+    def points(self) -> tuple[str, ...] | None:
+        """Operating points that count."""
+
+    @property
+    def orders(self) -> tuple[float, ...] | None:
+        """Orders that count."""
+
+    @property
+    def motions(self) -> tuple[str, ...] | None:
+        """Motions that are to have a mode of their own."""
+
+    @property
+    def rotors(self) -> tuple[str, ...] | None:
+        """Rotors, or shafts, that count."""
+
+    @property
+    def frequency(self) -> float:
+        """Wanted about the torque-roll axis [Hz]."""
+
+
+class Answered(Protocol):
+    """A design and its loads."""
+
+    @property
+    def engine(self) -> Engine:
+        """The design."""
+
+    @property
+    def loads(self) -> tuple[PointLoads, ...]:
+        """Per operating point."""
