@@ -58,7 +58,8 @@ def run(told: argparse.Namespace) -> None:
     families = NAMES if told.families == "all" else told.families.split(",")
     known, until, at = lines_of([told.log] if told.log.exists() else []), time.monotonic() + told.seconds, commit()
     done = {(line["family"], line["seed"]) for line in known}
-    todo = [(name, told.first + k) for k in range(told.number) for name in families]
+    firsts = [int(first) for first in told.first.split(",")]
+    todo = [(name, first + k) for k in range(told.number) for first in firsts for name in families]
     if told.again:
         todo = [(line["family"], line["seed"]) for line in known if line["wrong"] and line["family"] in families]
         done = set()
@@ -79,8 +80,8 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", required=True)
     running = commands.add_parser("run")
     running.add_argument("families", help="comma-separated, or all")
-    running.add_argument("--from", dest="first", type=int, default=0)
-    running.add_argument("--number", type=int, default=100)
+    running.add_argument("--from", dest="first", default="0,100000,200000", help="first seeds, comma-separated")
+    running.add_argument("--number", type=int, default=2000, help="of each family from each first seed")
     running.add_argument("--log", type=Path, default=PAGE.with_name("run.jsonl"))
     running.add_argument("--seconds", type=float, default=1e9)
     running.add_argument("--again", action="store_true", help="what the log has as wrong, once more")
