@@ -93,6 +93,7 @@ def main() -> None:
     paged.add_argument("logs", nargs="+", type=Path)
     told = parser.parse_args()
     if told.command == "page":
+        PAGE.parent.mkdir(parents=True, exist_ok=True)
         PAGE.write_text(page(lines_of(told.logs), NAMES), encoding="utf-8")
         return
     if told.command == "show":
