@@ -190,6 +190,8 @@ def _scale(tables: Any, path: Path, rng: random.Random) -> None:
     if isinstance(value, str) and value.split(" ")[0].replace(".", "").lstrip("-").isdigit():
         number, _, unit = value.partition(" ")
         parent[key] = f"{float(number) * factor:g} {unit}"
+    elif isinstance(value, int) and not isinstance(value, bool) and rng.random() < 0.7:
+        parent[key] = rng.choice((0, 1, 2, 3, 5, 8, 12, 24, 36, 47, 48, 49, 100, 1000, 10**6, 10**9))
     elif isinstance(value, int | float) and not isinstance(value, bool):
         parent[key] = value * factor
 

@@ -14,6 +14,7 @@ import signal
 import time
 import tomllib
 import traceback
+import unicodedata
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -30,6 +31,8 @@ LONGEST = 10.0
 """Seconds that a command may take for one damaged file."""
 MOST_LINES, MOST_CHARACTERS = 25, 1200
 _MEMORY = 4 << 30
+# control, format (which turn the direction of reading), line and paragraph separators
+_COMMANDS = ("Cc", "Cf", "Zl", "Zp")
 _STATUSES = (0, 1, 2, 130)
 TRACED = (
     scenes.GIVEN.replace('stroke = "120 mm"', 'stroke = "120 mm"\nbore = "100 mm"')
@@ -139,7 +142,7 @@ def _said_wrong(status: int, out: str, err: str, folder: Path) -> tuple[str, str
     lines = err.splitlines()
     if status not in _STATUSES:
         return "status", str(status)
-    if strange := [c for c in out + err if not c.isprintable() and c != "\n"]:
+    if strange := [c for c in out + err if unicodedata.category(c) in _COMMANDS and c != "\n"]:
         return "control character", f"{strange[0]!a} in {(out + err)[:300]!a}"
     if len(lines) > MOST_LINES:
         return "many lines", f"{len(lines)}: {err[:300]}"

@@ -34,6 +34,18 @@ def make(folder: Path, text: str, names: list[str] = NAMES, **more: object) -> N
             (stage / name).write_text(text)
 
 
+def fail(folder: Path) -> None:
+    with staged(Set(folder, "--out", "solve", NAMES)) as stage:
+        (stage / NAMES[0]).write_text("x")
+        raise ZeroDivisionError
+
+
+def add_meanwhile(folder: Path, name: str) -> None:
+    with staged(Set(folder, "--out", "solve", NAMES)) as stage:
+        (stage / name).write_text("new")
+        (folder / name).write_text("mine")
+
+
 def held(folder: Path) -> tuple[set[str], set[str]]:
     """Names and contents of a set."""
     found = {path.name: path.read_text() for path in folder.glob("file-*")}
@@ -81,14 +93,12 @@ def test_a_set_is_replaced_as_a_whole(tmp_path: Path) -> None:
 
 
 def test_an_error_leaves_all_as_it_was(tmp_path: Path) -> None:
-    with pytest.raises(ZeroDivisionError), staged(Set(tmp_path / "a/b", "--out", "solve")) as stage:
-        (stage / "x").write_text("x")
-        raise ZeroDivisionError
+    with pytest.raises(ZeroDivisionError):
+        fail(tmp_path / "a/b")
     assert list(tmp_path.iterdir()) == []
     make(tmp_path / "set", "old")
-    with pytest.raises(ZeroDivisionError), staged(Set(tmp_path / "set", "--out", "solve", NAMES)) as stage:
-        (stage / NAMES[0]).write_text("x")
-        raise ZeroDivisionError
+    with pytest.raises(ZeroDivisionError):
+        fail(tmp_path / "set")
     assert held(tmp_path / "set") == (set(NAMES), {"old"})
 
 
@@ -104,9 +114,8 @@ def test_a_spoilt_note_owns_nothing(noted: str, tmp_path: Path) -> None:
 def test_what_came_in_the_meantime_stays(tmp_path: Path) -> None:
     folder = tmp_path / "set"
     make(folder, "old", NAMES[:2])
-    with pytest.raises(InputError, match=NAMES[3]), staged(Set(folder, "--out", "solve", NAMES)) as stage:
-        (stage / NAMES[3]).write_text("new")
-        (folder / NAMES[3]).write_text("mine")
+    with pytest.raises(InputError, match=NAMES[3]):
+        add_meanwhile(folder, NAMES[3])
     assert (folder / NAMES[3]).read_text() == "mine"
 
 
