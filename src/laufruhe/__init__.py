@@ -33,11 +33,19 @@ def load(path: str | Path) -> Problem:
     return read(path)
 
 
-def solve(problem: Problem) -> Result:
-    """Decide what a problem leaves open; the result says what of it is proven."""
+def solve(problem: Problem, time_limit: float | None = None) -> Result:
+    """Decide what a problem leaves open; the result says what of it is proven.
+
+    Parameters
+    ----------
+    problem
+        As `load` reads it.
+    time_limit
+        Seconds after which the search ends with the best design that it has, and with its bound.
+    """
     from laufruhe.solvers import solve as decide
 
-    return decide(problem)
+    return decide(problem, time_limit=time_limit)
 
 
 def evaluate(design: Problem | Engine, points: Sequence[OperatingPoint] = ()) -> Result:

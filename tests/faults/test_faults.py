@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -185,3 +187,14 @@ def test_a_broken_matplotlibrc_in_the_working_folder(tmp_path: Path, monkeypatch
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "out/cycle.png").is_file()
+
+
+@pytest.mark.parametrize("name", ["inline-five-open", "vee-six-open", "two-stroke-four-open", "inline-five-uneven-gas"])
+@pytest.mark.parametrize("cylinders", [24, 47, 48])
+def test_many_open_cylinders_are_checked_at_once(name: str, cylinders: int, tmp_path: Path) -> None:
+    text = (harness.PROBLEMS / f"{name}.toml").read_text(encoding="utf-8")
+    path = written(tmp_path, re.sub(r"cylinders *= *\d+", f"cylinders = {cylinders}", text))
+    assert f"cylinders = {cylinders}" in path.read_text(encoding="utf-8")
+    started = time.process_time()
+    assert CliRunner().invoke(app, ["check", str(path)]).exit_code in (0, 2)
+    assert time.process_time() - started < 10.0

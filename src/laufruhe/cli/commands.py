@@ -12,7 +12,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from laufruhe.cli.screen import DONE, FAILED, checked_tolerance, exit_statuses, handing_out, progress
+from laufruhe.cli.screen import DONE, FAILED, above_zero, exit_statuses, handing_out, in_time, progress
 
 app = typer.Typer(
     name="laufruhe",
@@ -40,6 +40,10 @@ GAP = "Relative gap that counts as proven, in place of the file's."
 ToleranceOption = Annotated[float | None, typer.Option("--tolerance", metavar="X", help=GAP)]
 ERROR = "Relative error of the objective that is allowed."
 FidelityTolerance = Annotated[float, typer.Option("--tolerance", metavar="X", help=ERROR)]
+LIMIT = "Stop after so many seconds with the best design so far and its bound."
+LimitOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=LIMIT)]
+STOP = "Stop after so many seconds; what is finished is kept."
+StopOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=STOP)]
 JOBS = "Processes that may be used.  [default: one a core]"
 JobsOption = Annotated[int | None, typer.Option("--jobs", metavar="N", help=JOBS)]
 StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)]
@@ -53,9 +57,10 @@ def solve(
     out: OutOption = None,
     no_plots: NoPlotsOption = False,
     tolerance: ToleranceOption = None,
+    time_limit: LimitOption = None,
 ) -> None:
     """Decide what the problem leaves open, and prove how good that is."""
-    with exit_statuses(problem):
+    with exit_statuses(problem), in_time(time_limit):
         from laufruhe.cli.solve import Request, run, solved
 
         run(Request("solve", problem, json, out, not no_plots, tolerance), solved)
@@ -76,13 +81,19 @@ def evaluate(
 
 
 @app.command()
-def study(problem: StudyArgument, json: StudyJsonOption = None, out: OutOption = None, jobs: JobsOption = None) -> None:
+def study(
+    problem: StudyArgument,
+    json: StudyJsonOption = None,
+    out: OutOption = None,
+    jobs: JobsOption = None,
+    time_limit: StopOption = None,
+) -> None:
     """Run the sweeps and comparisons of a study file.
 
     Finished points are kept; a study that was interrupted goes on where it stopped.
     """
     kept = "interrupted; finished points are kept, the same command goes on"
-    with exit_statuses(problem, kept), handing_out(json, problem) as hand_out:
+    with exit_statuses(problem, kept), in_time(time_limit), handing_out(json, problem) as hand_out:
         from laufruhe.cli.study import studied
 
         with progress() as say:
@@ -112,13 +123,13 @@ def explain(problem: ProblemArgument, json: JsonOption = None, tolerance: Fideli
     with exit_statuses(problem), handing_out(json, problem) as hand_out:
         from laufruhe.cli.fidelity import explained
 
-        hand_out(*explained(problem, checked_tolerance(tolerance)))
+        hand_out(*explained(problem, above_zero("--tolerance", tolerance, "1e-3")))
 
 
 @app.command()
-def trade(problems: Problems, json: JsonOption = None, out: PagesOption = None) -> None:
+def trade(problems: Problems, json: JsonOption = None, out: PagesOption = None, time_limit: StopOption = None) -> None:
     """Measure speed against accuracy of every fidelity, on these problems."""
-    with exit_statuses(problems[0]), handing_out(json, *problems) as hand_out, progress() as say:
+    with exit_statuses(problems[0]), in_time(time_limit), handing_out(json, *problems) as hand_out, progress() as say:
         from laufruhe.cli.fidelity import traded
 
         hand_out(*traded(problems, out or Path("results") / "trade", say))

@@ -45,12 +45,21 @@ def json_file(json: str | None, problems: Iterable[Path], places: ExitStack) -> 
     return places.enter_context(files.staged_file(path, "--json"))
 
 
-def checked_tolerance(tolerance: float) -> float:
-    """Refuse a tolerance that is no number above zero."""
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
-        complaint = Complaint("--tolerance", f"{tolerance:g}", "must be a number above zero", "try 1e-3")
+def above_zero(option: str, value: float, example: str) -> float:
+    """Refuse a value that is no number above zero."""
+    if not (math.isfinite(value) and value > 0.0):
+        complaint = Complaint(option, f"{value:g}", "must be a number above zero", f"try {example}")
         raise InputError("laufruhe", (complaint,))
-    return tolerance
+    return value
+
+
+@contextmanager
+def in_time(seconds: float | None) -> Iterator[None]:
+    """What is typed as --time-limit: searches within end then, with the best that they have."""
+    from laufruhe.numerics.budget import limited
+
+    with limited(seconds if seconds is None else above_zero("--time-limit", seconds, "60")):
+        yield
 
 
 def complain(lines: str) -> None:

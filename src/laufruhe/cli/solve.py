@@ -12,7 +12,7 @@ from pathlib import Path
 
 import typer
 
-from laufruhe.cli.screen import DONE, FAILED, checked_tolerance, complain, json_file, progress
+from laufruhe.cli.screen import DONE, FAILED, above_zero, complain, json_file, progress
 from laufruhe.errors import SolverError
 from laufruhe.files.reader import load
 from laufruhe.problem.problem import Problem
@@ -86,7 +86,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
     with _timed(seconds, "load"):
         problem = load(request.problem)
         if request.tolerance is not None:
-            problem = replace(problem, tolerance=checked_tolerance(request.tolerance))
+            problem = replace(problem, tolerance=above_zero("--tolerance", request.tolerance, "1e-3"))
     with ExitStack() as places:
         # a file called '...toml' would name the folder above
         name = (problem.name.strip(".") or "problem") + _SUFFIX[request.verb]

@@ -113,6 +113,8 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
 
 def _patterns(lattice: FiringLattice, own: tuple[int, ...], throws: int) -> Iterator[tuple[int, ...]]:
     steps, most = lattice.steps, lattice.capacity[0]
+    # the last place that loads each step: what is not full then stays so
+    last = {(step - p) % steps: p for p in range(steps) for step in own}
 
     def grow(counts: list[int], load: list[int], left: int) -> Iterator[tuple[int, ...]]:
         if len(counts) == steps:
@@ -124,7 +126,8 @@ def _patterns(lattice: FiringLattice, own: tuple[int, ...], throws: int) -> Iter
             after = load.copy()
             for step in own:
                 after[(step - p) % steps] += count
-            if max(after) <= most:
+            full = all(after[j] == most for j in {(step - p) % steps for step in own} if last[j] == p)
+            if full and max(after) <= most:
                 yield from grow([*counts, count], after, left - count)
 
     yield from grow([], [0] * steps, throws)

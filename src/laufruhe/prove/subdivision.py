@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
@@ -87,7 +88,7 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
     bounds, sides = search.bounds(lower[None], upper[None])
     heap = [(float(bounds[0]), 0, lower, upper, int(sides[0]))]
     seen = 1
-    while heap and heap[0][0] < enough and seen < most:
+    while heap and heap[0][0] < enough and seen < most and not passed():
         halves: list[tuple[Array, Array, float]] = []
         while heap and heap[0][0] < enough and len(halves) < search.at_once:
             known, _, low, high, side = heapq.heappop(heap)

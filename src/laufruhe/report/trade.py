@@ -43,6 +43,7 @@ def as_page(found: Trade, picture: str | None, command: str) -> str:
         if picture
         else "No load enters what is asked, so every fidelity gives the same number.",
         piped(HEAD, [_cells(row) for row in found.rows]),
+        *([] if found.whole else ["Stopped at the time limit: fidelities beyond the last row were not measured."]),
         "*Another design*: objective with the scene prepared. *Gradient*: with its derivatives by all decisions. "
         "*Solve*: optimum from nothing, at this fidelity's own angles. *From nothing*: engine to objective. "
         "*Regret*: by how much the reference objective of the optimum found is above that of the best."

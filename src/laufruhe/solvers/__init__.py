@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, SolverError
+from laufruhe.numerics.budget import limited, passed
 from laufruhe.problem.channels import OF_MOUNTS
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.measure import Term
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
-from laufruhe.solvers.conclusion import Shown, broken_limits, concluded, judged, none_within, state, with_limits
+from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
 
 __all__ = ["METHODS", "Result", "Status", "solve", "state"]
 
+CUT_SHORT = "stopped at the time limit"
 Say = Callable[[str], None]
 
 
@@ -134,7 +138,7 @@ def _beyond_mounts(problem: Problem, kinds: frozenset[Kind]) -> tuple[str, ...]:
     return solve_unbalances(off_resonance(apart)).conflict
 
 
-def solve(problem: Problem, say: Say = lambda _: None) -> Result:
+def solve(problem: Problem, say: Say = lambda _: None, time_limit: float | None = None) -> Result:
     """Decide what a problem leaves open.
 
     Parameters
@@ -143,6 +147,8 @@ def solve(problem: Problem, say: Say = lambda _: None) -> Result:
         What is open, wanted and forbidden.
     say
         Told what is being decided, where that takes long.
+    time_limit
+        Seconds after which searches end with the best that they have, and with its bound.
 
     Raises
     ------
@@ -151,6 +157,36 @@ def solve(problem: Problem, say: Say = lambda _: None) -> Result:
     ModelError
         If the engine as given cannot be evaluated, or nothing decides what is open.
     """
+    with limited(time_limit):
+        try:
+            found = _decided(problem, say)
+        except SolverError:
+            if not passed():
+                raise
+            found = None
+        return found if found is not None and not passed() else _cut_short(problem, found)
+
+
+def _cut_short(problem: Problem, found: Result | None) -> Result:
+    """What there is when time is over: the best of the search, or the design as given where that is allowed."""
+    if found is None or found.status is Status.FAILED:
+        with suppress(ModelError):
+            given = judged(problem, problem.start)
+            if problem.phasing is None and given.excess <= KEPT:
+                shown = Shown(0.0, Reach.ASIDE, math.inf, f"the design as given; {CUT_SHORT}")
+                return concluded(given, given.evaluation, shown, {})
+    if found is None:
+        raise SolverError("no design was found within the time limit; raise it")
+    if found.status is Status.FAILED:
+        return replace(found, message=f"{found.message}; {CUT_SHORT}")
+    own = found.certificate
+    if own is None or own.kind is Proof.GLOBAL:
+        return found
+    return replace(found, certificate=replace(own, method=f"{own.method}; {CUT_SHORT}"))
+
+
+def _decided(problem: Problem, say: Say) -> Result:
+    """By the first method that suits."""
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
     kinds = kinds_of(problem)
@@ -160,7 +196,7 @@ def solve(problem: Problem, say: Say = lambda _: None) -> Result:
         return none_within(problem, evaluate_start(problem), broken, {})
     if fixed:
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
-        return with_limits(solve(problem.changed(limits=moved), say), problem.limits)
+        return with_limits(_decided(problem.changed(limits=moved), say), problem.limits)
     moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)
     if problem.objective and kinds and not moving and problem.phasing is None:
         given = judged(problem, problem.start)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import error_bound, reference, sampling_error
+from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
@@ -36,7 +37,7 @@ def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result
     result = solve(problem)
     if asked is None or result.certificate is None:
         return result
-    for _ in range(_ROUNDS):
+    for _ in () if passed() else in_time(range(_ROUNDS)):
         result = replace(result, error_estimate=error_of(result.problem, result.final))
         if result.error_estimate <= asked:
             break

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem, reach
+from laufruhe.numerics.budget import left
 from laufruhe.numerics.norms import MEAN, Cones, Grid
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers, excludes
@@ -32,6 +33,8 @@ ATTEMPTS: tuple[Mapping[str, Any], ...] = (
     {"tol_gap_abs": 1e-6, "tol_gap_rel": 1e-6, "tol_feas": 1e-7, "max_iter": 500, "max_step_fraction": 0.9},
 )
 """Settings of the solver, in the order in which they are tried."""
+SHORTEST = 0.05
+"""Seconds that one attempt has where time is over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +215,7 @@ def _told(rows: _Rows, cost: Array, told: Mapping[str, Any]) -> Any:
     settings.verbose = False
     for name, value in told.items():
         setattr(settings, name, value)
+    settings.time_limit = max(left(), SHORTEST)
     nothing = csc_array((rows.columns, rows.columns))
     right = np.concatenate(rows.right)
     return clarabel.DefaultSolver(nothing, cost, rows.matrix(), right, rows.cones, settings).solve()

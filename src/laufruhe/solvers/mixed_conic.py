@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
 from laufruhe.load_models.star_model import StarNorm, StarProblem
+from laufruhe.numerics.budget import left
 from laufruhe.numerics.norms import Cones
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
@@ -115,8 +116,9 @@ def _weighed(problem: StarProblem, rows: _Rows, unit: float) -> tuple[Any, list[
 def _answer(program: Any, steps: Any, built: Any, unit: float, choosing: bool, time_limit: float) -> ProgramFound:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        seconds = min(time_limit, max(left(), 1.0))
         try:
-            program.solve(solver=cp.SCIP, scip_params={"limits/time": time_limit, "limits/gap": 1e-7})
+            program.solve(solver=cp.SCIP, scip_params={"limits/time": seconds, "limits/gap": 1e-7})
         except cp.error.SolverError as error:
             raise SolverError(f"SCIP found no feasible point in {time_limit:g} s ({error})") from None
     stats = program.solver_stats

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.budget import in_time
 from laufruhe.problem import channels
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
@@ -106,7 +107,7 @@ def _divided(problem: Problem, search: MountSearch) -> Divided:
     divided = Divided(0.0, 0)
     if search.moves is not None or not divides(problem):
         return divided
-    for _ in range(MOST_DIVISIONS):
+    for _ in in_time(range(MOST_DIVISIONS)):
         found = search.chosen
         value = found.design.value if found is not None and found.design.excess <= KEPT else math.inf
         room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
@@ -95,7 +96,7 @@ class MountSearch:
         """From all starts, and again in a smaller size where that of the starts hid what was found."""
         nothing = nothing_of(self.problem)
         self._search(self._points)
-        for _ in range(MOST_SIZES):
+        for _ in in_time(range(MOST_SIZES)):
             if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= nothing:
                 break
             # a search ends at a share of the size that it counts in
@@ -137,7 +138,7 @@ class MountSearch:
         ]
         optima = solve_nonlinear(joint.program, starts, self._workers, ITERATIONS)
         around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
-        if around and len(points) > 1:
+        if around and len(points) > 1 and not passed():
             decisions = problem.mount_decisions
             low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
             again = []
@@ -179,7 +180,7 @@ class MountSearch:
     def _tighten(self) -> None:
         """Again with limits a little tighter: a peak between the samples breaks its limit by a little."""
         margin = 0.0
-        for _ in range(MOST_MARGINS):
+        for _ in in_time(range(MOST_MARGINS)):
             best = self.best
             if best is None or best.optimum is None or not FEASIBLE < best.design.excess <= 0.05:
                 break

@@ -18,6 +18,7 @@ from typing import TypeAlias
 from laufruhe.errors import ModelError
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import RMS
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate
@@ -142,7 +143,7 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star], say: 
     few = starts if len(stars) == 1 else min(starts, max(SHORTEST_SEARCH, starts // FEWER_STARTS))
     began, found = time.perf_counter(), list[StarDesign]()
     for k, (candidate, steps) in enumerate(stars):
-        if found and time.perf_counter() - began > phasing.time_limit:
+        if found and (passed() or time.perf_counter() - began > phasing.time_limit):
             break
         say(f"mounts of star {k + 1} of {len(stars)}")
         # a process of its own costs more than so few starts
@@ -155,7 +156,7 @@ def _solved_fully(problem: Problem, found: list[StarDesign], say: Say) -> list[S
     """The best few again with all starts; the better of both answers is kept."""
     out = list(found)
     starts = problem.search.starts
-    for k, each in enumerate(found[:MOST_SEARCHED]):
+    for k, each in enumerate(() if passed() else found[:MOST_SEARCHED]):
         own = each.result.problem
         # what is proven to be no better than the best needs no more starts
         if own.search.starts >= starts or each.bound >= found[0].value * (1.0 - problem.tolerance):
@@ -174,7 +175,7 @@ def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign], say: Say
     ]
     starts = starts or [(start, None) for start in starts_of(phasing, None)[:MOST_SEARCHED]]
     out = []
-    for k, (candidate, even) in enumerate(starts):
+    for k, (candidate, even) in enumerate(() if found and passed() else starts):
         say(f"throws that leave star {k + 1} of {len(starts)}")
         own = _problem_of(problem, phasing, candidate, problem.search.starts)
         moves = ThrowMoves(phasing, phasing.layout_of(candidate), candidate, phasing.intervals)

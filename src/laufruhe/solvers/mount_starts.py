@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
+from laufruhe.numerics.budget import in_time, left, limited
 from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 # starts at most for each open number, and candidates for each start: their modes cost a thousandth of a search
 STARTS = 4
 POOL = 40
+# share of the time that is left for looking at points to start from
+LOOKING = 0.25
 POOL_SAMPLES = 72
 
 
@@ -69,7 +72,8 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     found = [] if initial.resonance else [(given.tolist(), best)]
     spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
     spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
-    rows, size = _promising(problem, initial, spread, len(low), starts - len(found))
+    with limited(LOOKING * left()):
+        rows, size = _promising(problem, initial, spread, len(low), starts - len(found))
     for k, row in enumerate(rows):
         mounts = row[: len(low)]
         own = row[len(low) :].copy()
@@ -86,7 +90,7 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, w
     """
     given = replace(initial, samples=POOL_SAMPLES, resonance="")
     misses, values = np.full(len(pool), np.inf), np.full(len(pool), np.inf)
-    for k, row in enumerate(pool):
+    for k, row in in_time(enumerate(pool)):
         try:
             design = remounted(given, problem.design(row[:count].tolist(), problem.mount_decisions))
         except ModelError:

@@ -32,6 +32,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.numerics.budget import in_time, left, passed
 from laufruhe.numerics.cores import processors
 from laufruhe.solvers.processes import answer, apart
 
@@ -39,6 +40,8 @@ Array = NDArray[np.float64]
 
 _NEAR = 1e-6
 WORTH_EXPANDING = 3
+# seconds that a start has where time is over
+SHORTEST = 0.5
 # seconds of work that pay for starting processes
 WORTH_PROCESSES = 4.0
 _QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False}
@@ -231,7 +234,7 @@ def solve_nonlinear(
     task = _task(program, max_iterations, max_seconds, len(points) >= WORTH_EXPANDING)
     # one start tells whether the others are worth processes of their own
     began = time.perf_counter()
-    found, rest = _run(task, points[:1]), points[1:]
+    found, rest = _run(task, points[:1]), [] if passed() else points[1:]
     count = min(len(rest), workers if workers is not None else processors())
     shared = count > 1 and (time.perf_counter() - began) * len(rest) > WORTH_PROCESSES
     found += apart("laufruhe.solvers.nonlinear", task, rest, count) if shared else _run(task, rest)
@@ -271,12 +274,12 @@ def _run(task: _Task, points: Sequence[tuple[int, Array]]) -> list[LocalOptimum]
     oracle = ca.Function.deserialize(task.oracle)
     if task.expand:
         oracle = oracle.expand()
-    limits = {"max_iter": task.max_iterations, "max_wall_time": task.max_seconds}
+    limits = {"max_iter": task.max_iterations, "max_wall_time": min(task.max_seconds, max(left(), SHORTEST))}
     options: dict[str, Any] = {**_QUIET, "ipopt": {**_OPTIONS, **limits}}
     solver = ca.nlpsol("solver", "ipopt", oracle, options)
     # derivatives of the judge's own making, not the solver's
     slopes = oracle.factory("slopes", ["x", "p"], ["f", "g", "grad:f:x", "jac:g:x"])
-    return [_from_start(task, solver, slopes, k, point) for k, point in points]
+    return [_from_start(task, solver, slopes, k, point) for k, point in in_time(points)]
 
 
 def _from_start(task: _Task, solver: Any, slopes: Any, k: int, point: Array) -> LocalOptimum:

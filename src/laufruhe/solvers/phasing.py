@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from laufruhe.errors import SolverError
 from laufruhe.load_models.star_model import StarModel
+from laufruhe.numerics.budget import passed
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
@@ -115,7 +116,7 @@ def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) ->
     started = time.perf_counter()
     found: list[StarDesign] = []
     for candidate in designs:
-        if found and time.perf_counter() - started > phasing.time_limit:
+        if found and (passed() or time.perf_counter() - started > phasing.time_limit):
             return found, False
         result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem)))
         found.append(StarDesign(candidate, result))

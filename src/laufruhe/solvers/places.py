@@ -11,6 +11,7 @@ from itertools import count, islice, product
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.numerics.budget import passed
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
@@ -110,7 +111,7 @@ def _divided(search: _Search, nothing: float, say: Callable[[str], None]) -> tup
     if root is None:
         return None, np.inf, seen
     heap, best = [(root.bound, next(number), root)], search.better(None, root.middle)
-    while heap and seen < most:
+    while heap and seen < most and not passed():
         gap = gap_of(best.value, heap[0][0], nothing)
         # a box that left nothing out has no better design, only a bound as near as its program came
         if gap <= NEARLY * problem.tolerance or (gap < np.inf and heap[0][2].spread.max() <= EXACT):

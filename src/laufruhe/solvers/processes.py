@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from laufruhe.errors import SolverError
+from laufruhe.numerics.budget import left, limited
 
 
 def apart(module: str, task: Any, items: Sequence[Any], count: int) -> list[Any]:
@@ -36,7 +37,7 @@ def apart(module: str, task: Any, items: Sequence[Any], count: int) -> list[Any]
             children.append(child)
             assert child.stdin is not None
             try:
-                pickle.dump((task, items[k::count]), child.stdin)
+                pickle.dump((left(), task, items[k::count]), child.stdin)
                 child.stdin.close()
             except BrokenPipeError:
                 raise SolverError("a process of the nonlinear solver could not start; try one worker") from None
@@ -60,6 +61,7 @@ def answer(run: Callable[[Any, Sequence[Any]], list[Any]]) -> None:
     """Read a task and a share of its items from standard input, write what `run` makes of them to standard output."""
     answer_to = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    task, items = pickle.load(sys.stdin.buffer)
-    pickle.dump(run(task, items), answer_to)
+    seconds, task, items = pickle.load(sys.stdin.buffer)
+    with limited(seconds):
+        pickle.dump(run(task, items), answer_to)
     answer_to.close()

@@ -16,6 +16,7 @@ import numpy as np
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.load_models.star_model import StarModel, StarProblem
+from laufruhe.numerics.budget import passed
 from laufruhe.physics.crank_stars import Array, Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
@@ -137,7 +138,7 @@ def search_designs(
     search = _Search(model, stars, tolerance, nothing)
     complete = True
     while (place := search.nearest(count)) is not None:
-        if time.perf_counter() - started > time_limit:
+        if time.perf_counter() - started > time_limit or (passed() and search.tried):
             complete = False
             break
         search.solve(*place)
@@ -159,6 +160,11 @@ class _Search:
         self._open = np.ones(self.bounds.shape, dtype=bool)
         self.solved: list[Solved] = []
         self.infeasible = 0
+
+    @property
+    def tried(self) -> bool:
+        """Whether any design was."""
+        return bool(self.solved or self.infeasible)
 
     @property
     def beyond(self) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
+from laufruhe.numerics.budget import passed
 from laufruhe.physics.crank_stars import Array, Stars, phase_waves
 from laufruhe.physics.star_space import Partial, StarSpace
 
@@ -117,7 +118,7 @@ def search_stars(
     def prune(partial: Partial) -> NDArray[np.bool_]:
         nonlocal looked_at, ended
         looked_at += len(partial.stars)
-        ended = ended or time.perf_counter() - started > time_limit
+        ended = ended or passed() or time.perf_counter() - started > time_limit
         if ended:
             return np.ones(len(partial.stars), dtype=bool)
         limit = best.cut

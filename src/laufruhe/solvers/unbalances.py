@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
+from laufruhe.numerics.budget import in_time
 from laufruhe.problem.evaluation import BETWEEN, evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import ROUNDING, nothing_of
@@ -92,7 +93,7 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[_Opti
     The optimum, None where the limits cannot be met, and the angles that told.
     """
     samples, best = model.full_samples, None
-    for _ in range(MOST_DOUBLINGS + 1):
+    for _ in in_time(range(MOST_DOUBLINGS + 1)):
         found = _allowed(problem, model, samples, nothing)
         if found is None:
             # fewer angles ask for less: what they cannot meet, all cannot
@@ -115,7 +116,7 @@ def _allowed(problem: Problem, model: AffineModel, samples: int, nothing: float)
     """
     found = _attempt(problem, model, samples, nothing, 0.0)
     margin = 0.0
-    for _ in range(MOST_MARGINS):
+    for _ in in_time(range(MOST_MARGINS)):
         if found is None or found.excess <= FEASIBLE:
             break
         margin += 1.05 * found.excess

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.budget import in_time
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Term
 from laufruhe.problem.nothing import nothing_of
@@ -63,11 +64,11 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     steps = TRADE_STEPS if even is not None and phasing.intervals.most < math.inf else (1.0,)
     found: list[StarDesign] = []
     trade = []
-    for share in steps:
+    for share in in_time(steps):
         allowed = _narrowed(phasing, share)
         # what is best with less freedom is a start, so that more of it is never worse
         own = [design.candidate for design in found[:1]] + starts[: STARTS if share == 1.0 else TRADE_STARTS]
-        answers = [answer for start in own if (answer := local_optimum(phasing, start, allowed)) is not None]
+        answers = [answer for start in in_time(own) if (answer := local_optimum(phasing, start, allowed)) is not None]
         found = sorted(answers, key=lambda answer: answer.value)
         if found and len(steps) > 1:
             trade.append(_trade_point(problem, phasing, allowed, found[0]))

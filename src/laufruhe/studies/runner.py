@@ -23,6 +23,7 @@ from typing import TypeAlias
 import xarray as xr
 
 from laufruhe.errors import SolverError
+from laufruhe.numerics.budget import left, passed
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.scenes import Point, Scenes
@@ -32,6 +33,7 @@ KEPT = ".unfinished-points.jsonl"
 _SUM = 32
 # a worker imports everything anew: two seconds, so a pool has to save more
 POOL_PAYS = 4.0
+LONGEST_WAIT = 1e9
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -146,11 +148,19 @@ def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Answe
     """
     started = time.perf_counter()
     for k, task in enumerate(tasks):
-        left = (time.perf_counter() - started) / k * (len(tasks) - k) if k else 0.0
-        if jobs > 1 and left * (1.0 - 1.0 / jobs) > POOL_PAYS:
+        ahead = (time.perf_counter() - started) / k * (len(tasks) - k) if k else 0.0
+        if jobs > 1 and ahead * (1.0 - 1.0 / jobs) > POOL_PAYS:
             yield from _pooled(tasks, k, scenes.folder, jobs)
             return
-        yield _answer(k, task, scenes)
+        answer = _answer(k, task, scenes)
+        if passed():
+            # what a limit may have cut short is no answer
+            raise _over()
+        yield answer
+
+
+def _over() -> SolverError:
+    return SolverError("the time limit is over; finished points are kept, the same command goes on")
 
 
 def _answer(k: int, task: Task, scenes: Scenes) -> Answer:
@@ -166,8 +176,10 @@ def _pooled(tasks: Sequence[Task], first: int, folder: Path, jobs: int) -> Itera
     try:
         with _as_workers_start():
             asked = [pool.submit(_served, k, tasks[k], folder) for k in range(first, len(tasks))]
-        for answer in as_completed(asked):
+        for answer in as_completed(asked, min(max(left(), 0.0), LONGEST_WAIT)):
             yield answer.result()
+    except TimeoutError:
+        raise _over() from None
     except BrokenProcessPool:
         raise SolverError("a worker of the study was killed; the same command goes on where it stopped") from None
     finally:

@@ -17,6 +17,7 @@ from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, error_bound, refer
 from laufruhe.fidelity.knobs import TIME_ORDERS, TIME_SAMPLES
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.machine import Engine
+from laufruhe.numerics.budget import passed
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
@@ -99,6 +100,8 @@ class Trade:
         change of the objective that the uneven speed makes; None where no load is asked.
     time_domain
         None where mounts are rigid.
+    whole
+        Whether time was enough for all fidelities.
     """
 
     problem: Problem
@@ -108,6 +111,7 @@ class Trade:
     rigid_part: RigidPart
     flywheel: tuple[float, float] | None
     time_domain: TimeDomain | None
+    whole: bool = True
 
 
 def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trade:
@@ -121,13 +125,21 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
         say("solving the reference")
         engine = optimum(problem.at(Fidelity(samples=REFERENCE_STEPS)), REFERENCE_STEPS)
         least = math.nan if engine is None else objective_value(problem, reference(problem, engine))
-    rows = []
+    rows, whole = [], False
     for name, own in ladder(problem):
         say(name)
-        rows.append(_row(name, own, best, truth, least))
+        row = _row(name, own, best, truth, least)
+        if passed():
+            # what a limit may have cut short is no measurement
+            break
+        rows.append(row)
+    else:
+        whole = True
+    if not rows:
+        raise SolverError("the time limit is over before any fidelity was measured; raise it")
     say("uneven crank speed")
     flywheel = _price_of_constant_speed(problem) if problem.load_terms else None
-    return Trade(problem, tuple(rows), truth, least, rigid_part(problem), flywheel, _price_of_time(problem))
+    return Trade(problem, tuple(rows), truth, least, rigid_part(problem), flywheel, _price_of_time(problem), whole)
 
 
 def is_open(problem: Problem) -> bool:

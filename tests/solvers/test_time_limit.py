@@ -1,0 +1,115 @@
+"""A time limit ends every search with the best design that it has, and with a bound that holds."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from cli import scenes
+from laufruhe.cli import app
+from laufruhe.files.reader import load
+from laufruhe.numerics.budget import in_time, left, limited, passed
+from laufruhe.solvers import CUT_SHORT, Status, solve
+from problem_files import written
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+# a problem of every kind of search, and what its whole search finds
+OPTIMA = {
+    "tractor-four-lanchester": 227.2,
+    "vee-eight-open": 444.5,
+    "two-stroke-four-open": 440.9,
+    "tractor-four-shaft-heights": 204.4,
+    "vee-twenty-open": 1690.7,
+    "inline-five-uneven-gas": 285.7,
+    "tractor-four-elastic": math.inf,
+    "inline-five-elastic": math.inf,
+}
+
+
+def test_a_limit_within_a_limit() -> None:
+    assert left() == math.inf
+    with limited(100.0):
+        with limited(1e-9):
+            time.sleep(1e-3)
+            assert passed()
+            assert list(in_time(range(5))) == [0]
+        with limited(None):
+            assert 99.0 < left() <= 100.0
+            assert list(in_time(range(5))) == list(range(5))
+    assert not passed()
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in OPTIMA])
+def test_the_best_so_far_with_a_bound_that_holds(name: str) -> None:
+    started = time.perf_counter()
+    result = solve(load(PROBLEMS / f"{name}.toml"), time_limit=1e-3)
+    assert time.perf_counter() - started < 60.0
+    assert result.status in (Status.FEASIBLE, Status.OPTIMAL)
+    assert result.objective is not None
+    assert result.certificate is not None
+    assert result.certificate.lower_bound <= result.objective.value
+    assert result.certificate.lower_bound <= OPTIMA[name]
+    if result.status is Status.FEASIBLE:
+        assert CUT_SHORT in result.certificate.method
+
+
+def test_a_limit_that_is_not_reached_changes_nothing() -> None:
+    problem = load(PROBLEMS / "tractor-four-lanchester.toml")
+    limited_, free = solve(problem, time_limit=1e3), solve(problem)
+    assert limited_.objective == free.objective
+    assert limited_.decisions == free.decisions
+
+
+@pytest.mark.parametrize("command", ["solve", "study", "trade"])
+@pytest.mark.parametrize("limit", ["0", "-1", "nan"])
+def test_a_limit_is_above_zero(command: str, limit: str, tmp_path: Path) -> None:
+    path = written(tmp_path, scenes.TIGHT)
+    answer = CliRunner().invoke(app, [command, str(path), "--time-limit", limit, "--out", str(tmp_path / "out")])
+    assert answer.exit_code == 2
+    assert "--time-limit" in answer.stderr
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_solve_by_command(tmp_path: Path) -> None:
+    path, out = PROBLEMS / "vee-eight-open.toml", tmp_path / "out"
+    words = ["solve", str(path), "--time-limit", "0.001", "--out", str(out), "--no-plots"]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    found = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    assert found["status"] == "feasible"
+    assert CUT_SHORT in found["certificate"]["method"]
+
+
+@pytest.mark.slow
+def test_a_study_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ["study", str(PROBLEMS / "tractor-sweeps.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    asked = iter(range(100))
+    with monkeypatch.context() as patched:
+        patched.setattr("laufruhe.studies.runner.passed", lambda: next(asked) >= 5)
+        stopped = CliRunner().invoke(app, words)
+    assert stopped.exit_code == 1
+    assert "the same command goes on" in stopped.stderr
+    kept = tmp_path / "out/.unfinished-points.jsonl"
+    assert kept.read_bytes().count(b"\n\n") == 4
+    assert {entry.name for entry in (tmp_path / "out").iterdir()} == {kept.name}
+    assert CliRunner().invoke(app, words).exit_code == 0
+    assert not kept.exists()
+    assert (tmp_path / "out/report.md").is_file()
+
+
+@pytest.mark.slow
+def test_a_trade_keeps_what_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, out = written(tmp_path, scenes.TIGHT), tmp_path / "trade"
+    stopped = CliRunner().invoke(app, ["trade", str(path), "--out", str(out), "--time-limit", "1e-3"])
+    assert stopped.exit_code == 1
+    assert "time limit" in stopped.stderr
+    assert not out.exists()
+    asked = iter(range(100))
+    monkeypatch.setattr("laufruhe.studies.trade.passed", lambda: next(asked) >= 3)
+    some = CliRunner().invoke(app, ["trade", str(path), "--out", str(out)])
+    assert some.exit_code == 0
+    assert "Stopped at the time limit" in (out / "scene.md").read_text(encoding="utf-8")
