@@ -8,10 +8,10 @@ import pytest
 ROOT = Path(__file__).parents[2]
 # what the commands write is not kept
 WRITTEN = ROOT / "results"
-KEPT = (WRITTEN / "README.md", WRITTEN / "benchmarks")
+KEPT = (WRITTEN / "README.md", WRITTEN / "benchmarks", WRITTEN / "attack" / "README.md")
 PAGES = sorted(
     path
-    for pattern in ("*.md", "docs/**/*.md", "results/README.md", "results/benchmarks/*.md")
+    for pattern in ("*.md", "docs/**/*.md", "results/README.md", "results/benchmarks/*.md", "results/attack/README.md")
     for path in ROOT.glob(pattern)
 )
 LINK = re.compile(r"\]\((?![a-z]+:)([^)\s]*)\)")
