@@ -45,6 +45,7 @@ title = "t"
 speeds = { from = "1000 rpm", to = "2000 rpm", points = 5 }
 cases = [{ name = "single", problem = "single.toml" }]
 """
+AT_ONCE = "from laufruhe.studies import runner; runner.POOL_PAYS = 0.0; from laufruhe.cli import main; main()"
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 TIMED = "## Where the time went"
 
@@ -58,13 +59,13 @@ def prepared(folder: Path) -> Path:
     return folder
 
 
-def started(folder: Path) -> subprocess.Popen[str]:
-    """The command in a process of its own."""
+def started(folder: Path, jobs: int = 1) -> subprocess.Popen[str]:
+    """The command in a process of its own; with several jobs, workers are started at once."""
     source = str(Path(laufruhe.__file__).parents[1])
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     # a test run in the background has its interrupts ignored, and hands that on
     return subprocess.Popen(
-        [sys.executable, "-m", "laufruhe", "study", "s.toml", "--out", "out", "--jobs", "1"],
+        [sys.executable, "-c", AT_ONCE, "study", "s.toml", "--out", "out", "--jobs", str(jobs)],
         cwd=folder, env={**os.environ, **threads, "PYTHONPATH": source}, stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
@@ -140,12 +141,16 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     prepared(folder)
     for _ in range(rng.randint(1, 4)):
-        running = [started(folder) for _ in range(rng.choice((1, 2)))]
-        told.tried[f"runs of {len(running)} at once"] += 1
+        count, jobs = rng.choice((1, 2)), rng.choice((1, 1, 1, 2))
+        running = [started(folder, jobs) for _ in range(count)]
+        told.tried[f"runs of {count} at once, {jobs} core{'s' if jobs > 1 else ''} each"] += 1
         _stopped(running, rng, whole, seed, told)
         told.tried[f"kept points: {damage(folder / 'out' / KEPT, rng)}"] += 1
     last = started(folder)
     said = last.communicate()[1]
+    left = sorted(path.name for path in folder.glob(".unfinished-*"))
+    if left:
+        told.wrong.append(f"seed {seed}: {', '.join(left)} left behind")
     if last.returncode or said:
         told.wrong.append(f"seed {seed}: the last run ended with {last.returncode}: {said[-300:]}")
     elif results(folder) != whole.files:
