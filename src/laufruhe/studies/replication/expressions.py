@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import operator
 import re
+import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cache, partial
 from string import Formatter
@@ -82,7 +83,7 @@ def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str])
     ExpressionError
         If it cannot be read, or uses names, functions or cases that are not there.
     """
-    nodes = _nodes(text)
+    nodes = _read(text)[0]
     called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
     for node in nodes:
         if isinstance(node, ast.Name) and id(node) not in called:
@@ -116,10 +117,10 @@ def value_of(text: Any, names: Mapping[str, Any]) -> Any:
     """
     if not isinstance(text, str):
         return text
-    _nodes(text)
+    code = _read(text)[1]
     try:
-        # nothing but what `_nodes` let through is in the code
-        return eval(_code(text), {"__builtins__": {}, **_CALLED, **CONSTANTS, **names})
+        # nothing but what `_read` let through is in the code
+        return eval(code, {"__builtins__": {}, **_CALLED, **CONSTANTS, **names})
     except ExpressionError:
         raise
     except NameError as error:
@@ -131,22 +132,30 @@ def value_of(text: Any, names: Mapping[str, Any]) -> Any:
 
 
 @cache
-def _nodes(text: str) -> tuple[ast.AST, ...]:
-    """All parts of an expression, each of which is allowed."""
+def _read(text: str) -> tuple[tuple[ast.AST, ...], CodeType]:
+    """All parts of an expression, each of which is allowed, and what Python evaluates."""
     if len(text) > MOST_LETTERS:
         raise ExpressionError(f"an expression of {len(text)} letters is too long; split it under define")
     try:
-        nodes = tuple(ast.walk(ast.parse(text.strip(), mode="eval").body))
+        # Python warns of 1[0], which has no value anyway
+        with warnings.catch_warnings(action="ignore"):
+            tree, own = (ast.parse(text.strip(), mode="eval") for _ in range(2))
+            nodes = tuple(ast.walk(tree.body))
+            for node in nodes:
+                _check_node(node)
+            return nodes, compile(ast.fix_missing_locations(_Called().visit(own)), "", "eval")
+    except ExpressionError:
+        raise
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ExpressionError(
-            f"'{text}' is no expression; write for example 100 * (mean['b'] / mean['a'] - 1)"
-        ) from None
-    for node in nodes:
-        if not _is_allowed(node):
-            raise ExpressionError(f"'{ast.unparse(node)}' is not allowed here; use numbers, names and functions alone")
-        if isinstance(node, ast.Call):
-            check_among(ast.unparse(node.func), FUNCTIONS, "function")
-    return nodes
+        write = "write for example 100 * (mean['b'] / mean['a'] - 1)"
+        raise ExpressionError(f"'{text}' is no expression; {write}") from None
+
+
+def _check_node(node: ast.AST) -> None:
+    if isinstance(node, ast.Call):
+        check_among(ast.unparse(node.func), FUNCTIONS, "function")
+    if not _is_allowed(node):
+        raise ExpressionError(f"'{ast.unparse(node)}' is not allowed here; use numbers, names and functions alone")
 
 
 def _is_allowed(node: ast.AST) -> bool:
@@ -155,11 +164,6 @@ def _is_allowed(node: ast.AST) -> bool:
     if isinstance(node, ast.BinOp):
         return type(node.op).__name__ in _ARITHMETIC
     return isinstance(node, _PARTS) or not isinstance(node, ast.expr)
-
-
-@cache
-def _code(text: str) -> CodeType:
-    return compile(ast.fix_missing_locations(_Called().visit(ast.parse(text.strip(), mode="eval"))), "", "eval")
 
 
 class _Called(ast.NodeTransformer):
