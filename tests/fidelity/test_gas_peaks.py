@@ -16,6 +16,7 @@ from fidelity.scenes import random_problem
 from lanes import first_fast
 from laufruhe.machine import GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.numerics.norms import NORMS, Grid
+from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.gas_cycle import cylinder_pressure, pressure_at
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -85,6 +86,8 @@ def _bends(gas: GasModel | None, part: SliderCrank, whole: float) -> Any:
         return np.array(gas.angles)
     fine = np.linspace(0.0, whole, 2001)
     found = [fine]
+    if isinstance(gas, Wiebe):
+        found.append(np.array([gas.start, gas.start + gas.duration]))
     if isinstance(gas, Seiliger):
         # pressure holds its peak up to the cut-off
         low, high = max(part.dead_centres[0], 0.0) + 1e-9, math.pi
@@ -169,3 +172,36 @@ def test_error_with_gas_is_not_below_the_true_one(seed: int) -> None:
     assert abs(value - _truth(problem, QUICK if seed < FAST else ANGLES)) <= (stated + 1e-9) * value
     # and it is worth reading
     assert stated < 0.05
+
+
+@pytest.mark.parametrize("seed", first_fast(range(40), 8))
+def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
+    """On either side of a dead centre it is another: a peak stands there, and orders alone overshoot it."""
+    rng = random.Random(seed)
+    found = _problem(seed)
+    point = replace(found.points[0], gas=_gas(rng))
+    problem = replace(
+        found, points=(point,), objective=(Term(Measure(channels.CRANK_PIN_FORCE, NORMS["maximum"])),),
+        fidelity=replace(found.fidelity, samples=1440),
+    )  # fmt: skip
+    evaluation = evaluate(problem)
+    value = objective_value(problem, evaluation)
+    engine, cycle = problem.engine, problem.engine.cycle
+    truth = 0.0
+    for k, part in enumerate(engine.slider_cranks):
+        ends = part.shaft.ratio * (np.array(part.dead_centres) - part.fires_at)
+        beside = [ends + turn * math.tau + side for turn in range(2) for side in (-1e-9, 1e-9)]
+        bends = np.concatenate([_bends(point.gas, part, cycle.angle), *beside])
+        angles = np.concatenate([np.arange(QUICK) * cycle.angle / QUICK, np.mod(bends, cycle.angle)])
+        silent = pin_forces(engine, replace(point, gas=None)).rebased(cycle.base_order)
+        whole = silent.values(angles + part.firing_angle)[:, k]
+        assert point.gas is not None
+        push = part.piston_area * (pressure_at(point.gas, part, cycle, angles) - point.gas.crankcase_pressure)
+        alpha = part.fires_at + part.shaft.ratio * angles
+        tangent = part.rod_ratio * np.sin(alpha) - part.offset_ratio
+        tangent = tangent / np.sqrt(1.0 - tangent**2)
+        gas = (-push + 1j * push * tangent) * np.exp(1j * part.bank)
+        whole[:, 1:] += np.stack([gas.imag, gas.real], axis=1)
+        truth = max(truth, float(np.sqrt((whole**2).sum(axis=1)).max()))
+    assert value == pytest.approx(truth, rel=1e-4)
+    assert abs(value - truth) <= error_of(problem, evaluation) * value + 1e-9 * value

@@ -228,7 +228,9 @@ class TestForms:
         weights, v, w = data
         grid = one_signal(weights)
         one, other = norm.value(grid, v), norm.value(grid, w)
-        assert norm.value(grid, v + w) <= (one + other) * (1.0 + ROUNDING)
+        # a sum is rounded in its own size, of which a seminorm may see nothing
+        rounded = np.finfo(float).eps * (np.abs(v).max() + np.abs(w).max()) * (0.0 if norm.of_row_lengths else 2.0)
+        assert norm.value(grid, v + w) <= (one + other) * (1.0 + ROUNDING) + rounded
         assert norm.value(grid, factor * v) == pytest.approx(abs(factor) * one, rel=ROUNDING, abs=1e-300)
 
     @given(rows())

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-DEGREES = 3
-"""Derivatives whose jumps are found."""
-_SAME_ANGLE = 1e-10
+DEGREES = 4
+"""The value itself and as many derivatives but one, whose jumps are found."""
+SAME_ANGLE = 1e-10
 _WIDTH = 0.06
 """Longest stretch beside a corner from which its derivatives are taken [rad]."""
 _NODES = 6
@@ -32,6 +32,7 @@ _PLACES = 0.5 - 0.5 * np.cos(math.pi * (np.arange(_NODES) + 0.5) / _NODES)
 # least stretch, and the degree of a polynomial whose coefficients it determines to enough digits
 _DEGREES_OF = ((0.01, _NODES - 1), (1e-3, 3), (1e-5, 2), (0.0, 1))
 _CANCELLED = 1e-12
+_MET = 1e-7
 _STEPS = 360
 _BLOCK = 1 << 16
 
@@ -45,7 +46,7 @@ class Corners:
     angles
         Shape (k,) [rad], each within one period.
     jumps
-        Of the derivatives 1, 2, ... by the angle, shape (k, degrees, ...), of a signal of any shape.
+        Of the value and its derivatives 1, 2, ... by the angle, shape (k, degrees, ...), of a signal of any shape.
     """
 
     angles: Array
@@ -53,15 +54,17 @@ class Corners:
 
     @property
     def bending(self) -> Array:
-        """Angles at which the slope itself jumps, where a peak may stand."""
-        slopes = np.abs(self.jumps[:, 0].reshape(len(self.angles), -1)).max(axis=1, initial=0.0)
+        """Where a peak may stand: angles at which the slope jumps, and both sides of those at which the value does."""
+        size = np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2)
         # what is left of the jumps of higher derivatives is a rounding
-        return np.asarray(self.angles[slopes > 1e-6 * np.abs(self.jumps).max(initial=0.0)])
+        steps, slopes = size[:, 0] > 1e-9 * size.max(), size[:, 1] > 1e-6 * size.max()
+        beside = self.angles[steps]
+        return np.concatenate([self.angles[slopes & ~steps], beside - SAME_ANGLE, beside + SAME_ANGLE])
 
     def values(self, angles: Array, period: float, derivative: int = 0) -> Array:
         """Sum of f_m times the jumps, or a derivative of it, shape (len(angles), ...)."""
         k, degrees = self.jumps.shape[:2]
-        powers = [m - derivative for m in range(1, degrees + 1)]
+        powers = [m - derivative for m in range(degrees)]
         table: Array = np.array([period**m * _kernel(m, degrees + 2) for m in powers])
         # of every power one row a corner
         weights = np.einsum("mp,kmd->pkd", table, self.jumps.reshape(k, degrees, -1))
@@ -81,7 +84,7 @@ class Corners:
         orders = np.arange(count) * base
         waves = np.exp(-1j * np.outer(orders, self.angles))
         with np.errstate(divide="ignore", invalid="ignore"):
-            shares = base / math.pi / (1j * orders[:, None]) ** np.arange(2, 2 + self.jumps.shape[1])
+            shares = base / math.pi / (1j * orders[:, None]) ** np.arange(1, 1 + self.jumps.shape[1])
         shares[:1] = 0.0
         table = (waves[:, :, None] * shares[:, None, :]).reshape(count, -1)
         total, size = table @ self._flat, np.abs(table) @ np.abs(self._flat)
@@ -91,16 +94,17 @@ class Corners:
     def beyond(self, count: int, base: float) -> tuple[Array, Array]:
         """What all orders from `count` b on can hold at most: their sum, and the root of their mean square."""
         total = power = np.zeros(self.jumps.shape[2:])
-        for m, jumps in enumerate(np.abs(self.jumps).sum(axis=0), 1):
+        for m, jumps in enumerate(np.abs(self.jumps).sum(axis=0)):
             unit, last = jumps / (math.pi * base**m), max(count - 1, 0.5)
-            total = total + unit / (m * last**m)
+            # what any number of orders leaves of a jump is no more than the half of it and their overshoot
+            total = total + (unit / (m * last**m) if m else 0.6 * jumps)
             power = power + unit / math.sqrt((4 * m + 2) * last ** (2 * m + 1))
         return total, power
 
     def curvature(self, period: float) -> Array:
         """The second derivative over one period, on both sides of every corner and at steps between, shape (n, ...)."""
         steps = period * np.arange(_STEPS) / _STEPS
-        return self.values(np.concatenate([steps, self.angles - _SAME_ANGLE, self.angles + _SAME_ANGLE]), period, 2)
+        return self.values(np.concatenate([steps, self.angles - SAME_ANGLE, self.angles + SAME_ANGLE]), period, 2)
 
     def each(self, linear: Callable[[Array], Array]) -> Corners | None:
         """Through a real linear map of values (n, ...); None where nothing bends any more."""
@@ -123,7 +127,7 @@ class Corners:
 
     def strongest(self, count: int) -> Corners | None:
         """The few that bend most over a degree."""
-        steps = math.radians(1.0) ** np.arange(1, self.jumps.shape[1] + 1)
+        steps = math.radians(1.0) ** np.arange(self.jumps.shape[1])
         size = np.einsum("km,m->k", np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2), steps)
         kept = np.sort(np.argsort(-size, kind="stable")[:count])
         return merged(self.angles[kept], self.jumps[kept])
@@ -151,7 +155,7 @@ def _pad(jumps: Array, degrees: int) -> Array:
 
 def merged(angles: Array, jumps: Array) -> Corners | None:
     """Corners at one angle as one; None where nothing is left of any."""
-    _, first, inverse = np.unique(np.round(angles / _SAME_ANGLE), return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(np.round(angles / SAME_ANGLE), return_index=True, return_inverse=True)
     total = np.zeros((len(first), *jumps.shape[1:]))
     np.add.at(total, inverse, jumps)
     used = np.any(total.reshape(len(total), -1) != 0.0, axis=1)
@@ -171,7 +175,7 @@ def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float
         Shape (k,) [rad].
     """
     at = _within(breaks, period)
-    at = at[np.unique(np.round(at / _SAME_ANGLE), return_index=True)[1]]
+    at = at[np.unique(np.round(at / SAME_ANGLE), return_index=True)[1]]
     if not len(at):
         return None
     # a stretch ends at the next corner
@@ -186,14 +190,16 @@ def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float
         stretch = sides[side] * stretches[k, side]
         degree = next(degree for least, degree in _DEGREES_OF if stretches[k, side] >= least)
         series = np.tensordot(_fit(degree), values[k, side], axes=1)
-        for m in range(1, min(degree, DEGREES) + 1):
-            jumps[k, m - 1] += sides[side] * series[m] * math.factorial(m) / stretch**m
+        for m in range(min(degree + 1, DEGREES)):
+            jumps[k, m] += sides[side] * series[m] * math.factorial(m) / stretch**m
+    # polynomials meet to a rounding where nothing jumps
+    jumps[:, 0] *= np.abs(jumps[:, 0]) > _MET * np.abs(values).max(initial=0.0)
     return merged(at, jumps)
 
 
 def _within(angles: Array, period: float) -> Array:
     """Of one period; what ends it within a rounding begins it."""
-    return np.asarray(np.mod(angles + 0.5 * _SAME_ANGLE, period) - 0.5 * _SAME_ANGLE)
+    return np.asarray(np.mod(angles + 0.5 * SAME_ANGLE, period) - 0.5 * SAME_ANGLE)
 
 
 @lru_cache(maxsize=8)
@@ -205,7 +211,7 @@ def _fit(degree: int) -> Array:
 @lru_cache(maxsize=64)
 def _kernel(degree: int, count: int) -> Array:
     """f_m over P^m as coefficients of the powers of phi / P - 1/2, between -1/2 and 1/2."""
-    own = [-1.0]
+    own = [-1.0] if degree >= -1 else [0.0]
     for _ in range(degree + 1):
         own = [0.0, *(c / k for k, c in enumerate(own, 1))]
         # the mean of y^k is 2^-k / (k + 1) where k is even

@@ -13,7 +13,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from laufruhe.numerics.corners import Corners, found_corners, joined
+from laufruhe.numerics.corners import SAME_ANGLE, Corners, found_corners, joined
+from laufruhe.numerics.turns import Turn, phasors
 
 MOST_CORNERS = 24
 """Of one function that are taken out in closed form."""
@@ -67,6 +68,13 @@ class Spectrum:
         return type(self)(
             self.base, self.coefficients - self.corners.coefficients(len(self.coefficients), float(self.base))
         )
+
+    def later(self, turn: Turn, angle: float) -> Self:
+        """The signal later by an angle [rad], which is also given as a share of its period."""
+        turns = phasors([-turn], np.arange(len(self.coefficients)))
+        moved = self.coefficients * turns.reshape(-1, *(1,) * (self.coefficients.ndim - 1))
+        corners = None if self.corners is None else self.corners.moved(angle).folded(self.period, 1)
+        return type(self)(self.base, moved, corners)
 
     @property
     def series(self) -> Self:
@@ -242,7 +250,11 @@ def bent_spectrum(
         corners = corners.strongest(most)
     if corners is None:
         return spectrum_of(signal(angles), base)
-    smooth = spectrum_of(signal(angles) - corners.values(angles, period), base).coefficients
+    # a step on a jump is taken behind it
+    behind = angles + SAME_ANGLE
+    rest = spectrum_of(signal(behind) - corners.values(behind, period), base)
+    turned = np.exp(-1j * SAME_ANGLE * rest.orders).reshape(-1, *(1,) * (rest.coefficients.ndim - 1))
+    smooth = rest.coefficients * turned
     return Spectrum(base, smooth + corners.coefficients(len(smooth), float(base)), corners)
 
 

@@ -16,17 +16,17 @@ bearings (B6), still linear. What gears and belts add is not modelled.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank, kinematics
-from laufruhe.numerics.spectrum import Spectrum, spectrum_of
+from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import cylinder_pressure
+from laufruhe.physics.gas_cycle import pressure_at, pressure_breaks
 from laufruhe.physics.mechanism import resolved_orders
 from laufruhe.physics.shaking_loads import order_index, rotor_wrench, spread
 
@@ -76,13 +76,13 @@ def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelit
     for shaft in dict.fromkeys(bearing.shaft for bearing in bearings):
         carried = [k for k, part in enumerate(engine.slider_cranks) if part.shaft == shaft]
         own = [rotor for rotor in engine.rotors if rotor.shaft == shaft]
-        at_pins = Spectrum(pins.base, pins.coefficients[:, carried])
+        at_pins = pins.each(partial(np.take, indices=carried, axis=1))
         rotors = _side_by_side([_of_rotor(rotor, point.speed, cycle) for rotor in own], cycle)
         for places, forces in (([engine.slider_cranks[k].x for k in carried], at_pins), ([r.x for r in own], rotors)):
             shares = np.zeros((len(bearings), len(places)))
             rows = [k for k, bearing in enumerate(bearings) if bearing.shaft == shaft]
             shares[rows] = SHARES[fidelity.crankshaft]([bearings[k].x for k in rows], places)
-            total = total + Spectrum(forces.base, np.einsum("bp,npd->nbd", shares, forces.coefficients))
+            total = total + forces.each(partial(np.einsum, "bp,npd->nbd", shares))
     return total
 
 
@@ -134,7 +134,7 @@ SHARES = {"cut": lever_shares, "beam": beam_shares}
 def bearing_pressures(engine: Engine, forces: Spectrum) -> Spectrum:
     """Force over projected area of every main bearing [Pa] (B5; textbook, example 3)."""
     areas = np.array([bearing.area for bearing in engine.bearings])
-    return Spectrum(forces.base, forces.coefficients / areas[:, None])
+    return forces.each(lambda own: own / areas[:, None])
 
 
 def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
@@ -157,11 +157,10 @@ def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None,
     load = fidelity.kept(spread(moved, order_index(cycle, abs(ratio)), cycle))
     if gas is not None:
         load = load + fidelity.kept(_gas_orders(cycle, part, gas, fidelity))
-    along, across = load.coefficients.T
-    axis = cis(as_turn(part.bank))
-    turned = np.stack([0.0 * along, axis.imag * along + axis.real * across, axis.real * along - axis.imag * across], 1)
+    y, z = cis(as_turn(part.bank)).imag, cis(as_turn(part.bank)).real
+    turned = load.each(lambda own: own @ np.array([[0.0, y, z], [0.0, z, -y]]))
     rod = Rotor("rod", part.x, part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
-    found = Spectrum(load.base, turned) + _of_rotor(rod, speed, cycle)
+    found = turned + _of_rotor(rod, speed, cycle)
     found.coefficients.setflags(write=False)
     return found
 
@@ -189,13 +188,14 @@ def _inertia_orders(part: SliderCrank, fidelity: Fidelity) -> ComplexArray:
 @lru_cache(maxsize=256)
 def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity) -> Spectrum:
     """P and N of the gas over the crank angle of the engine, shape (n, 2) (B1, B2)."""
-    steps = fidelity.gas_steps
-    alpha = part.fires_at + part.shaft.ratio * cycle.angle * np.arange(steps) / steps
-    along = -part.piston_area * (cylinder_pressure(gas, part, cycle, steps) - gas.crankcase_pressure)
-    from_firing = spectrum_of(np.stack([along, -along * _tangent(part, alpha)], axis=1), cycle.base_order)
-    delay = as_turn(part.firing_angle) / cycle.turns
-    phases = np.array([cis(-delay * h) for h in range(len(from_firing.coefficients))])
-    return fidelity.kept_of_gas(Spectrum(cycle.base_order, from_firing.coefficients * phases[:, None]))
+
+    def loads(angles: Array) -> Array:
+        alpha = part.fires_at + part.shaft.ratio * angles
+        along = -part.piston_area * (pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure)
+        return np.stack([along, -along * _tangent(part, alpha)], axis=1)
+
+    from_firing = bent_spectrum(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))
+    return fidelity.kept_of_gas(from_firing.later(as_turn(part.firing_angle) / cycle.turns, part.firing_angle))
 
 
 def _cosine(part: SliderCrank, alpha: Array) -> Array:
@@ -208,8 +208,7 @@ def _tangent(part: SliderCrank, alpha: Array) -> Array:
 
 def _side_by_side(loads: list[Spectrum], cycle: Cycle) -> Spectrum:
     """Forces (n, 3) each as one signal (n, places, 3)."""
-    length = max((len(load.coefficients) for load in loads), default=1)
-    out = np.zeros((length, len(loads), 3), dtype=complex)
-    for k, load in enumerate(loads):
-        out[: len(load.coefficients), k] = load.coefficients
-    return Spectrum(cycle.base_order, out)
+    total = Spectrum(cycle.base_order, np.zeros((1, len(loads), 3), dtype=complex))
+    for one, load in zip(np.eye(len(loads)), loads, strict=True):
+        total = total + load.each(partial(np.einsum, "k,nd->nkd", one))
+    return total

@@ -17,6 +17,7 @@ from laufruhe.numerics.norms.norm import (
     SmoothProgram,
     curvature,
     fine_lengths,
+    jumped,
     lengths,
     mean_square,
     softened_lengths,
@@ -97,7 +98,8 @@ class Mean(Norm):
                 continue
             size, step = fine_lengths(signal, steps, times)
             shifted = fine_lengths(signal.series, steps, times)[0].mean(axis=(0, 2))
-            bend = step**2 / 8.0 * float(curvature(signal)[1].mean())
+            # what a step across a jump sees of it is one side
+            bend = float((step**2 / 8.0 * curvature(signal)[1] + step * jumped(signal)).mean())
             total += share * (float(np.abs(shifted - size.mean()).max()) + bend)
         return float(total)
 

@@ -241,8 +241,15 @@ def curvature(signal: Spectrum) -> tuple[Array, Array]:
     if signal.corners is None:
         return most, mean
     size = lengths(signal.corners.curvature(signal.period))
-    bends = lengths(np.abs(signal.corners.jumps[:, 0]).sum(axis=0)) / signal.period
+    bends = lengths(np.abs(signal.corners.jumps[:, 1]).sum(axis=0)) / signal.period
     return most + size.max(axis=0), mean + size.mean(axis=0) + bends
+
+
+def jumped(signal: Spectrum) -> Array:
+    """Sum of all jumps of the signal itself over its period, shape (places,)."""
+    if signal.corners is None:
+        return np.zeros(signal.coefficients.shape[1])
+    return lengths(np.abs(signal.corners.jumps[:, 0]).sum(axis=0)) / signal.period
 
 
 def fine_lengths(signal: Spectrum, steps: int, times: int) -> tuple[Array, float]:

@@ -21,7 +21,7 @@ class RootMeanSquare(Norm):
 
     def value(self, grid: Grid, rows: Array) -> float:
         """sqrt(sum_k w_k |v_k|^2)."""
-        size = lengths(rows)
+        size = np.where(grid.weights > 0.0, lengths(rows), 0.0)
         largest = float(size.max(initial=0.0))
         if largest == 0.0:
             return largest
