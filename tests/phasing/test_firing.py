@@ -116,3 +116,11 @@ def test_measures_of_orders():
     assert longest_bank_gap(FOUR, cross, order, firing_turns(cross, throws, order)) > math.radians(180.0)
     # two cylinders at 180 and 540 deg leave all of order 1 (S9): |1 + e^{-i pi}| = 0 there, half orders stay
     assert order_content(FOUR, (0.0, 0.5)) == pytest.approx(abs(1 + complex(0, -1)) / 2)
+
+
+def test_pistons_that_rise_together_fire_a_turn_apart():
+    """The two of a four-stroke parallel twin: one dead centre, one turn between the firings."""
+    layout = inline(2, 0.1)
+    assert intervals_of(FOUR, firing_turns(layout, (0.0, 0.0), (1, 2))) == pytest.approx([math.tau] * 2)
+    parts, _ = build(FOUR, layout, MECHANISM, (0.0, 0.0), (1, 2))
+    assert [part.firing_angle for part in parts] == pytest.approx([0.0, math.tau])

@@ -172,12 +172,12 @@ def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) 
     """Turn of the crank at which each cylinder of the order fires, ascending from 0."""
     turns = _dead_centres(layout, tuple(throws))
     start, out = None, []
-    previous = -SAME_TURN
+    previous = -1.0
     for number in order:
         k = number - 1
         turn = turns[k]
         turn = turn - 1.0 if turn > 1.0 - SAME_TURN else turn
-        while turn < previous - SAME_TURN:
+        while turn <= previous + SAME_TURN:
             turn += 1.0
         start = turn if start is None else start
         out.append(turn - start)
