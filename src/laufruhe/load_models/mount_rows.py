@@ -51,13 +51,12 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity
     whole = sum(point.weight for point in chosen)
     blocks: list[Any] = []
     weights: list[float] = []
-    steps = 1
+    # points keep orders of their own: every signal has as many steps as the finest needs
+    finest = max(float(point.orders.max(initial=0.0)) / point.base for point in chosen)
+    samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * finest))
     for point in chosen:
         signal = point.response.force if quantity.channel is channels.MOUNT_FORCE else point.response.travel
         counted = np.flatnonzero(quantity.counted(point.orders)).tolist()
-        highest = float(point.orders.max(initial=0.0))
-        samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * highest / point.base))
-        steps = samples
         cosine, sine = waves(point.orders[counted].tolist(), point.base, samples)
         values = signal[0][:, counted] @ cosine - signal[1][:, counted] @ sine
         for k in mounts:
@@ -66,7 +65,7 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity
                 rows = rows @ ca.diag(ca.DM(list(quantity.direction_weights)))
             blocks.append(rows)
             weights += [point.weight / whole / len(mounts) / samples] * samples
-    return ca.vertcat(*blocks), Grid(np.array(weights), steps)
+    return ca.vertcat(*blocks), Grid(np.array(weights), samples)
 
 
 def transmitted(points: Sequence[PointResponse], quantity: Measure) -> list[tuple[Any, Any]]:

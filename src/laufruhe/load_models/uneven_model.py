@@ -100,26 +100,25 @@ class UnevenModel:
         whole = sum(point.weight for point in chosen)
         blocks: list[Any] = []
         weights: list[Array] = []
-        for point in chosen:
-            share = point.weight / whole
-            if measure.norm.is_euclidean:
+        if measure.norm.is_euclidean:
+            for point in chosen:
                 found = self._signal(measure, point, at)
-                half = np.where(found[0].orders == 0.0, 1.0, 0.5) * share / len(found)
+                half = np.where(found[0].orders == 0.0, 1.0, 0.5) * point.weight / whole / len(found)
                 blocks += [part.T for place in found for part in (place.real, place.imaginary)]
                 weights += [half] * (2 * len(found))
-            else:
-                places = self._vectors(measure, point, at)
-                blocks += places
-                weights.append(np.full(len(places) * places[0].shape[0], share / len(places) / places[0].shape[0]))
-        return ca.vertcat(*blocks), Grid(np.concatenate(weights), blocks[0].shape[0])
-
-    def _vectors(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Any]:
-        """Values at equal steps of a period, shape (samples, d), of each mount or of the block."""
-        if quantity.channel is channels.MOUNT_FORCE and isinstance(self._mounting, RigidMounting):
-            # one map for all orders: the wrench alone is sampled
-            values = _sampled(self._counted(quantity, point, at))
-            return [values @ ca.DM(m.real).T for m in self._maps(quantity, 0.0, point)]
-        return [_sampled(place) for place in self._signal(quantity, point, at)]
+            return ca.vertcat(*blocks), Grid(np.concatenate(weights), blocks[0].shape[0])
+        # one map for all orders: the wrench alone is sampled
+        mapped = measure.channel is channels.MOUNT_FORCE and isinstance(self._mounting, RigidMounting)
+        signals = [[self._counted(measure, p, at)] if mapped else self._signal(measure, p, at) for p in chosen]
+        # points keep orders of their own: every signal has as many steps as the finest needs
+        steps = max(_steps(place) for places in signals for place in places)
+        for point, places in zip(chosen, signals, strict=True):
+            values = [_sampled(place, steps) for place in places]
+            if mapped:
+                values = [values[0] @ ca.DM(m.real).T for m in self._maps(measure, 0.0, point)]
+            blocks += values
+            weights.append(np.full(len(values) * steps, point.weight / whole / len(values) / steps))
+        return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps)
 
     def _signal(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
         """What a channel has of each mount, or of the block."""
@@ -243,11 +242,15 @@ def _turning(pair: Sequence[NDArray[np.complex128]], order: float, real: Any, im
     return Lines(np.array([order]), first, second)
 
 
-def _sampled(lines: Lines) -> Any:
-    """Values at equal steps of the period, shape (samples, d)."""
+def _steps(lines: Lines) -> int:
+    """That a period needs."""
     base = float(base_of(lines.orders.tolist()))
-    samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * float(lines.orders.max()) / base))
-    cosine, sine = waves(lines.orders.tolist(), base, samples)
+    return max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * float(lines.orders.max()) / base))
+
+
+def _sampled(lines: Lines, steps: int) -> Any:
+    """Values at equal steps of the period, shape (steps, d)."""
+    cosine, sine = waves(lines.orders.tolist(), float(base_of(lines.orders.tolist())), steps)
     return (lines.real @ cosine - lines.imaginary @ sine).T
 
 

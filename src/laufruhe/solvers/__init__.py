@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.budget import limited, passed
-from laufruhe.problem.channels import OF_MOUNTS
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.measure import Term
-from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
+from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.unbalances import solve_unbalances
+from laufruhe.solvers.unbalances import beyond_mounts, solve_unbalances
 
 __all__ = ["METHODS", "Result", "Status", "solve", "state"]
 
@@ -128,16 +126,6 @@ METHODS: tuple[Method, ...] = (
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
 
-def _beyond_mounts(problem: Problem, kinds: frozenset[Kind]) -> tuple[str, ...]:
-    """Limits that no unbalances keep together, whatever the open mounts are."""
-    open_mounts = kinds & OF_MOUNTS
-    limits = tuple(limit for limit in problem.load_limits if not limit.measure.channel.is_moved_by(open_mounts))
-    if not limits or kinds - open_mounts != {Kind.UNBALANCE}:
-        return ()
-    apart = replace(problem.balance, objective=(Term(limits[0].measure),), limits=limits)
-    return solve_unbalances(off_resonance(apart)).conflict
-
-
 def solve(problem: Problem, say: Say = lambda _: None, time_limit: float | None = None) -> Result:
     """Decide what a problem leaves open.
 
@@ -209,7 +197,7 @@ def _decided(problem: Problem, say: Say) -> Result:
     if method is None:
         asked = ", ".join(dict.fromkeys(measure.name for measure in problem.measures))
         raise ModelError(f"no method decides {_named(kinds)} together for {asked}; fix one of them, or ask for less")
-    conflict = _beyond_mounts(problem, kinds) if Kind.MOUNT in method.decides else ()
+    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and Kind.STAR not in kinds else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})
     return method.solve(problem, say)

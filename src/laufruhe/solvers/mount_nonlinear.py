@@ -30,7 +30,7 @@ from laufruhe.solvers.mount_starts import columns_of, unbalances_of
 from laufruhe.solvers.nonlinear import LocalOptimum, distinct
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth_program import SmoothProgram
-from laufruhe.solvers.unbalances import solve_unbalances
+from laufruhe.solvers.unbalances import beyond_mounts, solve_unbalances
 
 Array = NDArray[np.float64]
 
@@ -152,7 +152,10 @@ def _convex_part(problem: Problem) -> Problem | None:
 
 
 def _proven_conflict(problem: Problem) -> tuple[str, ...]:
-    """Limits that no stiffness within the bounds meets together, where the convex part proves it."""
+    """Limits that cannot be met together, where what mounts do not touch or what is convex in them proves it."""
+    conflict = beyond_mounts(problem)
+    if conflict:
+        return conflict
     convex = _convex_part(problem)
     return () if convex is None else solve_convex_mounts(convex).conflict
 

@@ -35,7 +35,7 @@ from laufruhe.solvers.star_answers import MOST_LISTED
 from laufruhe.solvers.star_cuts import search_designs
 from laufruhe.solvers.star_design import StarDesign
 from laufruhe.solvers.star_families import Family, families_of
-from laufruhe.solvers.uneven_starts import firing_intervals, starts_of
+from laufruhe.solvers.uneven_starts import firing_intervals, none_fires, starts_of
 
 Say: TypeAlias = Callable[[str], None]
 
@@ -189,7 +189,8 @@ def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign], say: Say
 def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs: int) -> Result:
     given = evaluate(problem)
     if not found:
-        return no_star(problem, "no star and firing order keeps the firing intervals allowed")
+        why, proven = none_fires(phasing)
+        return no_star(problem, why, Status.INFEASIBLE if proven else Status.FAILED)
     best = found[0]
     if _rank(best)[0]:
         return _none(problem, found, given, designs)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,6 +20,7 @@ from laufruhe.solvers.star_answers import Answer, Decided, searched
 from laufruhe.solvers.star_cuts import owners_of, solve_design
 from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.star_families import families_of
+from laufruhe.solvers.uneven_starts import none_fires
 
 
 def solve_phasing(problem: Problem) -> Result:
@@ -52,19 +52,11 @@ def solve_phasing(problem: Problem) -> Result:
 
 
 def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
-    even, slack = phasing.even_interval, 1e-9
-    if phasing.intervals.least > even + slack or phasing.intervals.most < even - slack:
-        return no_star(
-            problem,
-            f"no star can meet the intervals: {phasing.cylinders} cylinders fire {math.degrees(even):g} deg apart on "
-            f"average, phasing.intervals allows {math.degrees(phasing.intervals.least):g} to "
-            f"{math.degrees(phasing.intervals.most):g} deg",
-        )
-    families, reason = families_of(phasing)
+    families = families_of(phasing)[0] if phasing.intervals.holds([phasing.even_interval]) else ()
+    if not families and not phasing.continuous:
+        return no_star(problem, none_fires(phasing)[0])
     if not families:
-        return (
-            no_star(problem, f"no star exists: {reason}") if not phasing.continuous else _uneven(problem, phasing, None)
-        )
+        return _uneven(problem, phasing, None)
     answer = searched(problem, phasing, families)
     if not answer.designs:
         if phasing.continuous:
@@ -82,7 +74,7 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     star = Candidate(phasing.throws or (), None, *phasing.least_geometry)
     orders = ranked_orders(phasing, star)
     if not orders:
-        return no_star(problem, _no_order(phasing, star))
+        return no_star(problem, none_fires(phasing)[0])
     # the small ones first: a shaft that buys nothing is not built
     sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
     told = told_orders(problem, phasing, star)
@@ -173,19 +165,6 @@ def _none(problem: Problem, answer: Answer) -> Result:
     shown = " and ".join(f"'{name}'" for name in names) or "the bounds"
     why = f"no star keeps {shown}, whatever else is decided ({answer.infeasible} design(s) tried)"
     return no_star(problem, why, conflict=names)
-
-
-def _no_order(phasing: Phasing, star: Candidate) -> str:
-    free = replace(phasing, intervals=replace(phasing.intervals, least=0.0, most=math.inf))
-    orders = ranked_orders(free, star)
-    shown = [f"{math.degrees(angle):g}" for angle in star.throws]
-    allowed = f"{math.degrees(phasing.intervals.least):g} to {math.degrees(phasing.intervals.most):g} deg"
-    nearest = min(orders, key=lambda o: max(o.intervals) - min(o.intervals)) if orders else None
-    tail = ""
-    if nearest is not None:
-        low, high = math.degrees(min(nearest.intervals)), math.degrees(max(nearest.intervals))
-        tail = f"; the most even order of these throws has intervals from {low:g} to {high:g} deg"
-    return f"throws [{', '.join(shown)}] deg contradict the firing intervals allowed, {allowed}{tail}"
 
 
 def _uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:

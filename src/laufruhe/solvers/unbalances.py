@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.budget import in_time
+from laufruhe.problem.channels import OF_MOUNTS
 from laufruhe.problem.evaluation import BETWEEN, evaluate
-from laufruhe.problem.measure import Limit
+from laufruhe.problem.measure import Limit, Term
+from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.nothing import ROUNDING, nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, concluded, judged, none_within
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
 from laufruhe.solvers.conic import lightest, solve_cones
 from laufruhe.solvers.result import Result
 
@@ -53,6 +55,15 @@ class _Optimum:
     excess: float
     samples: int
     nothing: float
+
+
+def beyond_mounts(problem: Problem) -> tuple[str, ...]:
+    """Limits that no unbalances keep together, whatever the open mounts are."""
+    limits = tuple(limit for limit in problem.load_limits if not limit.measure.channel.is_moved_by(OF_MOUNTS))
+    if not limits:
+        return ()
+    apart = off_resonance(replace(problem.balance, objective=(Term(limits[0].measure),), limits=limits))
+    return solve_unbalances(apart).conflict if apart.decisions else broken_limits(limits, evaluate(apart))
 
 
 def solve_unbalances(problem: Problem) -> Result:

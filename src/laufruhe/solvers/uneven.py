@@ -33,7 +33,7 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth_program import TURN, SmoothProgram
 from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.uneven_starts import firing_intervals, needed, starts_of
+from laufruhe.solvers.uneven_starts import firing_intervals, none_fires, starts_of
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,8 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     """
     starts = starts_of(phasing, even, problem.feels_gas)
     if not starts:
-        return _no_crank(problem, phasing)
+        why, proven = none_fires(phasing)
+        return no_star(problem, why, Status.INFEASIBLE if proven else Status.FAILED)
     steps = TRADE_STEPS if even is not None and phasing.intervals.most < math.inf else (1.0,)
     found: list[StarDesign] = []
     trade = []
@@ -101,14 +102,6 @@ def _none(problem: Problem, phasing: Phasing) -> Result:
             return no_star(problem, why, conflict=(limit.name,))
     names = " and ".join(f"'{limit.name}'" for limit in problem.limits) or "the bounds"
     return no_star(problem, f"no crank was found that keeps {names}; relax them, or open more", Status.FAILED)
-
-
-def _no_crank(problem: Problem, phasing: Phasing) -> Result:
-    """No crank fires within the intervals, and what would."""
-    low, high = math.degrees(phasing.intervals.least), math.degrees(phasing.intervals.most)
-    why = f"no crank and firing order keeps the firing intervals allowed, {low:g} to {high:g} deg"
-    text, complete = needed(phasing) if phasing.throw_bounds is None else ("", False)
-    return no_star(problem, why + text, Status.INFEASIBLE if complete else Status.FAILED)
 
 
 def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> StarDesign | None:

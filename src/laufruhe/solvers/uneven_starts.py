@@ -25,6 +25,7 @@ from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriteri
 from laufruhe.problem.problem import Phasing
 from laufruhe.solvers.ranking import ranked_orders
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.star_families import families_of
 
 ORDERS_WITH_GAS = 2
 # cranks that are compared by order alone, and by the exact model
@@ -95,14 +96,25 @@ def _given(phasing: Phasing) -> list[list[int]] | None:
     return [[slot[k] for k, pin in enumerate(pins) if pin == own] for own in range(max(pins) + 1)]
 
 
-def needed(phasing: Phasing) -> tuple[str, bool]:
-    """What intervals would let cranks fire, in words; and whether that is known of all of them."""
+def none_fires(phasing: Phasing) -> tuple[str, bool]:
+    """Why no crank and firing order keeps the intervals allowed, and whether that is proven."""
+    allowed = f"{math.degrees(phasing.intervals.least):g} to {math.degrees(phasing.intervals.most):g} deg"
+    if not phasing.intervals.holds([phasing.even_interval]):
+        even = f"{math.degrees(phasing.even_interval):g}"
+        return (
+            f"no star can meet the intervals: {phasing.cylinders} cylinders fire {even} deg apart on average, "
+            f"phasing.intervals allows {allowed}"
+        ), True
+    if phasing.throws is not None:
+        return _none_of_given(phasing, phasing.throws, allowed), True
+    if not phasing.continuous:
+        return f"no star exists: {families_of(phasing)[1]}", True
+    text = f"no crank and firing order keeps the firing intervals allowed, {allowed}"
     patterns, complete = _slots(phasing).patterns(_given(phasing))
-    if not patterns:
-        return "", complete
-    intervals = patterns[0].intervals(phasing.cycle)
-    low, high = math.degrees(min(intervals)), math.degrees(max(intervals))
-    text = f"; the most even crank {'' if complete else 'found '}has intervals from {low:.6g} to {high:.6g} deg"
+    if not patterns or patterns[0].broken <= _KEPT:
+        return text, False
+    shown = _ends_of(patterns[0].intervals(phasing.cycle))
+    text += f"; the most even crank {'' if complete else 'found '}has intervals {shown}"
     if phasing.bank is not None:
         step = 360.0 / (phasing.cylinders // math.gcd(phasing.cycle.turns, phasing.cylinders))
         text += (
@@ -110,6 +122,22 @@ def needed(phasing: Phasing) -> tuple[str, bool]:
             f"multiple of {step:g} deg"
         )
     return text, complete
+
+
+def _none_of_given(phasing: Phasing, throws: Sequence[float], allowed: str) -> str:
+    """Why throws as given have no firing order."""
+    free = replace(phasing, intervals=Intervals(0.0, math.inf))
+    orders = ranked_orders(free, Candidate(tuple(throws), None, *phasing.least_geometry))
+    shown = ", ".join(f"{math.degrees(angle):g}" for angle in throws)
+    text = f"throws [{shown}] deg contradict the firing intervals allowed, {allowed}"
+    if not orders:
+        return text
+    nearest = min(orders, key=lambda o: max(o.intervals) - min(o.intervals))
+    return f"{text}; the most even order of these throws has intervals {_ends_of(nearest.intervals)}"
+
+
+def _ends_of(intervals: Sequence[float]) -> str:
+    return f"from {abs(math.degrees(min(intervals))):.6g} to {math.degrees(max(intervals)):.6g} deg"
 
 
 def _best_cranks(phasing: Phasing, patterns: Sequence[FiringPattern]) -> list[Candidate]:

@@ -1,0 +1,64 @@
+"""Valid problems with stars open end in a design that is no worse than the one given, or in an infeasibility."""
+
+from __future__ import annotations
+
+import pytest
+
+from lanes import first_fast
+from laufruhe.errors import InputError
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.solvers import solve
+from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.result import Status
+from phasing.random_problems import OPEN, RIGID, Writer
+from problem_files import loaded
+
+
+def problem_of(folder, seed):
+    """Of a seed; None where the reader refuses it with a line."""
+    try:
+        return loaded(folder, Writer(seed).text())
+    except InputError:
+        return None
+
+
+def judge(problem):
+    result = solve(problem)
+    assert result.status is not Status.FAILED, result.message
+    given = evaluate(problem)
+    phasing = problem.phasing
+    if result.status is Status.INFEASIBLE:
+        assert result.message or result.conflict
+        return
+    assert result.final.excess(result.problem.limits) <= KEPT
+    assert phasing is None or phasing.intervals.holds(result.final.engine.firing_intervals, 1e-6)
+    if given.excess(problem.limits) <= 0.0 and (phasing is None or phasing.throw_bounds is None):
+        assert result.objective.value <= result.objective.initial * (1.0 + 1e-6) + 1e-9
+    assert result.certificate.lower_bound <= result.objective.value
+
+
+RIGID_SEEDS = [seed for seed in range(2, 400) if Writer(seed).mounts == RIGID]
+OTHER_SEEDS = [seed for seed in range(400) if Writer(seed).mounts not in (RIGID, OPEN)]
+OPEN_SEEDS = [seed for seed in range(200) if Writer(seed).mounts == OPEN]
+
+
+@pytest.mark.parametrize("seed", first_fast(RIGID_SEEDS, 16))
+def test_on_rigid_mounts(tmp_path, seed):
+    problem = problem_of(tmp_path, seed)
+    if problem is not None:
+        judge(problem)
+
+
+@pytest.mark.parametrize("seed", first_fast(OTHER_SEEDS, 8))
+def test_on_elastic_mounts(tmp_path, seed):
+    problem = problem_of(tmp_path, seed)
+    if problem is not None:
+        judge(problem)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", OPEN_SEEDS)
+def test_together_with_mounts(tmp_path, seed):
+    problem = problem_of(tmp_path, seed)
+    if problem is not None:
+        judge(problem)
