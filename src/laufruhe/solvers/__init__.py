@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.budget import limited, passed
