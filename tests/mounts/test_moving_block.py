@@ -26,6 +26,7 @@ from exudyn.itemInterface import (
     SensorObject,
 )
 
+from laufruhe.errors import ModelError
 from laufruhe.machine import Block, Cycle, Engine, Mount, OperatingPoint, SliderCrank
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -39,14 +40,16 @@ PLACES, STIFFNESS, DAMPING = ((-0.25, -0.1), (0.25, -0.1)), (6e4, 9e4), (600.0, 
 STEPS, TURNS = 720, 60
 
 
-def linear_forces(piston: float, angles: np.ndarray) -> np.ndarray:
+def linear_forces(piston: float, angles: np.ndarray, flywheel: float = 0.0, turns: bool = True) -> np.ndarray:
     """Lateral and vertical force on either side, shape (n, 2, 2) [N]."""
     crank = SliderCrank("one", 0.0, RADIUS, ROD, piston)
     wrench = shaking_loads(Engine("one", Cycle.TWO_STROKE, (crank,)), OperatingPoint("it", SPEED))
     # the piston rides at its mean height
     height, total = math.sqrt(ROD**2 - 0.5 * RADIUS**2), MASS + piston
-    roll = INERTIA + MASS * piston / total * height**2
-    block = Block(total, ((roll, 0, 0), (0, 8.0, 0), (0, 0, 8.0)), (0.0, 0.0, piston * height / total))
+    roll = INERTIA + MASS * piston / total * height**2 + flywheel
+    block = Block(
+        total, ((roll, 0, 0), (0, 8.0, 0), (0, 0, 8.0)), (0.0, 0.0, piston * height / total), flywheel * turns
+    )
     mounts = [
         Mount(
             f"{x} {y}", (x, y, z), (6e4, STIFFNESS[0] / 2, STIFFNESS[1] / 2),
@@ -65,7 +68,7 @@ def _body(system, place: float, mass: float, inertia: float, velocity: float = 0
     return node, system.AddObject(ObjectRigidBody2D(mass=mass, inertia=inertia, nodeNumber=node))
 
 
-def simulated_forces(piston: float, steps: int = STEPS) -> np.ndarray:
+def simulated_forces(piston: float, flywheel: float = 1e-3, steps: int = STEPS) -> np.ndarray:
     """The same from exudyn over the last turn, shape (steps, 2, 2) [N]."""
     system = exu.SystemContainer().AddSystem()
     ground = system.AddObject(ObjectGround())
@@ -76,7 +79,7 @@ def simulated_forces(piston: float, steps: int = STEPS) -> np.ndarray:
         return system.AddMarker(MarkerBodyRigid(bodyNumber=body, localHT=frame))
 
     _, block = _body(system, 0.0, MASS, INERTIA)
-    crank_node, crank = _body(system, 0.0, 1e-4, 1e-3, rate=SPEED)
+    crank_node, crank = _body(system, 0.0, 1e-4, flywheel, rate=SPEED)
     # a rod of next to no mass: the linear model's piston carries the rod's share already
     _, rod = _body(system, RADIUS + ROD / 2, 1e-4, 1e-6, RADIUS * SPEED / 2, -RADIUS * SPEED / ROD)
     _, sliding = _body(system, RADIUS + ROD, piston, 1e-4)
@@ -118,9 +121,9 @@ def simulated_forces(piston: float, steps: int = STEPS) -> np.ndarray:
     return np.stack(read, axis=1)
 
 
-def left_out(piston: float) -> float:
+def left_out(piston: float, flywheel: float = 1e-3, turns: bool = True) -> float:
     angles = 2 * math.pi * np.arange(1, STEPS + 1) / STEPS
-    found, expected = simulated_forces(piston), linear_forces(piston, angles)
+    found, expected = simulated_forces(piston, flywheel), linear_forces(piston, angles, flywheel, turns)
     return float(np.abs(found - expected).max() / np.abs(found).max())
 
 
@@ -132,3 +135,26 @@ def test_the_linear_model_leaves_out_no_more_than_the_mass_that_moves():
     assert light < 0.0015
     assert heavy < 0.25 * 2.0 / MASS
     assert 2.5 < heavy / light < 5.0
+
+
+@pytest.mark.slow
+@pytest.mark.validation
+def test_what_turns_at_imposed_speed_does_not_roll_with_the_block():
+    """E1a: a flywheel of a sixth of the block's inertia, told apart and taken for a part of what rolls."""
+    assert left_out(0.5, 1.0) < 0.0015
+    assert left_out(0.5, 1.0, turns=False) > 0.005
+
+
+def test_roll_alone_is_slower_with_what_turns_counted_in():
+    """A block that rolls on springs at its height and a wheel held at its own speed: I - J (E1a)."""
+    mounts = [Mount(f"{x} {y}", (x, y, 0.0), (1e5, 1e5, 1e5)) for x in (-0.3, 0.3) for y in (-0.25, 0.25)]
+    block = Block(100.0, ((6.0, 0, 0), (0, 8.0, 0), (0, 0, 8.0)), turning_inertia=0.5)
+    roll = math.sqrt(4 * 1e5 * 0.25**2 / (6.0 - 0.5)) / math.tau
+    frequencies = elastic_mounting(block, mounts).modes.frequencies
+    assert np.abs(frequencies - roll).min() < 1e-9 * roll
+
+
+@pytest.mark.parametrize("inertia", [-0.1, 6.0, 7.0])
+def test_what_turns_is_less_than_the_whole(inertia):
+    with pytest.raises(ModelError, match="turning_inertia"):
+        Block(100.0, ((6.0, 0, 0), (0, 8.0, 0), (0, 0, 8.0)), turning_inertia=inertia)

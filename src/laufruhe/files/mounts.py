@@ -50,6 +50,10 @@ class BlockTable(Table):
     inertia_products: f.Three[f.Inertia] = f.told(
         "Entries xy, xz, yz of the tensor: xy = - integral of x y dm.", [0.0, 0.0, 0.0]
     )
+    turning_inertia: f.Inertia = f.told(
+        "Part of the inertia about x that turns with the crank and does not roll with the block: crankshaft, flywheel.",
+        0.0,
+    )
 
 
 class StopTable(Table):
@@ -156,7 +160,7 @@ def _block(table: BlockTable) -> Block:
     (a, b, c), (xy, xz, yz) = table.inertia, table.inertia_products
     x, y, z = table.centre_of_gravity
     with blamed_on("block"):
-        return Block(table.mass, ((a, xy, xz), (xy, b, yz), (xz, yz, c)), (x, y, z))
+        return Block(table.mass, ((a, xy, xz), (xy, b, yz), (xz, yz, c)), (x, y, z), table.turning_inertia)
 
 
 def _elastic(table: MountsTable, block: Block) -> MountsFound:

@@ -27,16 +27,20 @@ class Block:
         stand its entries, xy = - integral of x y dm.
     centre_of_gravity
         (x, y, z) [m] (C2).
+    turning_inertia
+        Of what turns with the crank at its imposed speed, about its axis [kg m2]: a part of `inertia` that
+        does not roll with the block (E1a).
     """
 
     mass: float
     inertia: Matrix3
     centre_of_gravity: Vector3 = (0.0, 0.0, 0.0)
+    turning_inertia: float = 0.0
 
     def __post_init__(self) -> None:
         if not (self.mass > 0.0 and math.isfinite(self.mass)):
             raise ModelError(f"the block's mass {self.mass:g} kg must be positive")
-        tensor = self.tensor
+        tensor = np.array(self.inertia, dtype=float)
         if not np.all(np.isfinite(tensor)) or np.abs(tensor - tensor.T).max() > _SLACK * np.abs(tensor).max():
             raise ModelError("the block's inertia tensor is not symmetric; give xy, xz and yz once each")
         small, middle, large = np.linalg.eigvalsh(tensor)
@@ -51,10 +55,17 @@ class Block:
                 "body, the largest must not exceed the sum of the others; check the numbers and the signs of products"
             )
 
+        still = float(np.linalg.det(tensor) / np.linalg.det(tensor[1:, 1:]))
+        if not 0.0 <= self.turning_inertia < still * (1.0 - _SLACK):
+            raise ModelError(
+                f"turning_inertia {self.turning_inertia:.4g} kg m2 must not be negative, and less than the "
+                f"{still:.4g} kg m2 with which the block resists a roll; it is a part of inertia"
+            )
+
     @property
     def tensor(self) -> NDArray[np.float64]:
-        """Inertia tensor, shape (3, 3)."""
-        return np.array(self.inertia, dtype=float)
+        """Inertia with which the block follows its motion, shape (3, 3): without what turns at imposed speed (E1a)."""
+        return np.array(self.inertia, dtype=float) - np.diag([self.turning_inertia, 0.0, 0.0])
 
     @property
     def mass_matrix(self) -> NDArray[np.float64]:
