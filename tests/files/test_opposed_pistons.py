@@ -9,7 +9,7 @@ import pytest
 
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
-from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.evaluation import evaluate, objective_value
 from problem_files import written
 
 SHARED = """
@@ -89,3 +89,38 @@ def test_a_lead_goes_without_gas(tmp_path: Path) -> None:
     first = abs(evaluate(problem).loads[0].wrench.at(1)[2])
     one = (0.9 + 0.4) * 0.035 * problem.points[0].speed ** 2
     assert first == pytest.approx(2.0 * np.sin(np.radians(5.0)) * one, rel=1e-9)
+
+
+TWIN = """
+title = "Vee twin on one throw"
+[engine]
+layout = "parts"
+cycle = "four-stroke"
+stroke = "80 mm"
+rod_ratio = 0.25
+reciprocating_mass = "0 kg"
+rotating_mass = "1 kg"
+[[engine.slider_cranks]]
+x = "0 mm"
+bank_angle = 45
+[[engine.slider_cranks]]
+x = "0 mm"
+bank_angle = -45
+throw = 360
+[[engine.slider_cranks]]
+x = "100 mm"
+throw = 180
+[[operating_points]]
+speed = "1000 rpm"
+[objective]
+minimise = "mean shaking force"
+"""
+
+
+def test_slider_cranks_on_one_throw_share_its_rotating_mass(tmp_path: Path) -> None:
+    """Per throw, as in every other layout: two throws opposite each other, however many rods are on each."""
+    problem = load(written(tmp_path, TWIN))
+    assert [part.rotating_mass for part in problem.engine.slider_cranks] == [0.5, 0.5, 1.0]
+    assert objective_value(problem, evaluate(problem)) == pytest.approx(0.0, abs=1e-9)
+    own = load(written(tmp_path, TWIN.replace("bank_angle = 45", 'bank_angle = 45\nrotating_mass = "0.2 kg"')))
+    assert [part.rotating_mass for part in own.engine.slider_cranks] == [0.2, 1.0, 1.0]

@@ -15,6 +15,7 @@ from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
 from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
 from laufruhe.machine.slider_crank import radius_for_stroke
+from laufruhe.numerics.turns import as_turn
 
 T = TypeVar("T", bound=BaseModel)
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
@@ -261,6 +262,14 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
     return tuple(_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks))
 
 
+def _sharing(table: EngineTable, part: SliderCrankTable) -> int:
+    """Slider-cranks on the throw of this one that share the mass given for every throw."""
+    here = (part.shaft, part.x, as_turn(part.throw))
+    return sum(
+        (each.shaft, each.x, as_turn(each.throw)) == here and each.rotating_mass is None for each in table.slider_cranks
+    )
+
+
 def _free_part(table: EngineTable, part: SliderCrankTable, k: int, shafts: dict[str, Shaft]) -> SliderCrank:
     where = f"engine.slider_cranks[{k + 1}]"
     if part.shaft not in shafts:
@@ -271,7 +280,7 @@ def _free_part(table: EngineTable, part: SliderCrankTable, k: int, shafts: dict[
     shaft = shafts[part.shaft]
     with blamed_on(where):
         mechanism, _ = _mechanism(table.model_copy(update=own))
-        rotating = part.rotating_mass if part.rotating_mass is not None else table.rotating_mass
+        rotating = part.rotating_mass if part.rotating_mass is not None else table.rotating_mass / _sharing(table, part)
         first = (part.bank_angle - part.throw) / shaft.ratio % (math.tau / abs(shaft.ratio))
         fires = part.firing_angle if part.firing_angle is not None else first
         return mechanism.cylinder(k + 1, part.x, part.throw, part.bank_angle, fires, rotating, shaft)
