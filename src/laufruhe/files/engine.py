@@ -15,7 +15,7 @@ from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
 from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
 from laufruhe.machine.slider_crank import radius_for_stroke
-from laufruhe.numerics.turns import as_turn
+from laufruhe.numerics.turns import as_turn, within
 
 T = TypeVar("T", bound=BaseModel)
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
@@ -264,9 +264,10 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
 
 def _sharing(table: EngineTable, part: SliderCrankTable) -> int:
     """Slider-cranks on the throw of this one that share the mass given for every throw."""
-    here = (part.shaft, part.x, as_turn(part.throw))
+    here = (part.shaft, part.x, within(as_turn(part.throw), 1))
     return sum(
-        (each.shaft, each.x, as_turn(each.throw)) == here and each.rotating_mass is None for each in table.slider_cranks
+        (each.shaft, each.x, within(as_turn(each.throw), 1)) == here and each.rotating_mass is None
+        for each in table.slider_cranks
     )
 
 
