@@ -198,3 +198,23 @@ def test_many_open_cylinders_are_checked_at_once(name: str, cylinders: int, tmp_
     started = time.process_time()
     assert CliRunner().invoke(app, ["check", str(path)]).exit_code in (0, 2)
     assert time.process_time() - started < 10.0
+
+
+def test_too_much_at_once_is_refused_in_a_line(tmp_path: Path) -> None:
+    steps = 'speed = "2500 rpm"\nup_to = "3500 rpm"\nsteps = '
+    assert "operating_points" in scenes.GIVEN
+    refused(spoilt(tmp_path, 'speed = "2500 rpm"', f"{steps}201"), "operating_points", "201", "200")
+    path = spoilt(tmp_path, 'speed = "2500 rpm"', f"{steps}200")
+    assert CliRunner().invoke(app, ["check", str(path)]).exit_code == 0
+    shafts = "\n".join(
+        f'[[counterweights]]\nname = "{k}"\nopposite_throw = 1\nunbalance = {{ between = ["0 kg m", "1 kg m"] }}'
+        for k in range(40)
+    )
+    path = written(tmp_path, path.read_text(encoding="utf-8") + shafts)
+    refused(path, "million numbers", verb="solve")
+
+
+@pytest.mark.parametrize("key", ["orders", "mounts", "operating_points"])
+def test_a_measure_of_nothing(key: str, tmp_path: Path) -> None:
+    limit = f'[[constraints]]\nlimit = "mean mount force"\nmax = "1 N"\n{key} = []\n'
+    refused(written(tmp_path, scenes.GIVEN + limit), f"constraints[1].{key}", "is empty")

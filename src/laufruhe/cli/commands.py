@@ -13,6 +13,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from laufruhe.cli.screen import DONE, FAILED, above_zero, exit_statuses, handing_out, in_time, progress
+from laufruhe.cli.supervised import supervised
 
 app = typer.Typer(
     name="laufruhe",
@@ -158,10 +159,15 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):
             # a terminal that knows no Greek gets an escape in place of a traceback
             stream.reconfigure(errors="backslashreplace")
+    supervised(_run)
+
+
+def _run() -> NoReturn:
     try:
         app()
     except SystemExit as end:
         _leave(end.code if isinstance(end.code, int) else DONE)
+    _leave(DONE)
 
 
 def _leave(status: int) -> NoReturn:

@@ -84,6 +84,9 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
     except KeyboardInterrupt:
         complain(f"laufruhe: {interrupted}")
         raise typer.Exit(INTERRUPTED) from None
+    except MemoryError:
+        complain(f"{printed(str(path))}: needs more memory than there is; ask for less at once")
+        raise typer.Exit(FAILED) from None
     except BrokenPipeError:
         # whoever read the output has gone; click ends quietly
         raise

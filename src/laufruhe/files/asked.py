@@ -109,6 +109,8 @@ class Scene:
         """Refuse keys that mean nothing for a channel, and names of what is not there."""
         of = getattr(table, "of", None)
         for key in _KEYS:
+            if getattr(table, key, None) == []:
+                raise Refused(f"{at}.{key}", [], "is empty", "leave it out to count all")
             if getattr(table, key, None) is not None and key not in channel.keys:
                 raise Refused(f"{at}.{key}", of if key == "of" else None, _stray(key, channel), "leave it out")
         points = [point.name for point in self.points]
@@ -165,8 +167,6 @@ def _stray(key: str, channel: Channel) -> str:
 
 
 def _known(names: list[str] | None, known: Sequence[str], where: str, what: str) -> None:
-    if names is not None and not names:
-        raise Refused(where, names, "is empty", "leave it out to count all")
     for name in names or ():
         if name not in known:
             raise Refused(where, name, f"is no {what} here", nearest(name, list(known)) if known else "add it")

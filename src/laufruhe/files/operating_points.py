@@ -17,6 +17,9 @@ from laufruhe.machine import Cycle, OperatingPoint, PressureTrace
 from laufruhe.machine.gas import GasModel
 from laufruhe.physics.seiliger_cycle import motored_cycle
 
+MOST_POINTS = 200
+"""Of one problem, which weighs them all at once: 14 MB and a fifth of a second each where four mounts are asked."""
+
 
 class OperatingPointTable(Table):
     """A speed and a load."""
@@ -44,6 +47,9 @@ def operating_points(
             at = units.shown(speed, "rad/s", 6)
             name = (f"{table.name} {at}" if len(speeds) > 1 else table.name) if table.name else at
             points.append(OperatingPoint(name, speed, _loaded(gas, table, cycle, where), table.weight / len(speeds)))
+    if len(points) > MOST_POINTS:
+        rule = f"makes {len(points)} operating points, more than {MOST_POINTS}"
+        raise Refused("operating_points", None, rule, "take wider steps, or sweep the speed in a study")
     all_different([p.name for p in points], "operating_points", "operating points have one name")
     return tuple(points)
 

@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 NEEDED, LEAST_UNIT = 1e3, 1e-9
 FEASIBLE = 1e-6
 """Relative excess over a limit that counts as none."""
+MOST_NUMBERS = 60_000_000
+"""Of one measure: rows by open numbers; some ten times as many are held while a program is solved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +227,9 @@ class AffineModel:
         lead = [signal.over(self.base) for signal in (self.lead or self).bare.signals(channel)]
         bends = bends_of(measure, lead, self.problem.engine)
         bare = self._rows(measure, self.bare.signals(channel), samples, averaged, bends)
+        if bare.vectors.size * len(self._changes) > MOST_NUMBERS:
+            size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"
+            raise ModelError(f"{size} are needed; give fewer operating points, open numbers or samples", "problem")
         slopes = [
             self._rows(measure, [channel.signal(by[k]) for by in self._slopes], samples, averaged, bends).vectors
             for k in range(len(self._changes))

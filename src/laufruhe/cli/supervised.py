@@ -1,0 +1,57 @@
+"""A command in a process of its own: interrupted whatever a solver does, and a sudden end is told in a line."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from types import FrameType
+from typing import NoReturn
+
+from laufruhe.cli.screen import FAILED, INTERRUPTED
+from laufruhe.numerics.cores import end_with_parent
+
+PATIENCE = 2
+"""Seconds in which an interrupted command may tidy up; a solver that does not listen is ended then."""
+
+
+def supervised(work: Callable[[], NoReturn]) -> NoReturn:
+    """Do work that ends its process, where the system can in another one that is watched over."""
+    if not hasattr(os, "fork"):
+        work()
+    watching = os.getpid()
+    child = os.fork()
+    if child == 0:
+        end_with_parent(watching)
+        signal.signal(signal.SIGINT, _interrupted)
+        work()
+    ended_here = False
+
+    def interrupt(*_: object) -> None:
+        os.kill(child, signal.SIGINT)
+        signal.alarm(PATIENCE)
+
+    def end(*_: object) -> None:
+        nonlocal ended_here
+        ended_here = True
+        os.kill(child, signal.SIGKILL)
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, interrupt)
+    signal.signal(signal.SIGALRM, end)
+    _, status = os.waitpid(child, 0)
+    if os.WIFEXITED(status):
+        os._exit(os.WEXITSTATUS(status))
+    if ended_here:
+        sys.stderr.write("laufruhe: interrupted\n")
+        os._exit(INTERRUPTED)
+    ended = f"by signal {os.WTERMSIG(status)}, most likely for want of memory; ask for less at once"
+    sys.stderr.write(f"laufruhe: the computation was ended {ended}\n")
+    os._exit(FAILED)
+
+
+def _interrupted(_: int, __: FrameType | None) -> None:
+    """Once: what tidies up is not interrupted again."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    raise KeyboardInterrupt

@@ -1,0 +1,74 @@
+"""A command is interrupted whatever it is at, and says in one line how it ended."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cli import scenes
+from problem_files import written
+
+# counts on without ever looking at a signal, as a solver may
+DEAF = "import laufruhe.solvers as s; s.solve = lambda *_, **__: sum(range(10**14))\n"
+RUN = "from laufruhe.cli import main; main()"
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not hasattr(os, "fork"), reason="needs another process")]
+
+
+def started(folder: Path, code: str) -> subprocess.Popen[str]:
+    """A solve that has come as far as its solver."""
+    path = written(folder, scenes.TIGHT)
+    words = [sys.executable, "-c", code + RUN, "solve", str(path), "--no-plots"]
+    running = subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 60.0
+    while not list(folder.glob("results/.unfinished-*/.laufruhe.json")) and time.monotonic() < until:
+        time.sleep(0.02)
+    time.sleep(0.5)
+    return running
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("code", [DEAF, DEAF.replace("sum(range(10**14))", "__import__('time').sleep(1e4)")])
+def test_interrupted_within_seconds(code: str, number: signal.Signals, tmp_path: Path) -> None:
+    running = started(tmp_path, code)
+    began = time.monotonic()
+    running.send_signal(number)
+    out, err = running.communicate(timeout=60)
+    assert time.monotonic() - began < 20.0
+    assert running.returncode == 130
+    assert out == ""
+    assert err.startswith("laufruhe: interrupted")
+    assert len(err.splitlines()) == 1
+    assert not (tmp_path / "results/scene").exists()
+    done = subprocess.run([sys.executable, "-c", RUN, "solve", "scene.toml", "--no-plots"], cwd=tmp_path, check=False)
+    assert done.returncode == 0
+    assert {entry.name for entry in (tmp_path / "results").iterdir()} == {"scene"}
+
+
+@pytest.mark.parametrize(
+    ("end", "said"), [("os.abort()", "signal 6"), ("(_ for _ in ()).throw(MemoryError())", "more memory")]
+)
+def test_an_end_without_warning_is_told(end: str, said: str, tmp_path: Path) -> None:
+    running = started(tmp_path, f"import os; import laufruhe.solvers as s; s.solve = lambda *_, **__: {end}\n")
+    out, err = running.communicate(timeout=60)
+    assert running.returncode == 1
+    assert out == ""
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_killed_command_leaves_no_process(tmp_path: Path) -> None:
+    running = started(tmp_path, DEAF)
+    (child,) = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
+    running.kill()
+    running.communicate(timeout=60)
+    for _ in range(100):
+        if not Path(f"/proc/{child}").exists():
+            break
+        time.sleep(0.1)
+    assert not Path(f"/proc/{child}").exists() or "Z" in Path(f"/proc/{child}/stat").read_text()
