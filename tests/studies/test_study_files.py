@@ -133,6 +133,9 @@ BAD = [
     (study() + 'without = ["gass"]', "did you mean 'gas'?"),
     ('title = "a problem"\n', "so this is no study file"),
     ('title = "t"\n[study]\n', "study.parts: is missing; add"),
+    (REPLICA.replace("common = { numbers = { m = 2 } }", "common = 1.5"), "study.common = 1.5: "),
+    (study(sweep=swept("counterweights.wb.mass", "values = [0, 1]")) + 'set = { "counterweights.web.name" = 1.5 }',
+     "counterweights.wb: is no quantity of this scene; use one of: 1"),
 ]  # fmt: skip
 
 
@@ -147,6 +150,15 @@ def test_refused_in_one_line_and_nothing_left(
     assert said in answer.stderr
     assert answer.stderr.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["s.toml"]
+
+
+def test_what_a_case_names_anew_is_swept_by_its_new_name(tmp_path: Path) -> None:
+    named = 'set = { "counterweights.web.name" = "inner" }'
+    (tmp_path / "s.toml").write_text(
+        study(sweep=swept("counterweights.inner.balance_factor", "values = [0, 1]")) + named
+    )
+    (part,) = load_study(tmp_path / "s.toml").study.parts
+    assert len(part.points(Scenes(tmp_path))) == 3
 
 
 def test_problem_given_to_study_and_study_to_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

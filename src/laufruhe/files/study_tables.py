@@ -100,7 +100,8 @@ def _options(here: Any) -> dict[str, Any]:
     if isinstance(here, dict):
         return {key: key for key in here}
     if isinstance(here, list):
-        named = {entry["name"]: k for k, entry in enumerate(here) if isinstance(entry, dict) and "name" in entry}
+        names = [entry.get("name") if isinstance(entry, dict) else None for entry in here]
+        named = {name: k for k, name in enumerate(names) if isinstance(name, str)}
         return {**{str(k + 1): k for k in range(len(here))}, **named}
     return {}
 

@@ -53,11 +53,13 @@ class StudyFile(Table):
 
 def _once(found: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple[Complaint, ...]:
     """What is wrong with keys that all parts have in common is said once."""
-    common = tables["study"].get("common", {}) if isinstance(tables["study"], dict) else {}
+    study = tables["study"]
+    common = study.get("common") if isinstance(study, dict) else None
+    keys = common if isinstance(common, dict) else {}
     kept: dict[str, Complaint] = {}
     for one in found:
         key = re.sub(r"^study\.parts\[\d+\]\.", "", one.where)
-        where = f"study.common.{key}" if re.split(r"[.\[]", key)[0] in common else one.where
+        where = f"study.common.{key}" if re.split(r"[.\[]", key)[0] in keys else one.where
         kept.setdefault(where, replace(one, where=where))
     return tuple(kept.values())
 

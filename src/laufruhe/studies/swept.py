@@ -14,7 +14,7 @@ from pydantic import Field
 
 from laufruhe.errors import SolverError
 from laufruhe.files.asked import QuantityName
-from laufruhe.files.study_tables import Axis, CaseTable, SweepTable, axis_of, keys_of
+from laufruhe.files.study_tables import Axis, CaseTable, SweepTable, axis_of, changed, keys_of
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.problem.problem import Problem
@@ -202,9 +202,11 @@ class SweptPart(Part):
 
     def _check_apart(self, case: CaseTable, scenes: Scenes) -> None:
         """Whether every number is told once, however its path is written."""
-        tables, told = scenes.tables(Point(case)), {}
-        for path in case.set:
-            told[keys_of(tables, path)] = f"is swept, and set by '{case.name}' too"
+        tables, told = scenes.tables(Point(case.model_copy(update={"set": {}}))), {}
+        for path, value in case.set.items():
+            with scenes.named(case):
+                told[keys_of(tables, path)] = f"is swept, and set by '{case.name}' too"
+                tables = changed(tables, path, value)
         for sweep in self.sweep:
             with scenes.named(case):
                 keys = keys_of(tables, sweep.quantity)
