@@ -21,6 +21,9 @@ def array(items: Any) -> dict[str, Any]:
 ORDERS = array(table(order=NUMBER, amplitude=NUMBER))
 MOUNT = table(name=TEXT, mean=NUMBER, max=NUMBER, rms=NUMBER, orders=ORDERS)
 SHAKING = table(orders=array(NUMBER), force=array(NUMBER), moment=array(NUMBER))
+SERIES = table(angle=array(NUMBER), components=array(TEXT), shaking=array(array(NUMBER)))
+POINT = table(name=TEXT, speed=NUMBER, weight=NUMBER)
+POINT["properties"]["series"] = SERIES
 DECISION = table(value=NUMBER, unit=TEXT, lower=NUMBER, upper=NUMBER, at_bound={"type": "boolean"})
 CONSTRAINT = table(
     name=TEXT, value=NUMBER, limit=NUMBER, unit=TEXT, active={"type": "boolean"}, shadow_price=MAYBE
@@ -42,6 +45,7 @@ SCHEMA = {
         constraints=array(CONSTRAINT),
         mounts=array(MOUNT),
         shaking=SHAKING,
+        points=array(POINT),
         firing_intervals=array(NUMBER),
         fidelity=table(kinematics=TEXT, samples={"type": "integer"}, error_estimate=MAYBE),
         timing={"type": "object", "additionalProperties": NUMBER},

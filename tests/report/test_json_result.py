@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from dataclasses import replace
@@ -13,11 +14,15 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from cli import scenes
+from laufruhe.files.reader import load
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
 from laufruhe.report.json_result import as_json
-from laufruhe.solvers import Result
+from laufruhe.report.markdown import as_markdown
+from laufruhe.report.screen import show
+from laufruhe.report.wording import fired_together
+from laufruhe.solvers import Result, state
 from report.result_schema import SCHEMA
 
 RESULTS = {
@@ -125,3 +130,59 @@ def test_infeasible_says_what_was_minimised_and_proves_nothing() -> None:
 def test_what_is_no_number_is_null(odd: float) -> None:
     result = replace(scenes.solved(scenes.TIGHT), error_estimate=odd)
     assert parsed(result)["fidelity"]["error_estimate"] is None
+
+
+def test_every_order_is_written() -> None:
+    """Small ones too, in full precision: what is read back adds up to the loads."""
+    result = scenes.solved(scenes.TIGHT)
+    written, wrench = parsed(result)["shaking"], result.final.loads[0].wrench
+    used = np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1))
+    assert written["orders"] == wrench.orders[used].tolist()
+    read = np.array(written["real"]) + 1j * np.array(written["imag"])
+    assert np.array_equal(read, wrench.coefficients[used])
+    smallest = min(force for force in written["force"] if force)
+    assert smallest < 1e-3 * max(written["force"])
+    forces = result.final.loads[0].mount_forces
+    assert forces is not None
+    orders = parsed(result)["mounts"][0]["orders"]
+    assert [entry["order"] for entry in orders] == forces.orders[np.any(forces.coefficients, axis=(1, 2))].tolist()
+
+
+def test_loads_over_the_cycle_are_written_where_wanted() -> None:
+    result = scenes.solved(scenes.TIGHT)
+    assert "series" not in parsed(result)["points"][0]
+    written = json.loads(as_json(result, series=True))
+    Draft202012Validator(SCHEMA).validate(written)
+    series = written["points"][0]["series"]
+    forces = np.array(series["mounts"])
+    assert forces.shape == (result.final.samples, len(written["mounts"]), 3)
+    assert len(series["angle"]) == len(series["shaking"]) == len(forces)
+    mean = np.linalg.norm(forces[:, 0], axis=1).mean()
+    assert mean == pytest.approx(written["mounts"][0]["mean"], rel=1e-6)
+
+
+TWIN = """
+title = "Two pistons side by side"
+[engine]
+layout = "parts"
+cycle = "four-stroke"
+stroke = "80 mm"
+rod_ratio = 0.25
+reciprocating_mass = "1 kg"
+slider_cranks = [{ x = "0 mm" }, { x = "100 mm" }, { x = "200 mm", throw = 180 }]
+[[operating_points]]
+speed = "1000 rpm"
+[objective]
+minimise = "mean shaking force"
+"""
+
+
+def test_cylinders_that_fire_at_once_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "twin.toml"
+    path.write_text(TWIN, encoding="utf-8")
+    result, text = state(load(path)), io.StringIO()
+    show(result, text)
+    assert fired_together(result) == "Cylinder 1 and cylinder 2 fire at once."
+    assert fired_together(result) in text.getvalue()
+    assert fired_together(result) in as_markdown(result, (), "laufruhe evaluate twin.toml")
+    assert fired_together(scenes.stated(scenes.GIVEN)) == ""

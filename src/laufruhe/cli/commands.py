@@ -37,6 +37,8 @@ PAGES = "Folder of the pages.  [default: results/trade]"
 PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=PAGES)]
 NO_PLOTS = "Draw no pictures; those of an earlier result are removed."
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help=NO_PLOTS)]
+SERIES = "Put the loads over the cycle into the JSON as well."
+SeriesOption = Annotated[bool, typer.Option("--series", help=SERIES)]
 GAP = "Relative gap that counts as proven, in place of the file's."
 ToleranceOption = Annotated[float | None, typer.Option("--tolerance", metavar="X", help=GAP)]
 ERROR = "Relative error of the objective that is allowed."
@@ -59,17 +61,22 @@ def solve(
     no_plots: NoPlotsOption = False,
     tolerance: ToleranceOption = None,
     time_limit: LimitOption = None,
+    series: SeriesOption = False,
 ) -> None:
     """Decide what the problem leaves open, and prove how good that is."""
     with exit_statuses(problem), in_time(time_limit):
         from laufruhe.cli.solve import Request, run, solved
 
-        run(Request("solve", problem, json, out, not no_plots, tolerance), solved)
+        run(Request("solve", problem, json, out, not no_plots, tolerance, series), solved)
 
 
 @app.command()
 def evaluate(
-    problem: ProblemArgument, json: JsonOption = None, out: OutOption = None, no_plots: NoPlotsOption = False
+    problem: ProblemArgument,
+    json: JsonOption = None,
+    out: OutOption = None,
+    no_plots: NoPlotsOption = False,
+    series: SeriesOption = False,
 ) -> None:
     """Evaluate the design as given.
 
@@ -78,7 +85,7 @@ def evaluate(
     with exit_statuses(problem):
         from laufruhe.cli.solve import Request, run, stated
 
-        run(Request("evaluate", problem, json, out, not no_plots), stated)
+        run(Request("evaluate", problem, json, out, not no_plots, series=series), stated)
 
 
 @app.command()

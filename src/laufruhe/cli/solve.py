@@ -37,11 +37,12 @@ class Request:
     out: Path | None
     pictures: bool
     tolerance: float | None = None
+    series: bool = False
 
     @property
     def command(self) -> str:
         """The line that makes the same result again."""
-        words = ["laufruhe", self.verb, str(self.problem)]
+        words = ["laufruhe", self.verb, str(self.problem), *(("--series",) if self.series else ())]
         return shlex.join(words if self.tolerance is None else [*words, "--tolerance", f"{self.tolerance:g}"])
 
 
@@ -49,7 +50,7 @@ def run(request: Request, answer: Answer) -> None:
     """Read, answer, write and show; leaves with the exit status of the result."""
     with progress() as say:
         result, folder = _written(request, answer, say)
-    _show(result, request.json == "-", folder)
+    _show(result, as_json(result, request.series) if request.json == "-" else None, folder)
     raise typer.Exit(DONE if result.status in (Status.OPTIMAL, Status.FEASIBLE) else FAILED)
 
 
@@ -107,7 +108,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         result = replace(result, timing={**result.timing, **seconds})
         files.write(stage / files.REPORT, as_markdown(result, pictures, request.command))
         for place in filter(None, (stage / files.RESULT, copy)):
-            files.write(place, as_json(result))
+            files.write(place, as_json(result, request.series))
     return result, folder
 
 
@@ -118,13 +119,13 @@ def _timed(seconds: dict[str, float], what: str) -> Iterator[None]:
     seconds[what] = time.perf_counter() - started
 
 
-def _show(result: Result, as_text: bool, folder: Path) -> None:
+def _show(result: Result, text: str | None, folder: Path) -> None:
     """Tables on the screen, or JSON there and tables beside it."""
     from laufruhe.report.screen import show
 
-    if as_text:
-        sys.stdout.write(as_json(result))
+    if text is not None:
+        sys.stdout.write(text)
         sys.stdout.flush()
-    show(result, sys.stderr if as_text else sys.stdout, folder)
+    show(result, sys.stdout if text is None else sys.stderr, folder)
     if result.status in (Status.INFEASIBLE, Status.FAILED):
         complain(f"{result.problem.name}: {result.status}: {result.message}")

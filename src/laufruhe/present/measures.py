@@ -19,9 +19,6 @@ from laufruhe.solvers.result import LimitValue, Result
 
 Array = NDArray[np.float64]
 
-# An order counts as present from this share of the largest on.
-PRESENT = 1e-3
-
 
 @dataclass(frozen=True)
 class Places:

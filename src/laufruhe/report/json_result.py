@@ -12,10 +12,10 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.torque import torque_facts
 from laufruhe.physics.wrench import WRENCH
-from laufruhe.present.measures import PRESENT, Array, is_met, limits_of, mount_orders, places_of, shaking_orders
+from laufruhe.present.measures import Array, is_met, limits_of, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.problem.channels import LoadChannel
-from laufruhe.problem.evaluation import Evaluation, measured
+from laufruhe.problem.evaluation import Evaluation, measured, over, samples_of
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
@@ -25,13 +25,13 @@ from laufruhe.solvers.result import Result, objective_of
 Record = dict[str, Any]
 
 
-def as_json(result: Result) -> str:
+def as_json(result: Result, series: bool = False) -> str:
     """Strict JSON, one line feed at its end."""
-    return strict(as_dict(result))
+    return strict(as_dict(result, series))
 
 
-def as_dict(result: Result) -> Record:
-    """The contract as plain Python values."""
+def as_dict(result: Result, series: bool = False) -> Record:
+    """The contract as plain Python values; with loads over the cycle where `series` are wanted."""
     problem = result.problem
     points = [
         {**_of(point, "name speed weight"), **_by_place(result, k), "shaking": _shaking(result.final.loads[k].wrench),
@@ -41,6 +41,9 @@ def as_dict(result: Result) -> Record:
     # one operating point stands at the top already
     places = {"mounts": None} | {places.key: None for places in places_of(result)}
     own = ("name", "speed", "weight", "torque", *((*places, "shaking") if len(points) > 1 else ()))
+    if series:
+        own += ("series",)
+        points = [{**point, "series": _series(result, k)} for k, point in enumerate(points)]
     return {
         "problem": problem.name,
         **_of(problem, "title source assumptions"),
@@ -116,7 +119,7 @@ def _places(result: Result, k: int, channel: LoadChannel) -> list[Record]:
     forces = channel.signal(result.final.loads[k])
     before, after = measured(result.initial, k, channel), measured(result.final, k, channel)
     amplitudes = mount_orders(forces)
-    kept = np.flatnonzero(np.any(amplitudes > PRESENT * amplitudes.max(initial=0.0), axis=1))
+    kept = np.flatnonzero(np.any(amplitudes != 0.0, axis=1))
     return [
         {
             "name": name,
@@ -128,10 +131,23 @@ def _places(result: Result, k: int, channel: LoadChannel) -> list[Record]:
     ]
 
 
+def _series(result: Result, k: int) -> Record:
+    """Loads of the design at the angles that it was measured at [rad], place by place, and of the wrench (C7)."""
+    final, whole = result.final, result.final.engine.cycle.angle
+    angles = whole * np.arange(final.samples) / final.samples
+    wrench = over(final.engine.cycle.base_order, [final.loads[k].wrench])[0].sample(final.samples)
+    return {
+        "angle": _plain(angles),
+        "components": list(WRENCH),
+        "shaking": _plain(wrench),
+        **{places.key: _plain(samples_of(final, k, places.channel)) for places in places_of(result)},
+    }
+
+
 def _shaking(wrench: Spectrum) -> Record:
     """Orders side by side with amplitudes, and with the complex coefficients of the wrench (C8)."""
     force, moment = shaking_orders(wrench)
-    kept = np.flatnonzero((force > PRESENT * force.max(initial=0.0)) | (moment > PRESENT * moment.max(initial=0.0)))
+    kept = np.flatnonzero((force != 0.0) | (moment != 0.0))
     whole = wrench.coefficients[kept]
     found = {"orders": wrench.orders[kept], "force": force[kept], "moment": moment[kept], "components": tuple(WRENCH),
              "real": whole.real, "imag": whole.imag}  # fmt: skip

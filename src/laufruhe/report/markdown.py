@@ -8,7 +8,7 @@ from laufruhe.present.pictures import CAPTIONS
 from laufruhe.report.grid import escaped
 from laufruhe.report.sections import tables_of
 from laufruhe.report.versions import versions
-from laufruhe.report.wording import explained, headline
+from laufruhe.report.wording import accuracy, explained, fired_together, headline
 from laufruhe.solvers.result import Result
 
 
@@ -29,6 +29,7 @@ def as_markdown(result: Result, pictures: Sequence[str], command: str) -> str:
         "Assumptions:\n\n" + _listed(problem.assumptions) if problem.assumptions else "",
         "## Result",
         escaped(headline(result)),
+        escaped(fired_together(result)),
         *(f"![{CAPTIONS[name]}]({name})\n\n*{CAPTIONS[name]}*" for name in pictures),
         *(grid.as_markdown() for grid in tables_of(result)),
         "## Proof",
@@ -51,7 +52,7 @@ def _fidelity(result: Result) -> str:
     text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
     if result.objective is None:
         return text
-    error = f"{100.0 * result.error_estimate:.1g} %"
+    error = accuracy(result)
     if f.tolerance is not None:
-        return f"{text} Chosen for an error of {f.tolerance:g}; the objective is wrong by at most {error}."
-    return f"{text} Estimated error of the objective: {error}, the change when every second step is left out."
+        return f"{text} Chosen for an error of {f.tolerance:g}; {error}."
+    return f"{text} {error[:1].upper()}{error[1:]}, of the physics that is kept."

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from laufruhe.report.grid import Grid
 from laufruhe.report.sections import tables_of
-from laufruhe.report.wording import explained, headline
+from laufruhe.report.wording import accuracy, explained, fired_together, headline
 from laufruhe.solvers.result import Result, Status
 
 PIPE_WIDTH = 110
@@ -29,6 +29,8 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
     console.print(Text(headline(result), style=_COLOURS[result.status]))
     if result.certificate is not None:
         console.print(Text(explained(result), style="dim"))
+    if together := fired_together(result):
+        console.print(Text(together))
     for grid in tables_of(result):
         console.print()
         console.print(Text(grid.title, style="bold"))
@@ -44,11 +46,7 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
 def _fidelity(result: Result) -> str:
     fidelity = result.problem.fidelity
     text = f"Fidelity: {fidelity.summary}, {result.final.samples} steps a cycle"
-    if result.objective is None:
-        return text
-    if fidelity.tolerance is not None:
-        return f"{text}; error of the objective at most {100.0 * result.error_estimate:.1g} %"
-    return f"{text}; error of the objective from sampling about {100.0 * result.error_estimate:.1g} %"
+    return text if result.objective is None else f"{text}; {accuracy(result)}"
 
 
 def _table(grid: Grid) -> Table:

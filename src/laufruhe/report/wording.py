@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 
+from laufruhe.numerics.turns import as_turn, within
 from laufruhe.present.measures import breaks_a_limit, changed
 from laufruhe.present.numbers import figure, percent, trimmed
 from laufruhe.prove.certificate import Certificate, Proof
@@ -35,6 +37,22 @@ def headline(result: Result) -> str:
         why = ", which breaks a limit," if breaks_a_limit(result.problem, result.initial) else ""
         sentence = f"{name} goes from {given}{why} to {decided}"
     return f"{sentence} ({change}), {_proven(result.certificate)}."
+
+
+def accuracy(result: Result) -> str:
+    """How far the objective may be off, in half a sentence."""
+    return f"error of the objective at most {100.0 * result.error_estimate:.1g} %"
+
+
+def fired_together(result: Result) -> str:
+    """Cylinders of the design that fire at the same angle, in a sentence; empty where each fires alone."""
+    fires: dict[float, list[str]] = defaultdict(list)
+    for part in result.final.engine.cylinders:
+        turn = within(as_turn(part.firing_angle), result.final.engine.cycle.turns)
+        fires[round(float(turn), 9)].append(part.name)
+    groups = [f"{', '.join(names[:-1])} and {names[-1]} fire at once" for names in fires.values() if len(names) > 1]
+    text = "; ".join(groups)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
 def _proven(certificate: Certificate | None) -> str:

@@ -43,7 +43,8 @@ def tables(result: Result) -> list[Grid]:
     rows = tuple((f"{j * base:g}", *row) for j, row in zip(kept, cells, strict=True))
     names = ("mount force [N]", "shaking force [N]", "moment [N m]")[0 if has_mounts(result) else 1 :]
     head = ("order", *(f"{name}{side}" for name in names for side in (("",), (" before", " after"))[len(designs) - 1]))
-    note = f"Amplitudes; the largest {SHOWN} of {len(present)} orders." if len(present) > len(kept) else ""
+    many = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(kept) else "orders"
+    note = f"Amplitudes; {many} of at least {100.0 * SHARE:g} % of the largest. result.json has every order."
     return [Grid(f"Orders at {result.problem.points[k].name}", head, rows, note=note)]
 
 
