@@ -7,10 +7,11 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from laufruhe import __version__
+import laufruhe
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.reader import load_tables, tables_of
@@ -40,6 +41,14 @@ class Point:
 
     def __str__(self) -> str:
         return ", ".join([self.case.name, *(f"{path} = {value}" for path, value in self.changes.items())])
+
+
+@cache
+def program() -> str:
+    """Version and source of this package: another one may answer otherwise."""
+    source = sorted(Path(laufruhe.__file__).parent.rglob("*.py"))
+    found = hashlib.sha256(b"".join(path.read_bytes() for path in source))
+    return f"{laufruhe.__version__} {found.hexdigest()}"
 
 
 class Scenes:
@@ -114,7 +123,7 @@ class Scenes:
         """Of everything that a point hangs on: scene, files that it names, what is asked, and this package."""
         tables = self.tables(point)
         case = point.case.model_dump(exclude={"name", "sweep"})
-        about = [settings, case, point.shafts, tables, __version__]
+        about = [settings, case, point.shafts, tables, program()]
         found = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
         gas = tables.get("gas")
         named = gas.get("file") if isinstance(gas, dict) else None
