@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from laufruhe import load, solve
+from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers import Status
@@ -117,3 +118,11 @@ def test_a_design_worse_than_the_one_given_is_not_proposed() -> None:
     assert result.objective.value == value
     assert result.certificate.kind is Proof.WITHIN_GAP
     assert result.certificate.gap == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("what", [what for what in OPEN if what != "nothing"])
+def test_nothing_minimised_is_refused(what: str, tmp_path: Path) -> None:
+    """Whatever is open, in one line."""
+    problem = loaded(tmp_path, BLOCK.format(sag="5 mm", force="5000 N", **OPEN[what]))
+    with pytest.raises(ModelError, match="open and nothing is minimised"):
+        solve(problem.changed(objective=(), limits=()))

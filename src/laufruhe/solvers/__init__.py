@@ -191,8 +191,8 @@ def _decided(problem: Problem, say: Say) -> Result:
         if not broken_limits(problem.limits, given.evaluation):
             shown = Shown(given.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
             return concluded(given, given.evaluation, shown, {})
-    if problem.decisions and not problem.objective and Kind.STAR not in kinds:
-        raise ModelError(f"{len(problem.decisions)} number(s) are open and nothing is minimised; add an objective")
+    if kinds and not problem.objective:
+        raise ModelError(f"{_named(kinds)} is open and nothing is minimised; add [objective] or [mounts]")
     method = next((m for m in METHODS if kinds <= m.decides and m.suits(problem)), None)
     if method is None:
         asked = ", ".join(dict.fromkeys(measure.name for measure in problem.measures))

@@ -17,7 +17,7 @@ import cvxpy as cp
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import SolverError
+from laufruhe.errors import ModelError
 from laufruhe.load_models.star_model import StarNorm, StarProblem
 from laufruhe.numerics.budget import left
 from laufruhe.numerics.norms import Cones
@@ -78,14 +78,9 @@ def solve_program(
         Optional ones, and the limits on their number and mass.
     time_limit
         [s].
-
-    Raises
-    ------
-    SolverError
-        If SCIP stops without a feasible point for another reason than that there is none.
     """
     if any(norm.turns is not None for _, norm in (*problem.terms, *problem.limits)):
-        raise SolverError("unbalances that are counted from a throw make the program bilinear")
+        raise ModelError("unbalances that are counted from a throw make the program bilinear")
     steps = cp.Variable((space.throws, space.phases), boolean=True)
     size = sum(domain.width for domain in problem.domains)
     scales = np.concatenate([np.full(d.width, d.scale) for d in problem.domains]) if size else np.zeros(0)
@@ -119,8 +114,8 @@ def _answer(program: Any, steps: Any, built: Any, unit: float, choosing: bool, t
         seconds = min(time_limit, max(left(), 1.0))
         try:
             program.solve(solver=cp.SCIP, scip_params={"limits/time": seconds, "limits/gap": 1e-7})
-        except cp.error.SolverError as error:
-            raise SolverError(f"SCIP found no feasible point in {time_limit:g} s ({error})") from None
+        except cp.error.SolverError:
+            return ProgramFound(None, (), 0.0, "no feasible point", seconds)
     stats = program.solver_stats
     model = stats.extra_stats["model"]
     status = str(stats.extra_stats["scip_status"])
@@ -128,7 +123,7 @@ def _answer(program: Any, steps: Any, built: Any, unit: float, choosing: bool, t
     if status == "infeasible":
         return ProgramFound(None, (), float("inf"), status, seconds)
     if steps.value is None:
-        raise SolverError(f"SCIP stopped with status '{status}' and no feasible point")
+        return ProgramFound(None, (), 0.0, status, seconds)
     star = tuple(int(p) for p in np.argmax(np.asarray(steps.value), axis=1))
     chosen = tuple(k for k, on in enumerate(built.value) if on > 0.5) if choosing else ()
     bound = max(0.0, (float(model.getDualbound()) - TRUST) * unit)

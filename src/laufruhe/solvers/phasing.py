@@ -39,8 +39,6 @@ def solve_phasing(problem: Problem) -> Result:
     phasing = problem.phasing
     if phasing is None:
         raise SolverError("nothing of the phasing is open")
-    if not problem.objective:
-        raise SolverError("nothing is to be minimised; add [objective] or [mounts]")
     started = time.perf_counter()
     if phasing.throws is not None:
         result = _of_fixed_throws(problem, phasing)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from laufruhe.errors import SolverError
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.nothing import nothing_of
@@ -139,12 +138,15 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         samples = model.samples if exact else PROGRAM_SAMPLES
         owners = owners_of(model)
         program = solve_program(model.at(samples), space, owners, phasing.shafts, phasing.time_limit)
-        if program.star is None:
-            answers.append(Answer((), math.inf, program.status == "infeasible", 0, "SCIP"))
+        if program.status == "infeasible":
+            answers.append(Answer((), math.inf, True, 0, "SCIP"))
             continue
-        again = solve_design(model, program.star, program.built, owners, problem.tolerance, nothing)
+        # a program that has none yet leaves the first star, whose bound is worth as much
+        star = family.first if program.star is None else program.star
+        again = solve_design(model, star, program.built, owners, problem.tolerance, nothing)
         if again is None:
-            raise SolverError("the design that SCIP returned breaks a limit between the angles it was solved at")
+            answers.append(Answer((), 0.0, False, 1, "SCIP"))
+            continue
         found, cut = again
         bound = max(program.bound if exact else 0.0, cut.least(space))
         done = program.status == "optimal" and gap_of(found.value, bound, nothing) <= 2.0 * problem.tolerance
