@@ -173,7 +173,7 @@ def _throws_open(bounded: bool) -> LeaveOpen:
         throws = engine.get("throws", [0.0])
         banks = 2 if engine["layout"] in ("vee", "boxer") else 1
         document["phasing"] = {"best": 3}
-        if bounded:
+        if bounded and len(throws) > 1:
             document["phasing"]["intervals"] = {"largest_deviation": "180 deg"}
         else:
             engine["cylinders"] = banks * len(throws)
@@ -290,6 +290,9 @@ def document_of(cell: Cell) -> Document:
     DECISIONS[cell.decision](document, rng)
     if cell.decision in OF_MOUNTS and cell.decision != "stiffness" and rng.random() < 0.3:
         DECISIONS["shaft and phase"](document, rng)
+    if "main-bearing" in cell.measure:
+        places = (226, 126, 26, -74, -174)
+        document["main_bearings"] = [{"x": f"{x} mm", "diameter": "70 mm", "width": "30 mm"} for x in places]
     document["objective"] = {"minimise": cell.measure, **_narrowed(cell.measure, document, rng)}
     if rng.random() < 0.4:
         _add_limit(document, rng)
@@ -354,6 +357,8 @@ def _add_limit(document: Document, rng: Generator) -> None:
         usual += [("mean mount force", (100, 3000), "N", "max"), ("maximum mount force", (200, 8000), "N", "max")]
     if elastic:
         usual += [("static sag", (1e-3, 4e-3), "m", "max"), ("natural frequencies", (3, 9), "Hz", "min")]
+    if "balancer_shafts" in document:
+        usual.append(("shaft distance", (0.03, 0.2), "m", "min"))
     name, (low, high), unit, side = usual[int(rng.integers(len(usual)))]
     value = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     document["constraints"] = [{"limit": name, side: f"{value:.6g} {unit}"}]

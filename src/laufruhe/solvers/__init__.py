@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.problem.decision import Kind
+from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
@@ -179,18 +180,21 @@ def _decided(problem: Problem, say: Say) -> Result:
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
     kinds = kinds_of(problem)
     fixed = [limit for limit in problem.limits if not limit.measure.channel.is_moved_by(kinds)]
-    broken = broken_limits(fixed, evaluate_start(problem)) if fixed else ()
-    if broken:
-        return none_within(problem, evaluate_start(problem), broken, {})
     if fixed:
+        given = evaluate_start(problem)
+        # what cannot be evaluated is refused first
+        objective_value(problem, given)
+        broken = broken_limits(fixed, given)
+        if broken:
+            return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
         return with_limits(_decided(problem.changed(limits=moved), say), problem.limits)
     moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)
     if problem.objective and kinds and not moving and problem.phasing is None:
-        given = judged(problem, problem.start)
-        if not broken_limits(problem.limits, given.evaluation):
-            shown = Shown(given.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
-            return concluded(given, given.evaluation, shown, {})
+        design = judged(problem, problem.start)
+        if design.excess <= KEPT:
+            shown = Shown(design.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
+            return concluded(design, design.evaluation, shown, {})
     if kinds and not problem.objective:
         raise ModelError(f"{_named(kinds)} is open and nothing is minimised; add [objective] or [mounts]")
     method = next((m for m in METHODS if kinds <= m.decides and m.suits(problem)), None)
