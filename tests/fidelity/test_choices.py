@@ -134,7 +134,8 @@ NAMES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NU
 
 def test_automatic_finds_what_is_not_there() -> None:
     text = "\n".join(part.what for part in choose(load(PROBLEMS / "tractor-six.toml"), 1e-2).left_out)
-    assert "Fx, Fy" in text
+    # an open shaft may drive what nothing drives now
+    assert "loads Fx\n" in text
     assert "2, 2.5" in text
     assert "1 of 2 parts of the cycle" in text
 

@@ -23,7 +23,7 @@ COUNT = 12
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
 def test_designs_agree_with_evaluations(path: Path) -> None:
-    problem = replace(load(path).balance, fidelity=Fidelity(samples=720))
+    problem = replace(load(path).balance, fidelity=Fidelity(samples=720), phasing=None)
     values = random_decisions(problem, COUNT)
     single = [objective_value(problem, evaluate(problem, problem.design(list(v)))) for v in values]
     for prune in (True, False):
@@ -113,3 +113,13 @@ def test_rod_ratios_do_not_go_with_gas() -> None:
     family = EngineFamily(problem.engine, problem.objective[0].measure, Fidelity(samples=360), problem.points[0].gas)
     with pytest.raises(ModelError, match="rod ratios"):
         family.values(EngineArrays(np.ones(2), rod_ratio=np.array([0.2, 0.3])))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("vee-six-open", "throws or firing order"), ("tractor-four-shaft-heights", "fix shaft")],
+)
+def test_what_is_no_unbalance_is_refused(name: str, said: str) -> None:
+    with pytest.raises(ModelError, match="differ in unbalances alone") as refused:
+        prepare(load(PROBLEMS / f"{name}.toml"))
+    assert said.removeprefix("fix shaft") in str(refused.value)

@@ -38,7 +38,9 @@ def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
     whole = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
     times = []
     for fidelity, prune in ((choice.fidelity, True), (whole, False)):
-        designs = prepare(replace(problem, fidelity=fidelity), prune)
+        # the rest as given: what it costs to evaluate does not change with it
+        fixed = replace(problem, fidelity=fidelity, decisions=problem.unbalances, phasing=None)
+        designs = prepare(fixed, prune)
         start = np.zeros((1, 1 + designs.columns))
         times.append(1e3 * seconds(lambda d=designs, x=start: d.of_columns(x)))  # type: ignore[misc]
     return times[0], times[1]

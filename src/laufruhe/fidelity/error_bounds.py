@@ -18,7 +18,7 @@ from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.shaking_loads import rotor_wrench
+from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, Term
@@ -128,9 +128,9 @@ class Scale:
 
     @property
     def driving(self) -> list[Spectrum]:
-        """What loads the block, and what is asked of the inside of the crankcase, at every operating point."""
+        """What loads the block or may, and what is asked of the inside of the crankcase, at every operating point."""
         inside = [s for term in self.terms if term.measure.is_inside for s in signals(term.measure, self.best)]
-        return [*(loads.wrench for loads in self.best.loads), *inside]
+        return [*(loads.wrench for loads in self.best.loads), *self.decided, *inside]
 
     @property
     def open_rotors(self) -> set[str]:
@@ -144,18 +144,19 @@ class Scale:
         return None if self.best.engine.block is None else mounting_in(self.best.engine)
 
     @cached_property
-    def decided_modes(self) -> set[int]:
-        """Modes that an open rotor drives, 1 the lowest: what is small now may not stay so."""
+    def decided(self) -> list[Spectrum]:
+        """Wrenches that open rotors may make: what is none now may not stay so."""
         rotors = [replace(r, unbalance=1.0) for r in self.problem.engine.rotors if r.name in self.open_rotors]
         by_name = {rotor.name: rotor for rotor in rotors}
         for drive in (drive for decision in self.problem.decisions for drive in decision.place_drives):
             rotor = by_name[drive.rotor]
             rotors.append(rotor.placed(*(at + (k == drive.axis) for k, at in enumerate(rotor.place))))
-        if self.mounting is None or not rotors:
-            return set()
-        wrenches = np.array([rotor_wrench(rotor, 1.0) for rotor in rotors])
-        driven = self.mounting.excited(Spectrum(self.problem.engine.cycle.base_order, wrenches))
-        return {mode + 1 for mode in driven}
+        return [rotor_loads([rotor], 1.0, self.problem.engine.cycle) for rotor in rotors]
+
+    @cached_property
+    def decided_modes(self) -> set[int]:
+        """Modes that an open rotor drives, 1 the lowest: what is small now may not stay so."""
+        return {mode + 1 for load in self.decided for mode in self.mounting.excited(load)} if self.mounting else set()
 
     @cached_property
     def excited_modes(self) -> tuple[int, ...]:

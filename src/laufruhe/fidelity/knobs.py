@@ -137,7 +137,7 @@ class _Orders(Knob):
         return first_enough(fidelity, self.key, (*ORDERS, None), lambda f: scale.loses(f) <= PHYSICS_SHARE * room)
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
-        wrenches = [loads.wrench for loads in scale.best.loads]
+        wrenches = [*(loads.wrench for loads in scale.best.loads), *scale.decided]
         found = []
         idle = [name for k, name in enumerate(WRENCH) if not any(w.coefficients[:, k].any() for w in wrenches)]
         if idle:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.numerics.batch_norms import CACHE_BYTES, BatchNorm
 from laufruhe.numerics.norms import Grid
@@ -59,7 +60,16 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
     """Everything that does not depend on the decisions, once.
 
     What `prune` leaves out, what repeats within the cycle and what nothing drives, changes nothing but the time.
+
+    Raises
+    ------
+    ModelError
+        If anything but unbalances is open: loads are linear in these alone.
     """
+    others = [d.name for d in problem.decisions if not d.is_affine]
+    others += ["throws or firing order"] if problem.phasing is not None else []
+    if others:
+        raise ModelError(f"many designs at once differ in unbalances alone; fix {', '.join(others)}")
     model = AffineModel(problem, whole_cycle=not prune)
     affine = model.at(model.full_samples if prune else problem.fidelity.samples)
     return Designs(problem, model, tuple((weight, _batched(norm, prune)) for weight, norm in affine.terms))

@@ -159,30 +159,42 @@ def periodic_state(
     loaded = np.any(wrench.coefficients != 0.0, axis=1)
     loads, orders = wrench.coefficients[loaded] @ model.load.T, wrench.orders[loaded]
 
-    def rates(t: float, state: Array, columns: int) -> Array:
-        y, rate = state.reshape(12, columns)[:6], state.reshape(12, columns)[6:]
-        load = (np.exp(1j * orders * speed * t) @ loads).real[:, None]
-        return np.concatenate([rate, model.accelerations(y, rate, load)]).reshape(-1)
-
+    rates = _rates(model, lambda t: (np.exp(1j * orders * speed * t) @ loads).real)
     # what an even star cancels leaves a shorter period, which closes faster and farther from any resonance
     shortest = period / (math.gcd(*np.flatnonzero(loaded).tolist()) or 1)
 
-    def run(start: Array, until: float, times: Array | None = None) -> Array:
-        columns = start.shape[1]
-        scale = float(np.abs(start).max(initial=0.0)) or 1e-6
-        found = solve_ivp(
-            rates, (0.0, until), start.reshape(-1), "DOP853", t_eval=times, args=(columns,), rtol=tolerance,
-            atol=tolerance * min(scale, 1e-3), max_step=until / 64,
-        )  # fmt: skip
-        return np.asarray(found.y if times is not None else found.y[:, -1].reshape(12, columns))
+    def ends(first: Array) -> Array:
+        return _integrated(rates, first, shortest, tolerance)[:, -1].reshape(12, -1)
 
-    start = _shot(lambda first: run(first, shortest), _static_size(model, loads), tolerance, model.has_stops)
+    start = _shot(ends, _static_size(model, loads), tolerance, model.has_stops)
     times = np.arange(samples + 1) * (period / samples)
-    states = run(start[:, None], period, np.minimum(times, period))
+    states = _integrated(rates, start, period, tolerance, np.minimum(times, period))
     y, rate = states[:6, :-1], states[6:, :-1]
     mismatch = float(np.abs(states[:, -1] - start).max() / max(np.abs(states).max(), 1e-300))
     travels = (model.travels @ y).T.reshape(samples, -1, 3)
     return SteadyState(np.asarray(times[:-1] * speed, dtype=float), model.mount_forces(y, rate), travels, mismatch)
+
+
+def _rates(model: TimeModel, load: Callable[[float], Array]) -> Callable[[float, Array], Array]:
+    """Right side of E25 in columns (y, y'), under a load (6,) that time tells."""
+
+    def rates(t: float, state: Array) -> Array:
+        y, rate = state.reshape(2, 6, -1)
+        return np.concatenate([rate, model.accelerations(y, rate, load(t)[:, None])]).reshape(-1)
+
+    return rates
+
+
+def _integrated(
+    rates: Callable[[float, Array], Array], start: Array, until: float, tolerance: float, times: Array | None = None
+) -> Array:
+    """States from a start on, those of several columns one below the other."""
+    scale = float(np.abs(start).max(initial=0.0)) or 1e-6
+    found = solve_ivp(
+        rates, (0.0, until), start.reshape(-1), "DOP853", t_eval=times, rtol=tolerance,
+        atol=tolerance * min(scale, 1e-3), max_step=until / 64,
+    )  # fmt: skip
+    return np.asarray(found.y)
 
 
 def _shot(run: Callable[[Array], Array], size: float, tolerance: float, has_stops: bool) -> Array:
@@ -264,42 +276,31 @@ def run_through(
     """
     if not duration > 0.0 or first < 0.0 or last < 0.0:
         raise ModelError("a run-up needs a duration and speeds that are not negative")
-    model = time_model(mounting)
-    gain = (last - first) / duration
-    bases = [(inertia.orders, inertia.coefficients @ model.load.T)]
-    if gas is not None:
-        bases.append((gas.orders, gas.coefficients @ model.load.T))
-
-    rates = _run_rates(model, bases, first, gain)
-    fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in bases))
+    model, gain = time_model(mounting), (last - first) / duration
+    loads = [(part.orders, part.coefficients @ model.load.T) for part in (inertia, gas) if part is not None]
+    rates = _rates(model, _sweeping(loads, first, gain))
+    fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in loads))
     state, edges = np.zeros(12), np.linspace(0.0, duration, stretches + 1)
     force, travel = np.zeros(stretches), np.zeros(stretches)
-    scale = _static_size(model, bases[0][1] * max(first, last) ** 2)
+    least = 1e-3 * tolerance * _static_size(model, loads[0][1] * max(first, last) ** 2)
     count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
     for k, (start, end) in enumerate(pairwise(edges)):
         times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
-        found = solve_ivp(
-            rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=1e-3 * tolerance * scale
-        )
-        y, rate = found.y[:6], found.y[6:]
-        force[k] = np.linalg.norm(model.mount_forces(y, rate), axis=-1).max()
-        travel[k] = np.linalg.norm((model.travels @ y).T.reshape(len(times), -1, 3), axis=-1).max()
-        state = found.y[:, -1]
+        states = solve_ivp(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least).y
+        force[k] = np.linalg.norm(model.mount_forces(states[:6], states[6:]), axis=-1).max()
+        travel[k] = np.linalg.norm((model.travels @ states[:6]).T.reshape(len(times), -1, 3), axis=-1).max()
+        state = states[:, -1]
     return RunUp(first + gain * edges[1:], force, travel)
 
 
-def _run_rates(
-    model: TimeModel, bases: Sequence[tuple[Array, NDArray[np.complex128]]], first: float, gain: float
-) -> Callable[[float, Array], Array]:
-    """Right side of E25 in (y, y') at a crank speed that grows by `gain`; of the loads the first is inertia (E28)."""
+def _sweeping(
+    loads: Sequence[tuple[Array, NDArray[np.complex128]]], first: float, gain: float
+) -> Callable[[float], Array]:
+    """Loads at a crank speed that grows by `gain`; the first is inertia, which grows with its square (E28)."""
 
     def load(t: float) -> Array:
         speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
-        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in bases]
-        return np.asarray(sum(parts[1:], speed * speed * parts[0]))[:, None]
+        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in loads]
+        return np.asarray(sum(parts[1:], speed * speed * parts[0]))
 
-    def rates(t: float, state: Array) -> Array:
-        y, rate = state[:6, None], state[6:, None]
-        return np.concatenate([rate[:, 0], model.accelerations(y, rate, load(t))[:, 0]])
-
-    return rates
+    return load
