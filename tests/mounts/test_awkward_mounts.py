@@ -221,3 +221,14 @@ def test_what_nothing_open_changes_is_proven(objective: str, opened: str, tmp_pa
     rest = "[search]\nstarts = 4\n" if opened == "stiffness" else STILL
     result = solve(problem_of(tmp_path, *parts, f"[objective]\n{objective}\n", rest))
     assert result.status == "optimal"
+
+
+def test_signals_of_operating_points_have_as_many_rows_each(tmp_path: Path) -> None:
+    """A point with gas repeats after two turns, one without after a half of one."""
+    engine = ENGINE.replace('stroke = "120 mm"', 'stroke = "120 mm"\nbore = "90 mm"') + "gas = false\n"
+    points = engine + '[[operating_points]]\nname = "loaded"\nspeed = "900 rpm"\n'
+    points += '[gas]\nmodel = "seiliger"\npeak_pressure = "50 bar"\nimep = "4 bar"\n'
+    asked = '[objective]\nminimise = "peak to peak mount travel"\n[search]\nstarts = 1\nboxes = 0\n'
+    result = solve(problem_of(tmp_path, points, BLOCK, MOUNTS, asked))
+    assert result.objective is not None
+    assert result.objective.value <= result.objective.initial

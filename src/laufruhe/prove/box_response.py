@@ -12,6 +12,7 @@ travel of the mounts are linear in x times y, so they are known up to the second
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import weight_wrench
-from laufruhe.physics.mount_numbers import total_stiffness
+from laufruhe.physics.mount_numbers import torque_roll_rows, total_stiffness
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, mounting_in
@@ -105,15 +106,6 @@ class Answer:
 
 
 @dataclass(frozen=True, eq=False)
-class Under:
-    """value + slopes . s - rest is nowhere above a quantity, s from -1 to 1 in each (E38)."""
-
-    value: Array
-    slopes: Array
-    rest: Array
-
-
-@dataclass(frozen=True, eq=False)
 class _Parts:
     """Matrices of a mounting in coordinates in which the mass is one."""
 
@@ -137,7 +129,7 @@ class BoxModel:
     """
 
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
-        self.problem, self._evaluation = problem, evaluation
+        self.problem, self.evaluation = problem, evaluation
         decisions = problem.mount_decisions
         self.lower, self.upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
         base = self.mounting(self.lower)
@@ -175,7 +167,7 @@ class BoxModel:
         """Every order with a load; of a quantity, those that it counts."""
         moved = self._root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
         found: list[tuple[int, int, float, float, ComplexArray]] = []
-        for p, loads in enumerate(self._evaluation.loads):
+        for p, loads in enumerate(self.evaluation.loads):
             size = np.abs(loads.wrench.coefficients).max(axis=1, initial=0.0)
             for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
                 order = float(loads.wrench.orders[k])
@@ -193,11 +185,11 @@ class BoxModel:
     def samples_fully(self, lines: Lines) -> bool:
         """Whether each of these orders has more than two samples, over a period that is that of the loads."""
         base = self.problem.engine.cycle.base_order
-        steps = [loads.wrench.base / base for loads in self._evaluation.loads]
+        steps = [loads.wrench.base / base for loads in self.evaluation.loads]
         if any(step.denominator != 1 for step in steps):
             return False
         places = lines.places * np.array([int(step) for step in steps])[lines.points]
-        return bool(2 * places.max(initial=0) < self._evaluation.samples)
+        return bool(2 * places.max(initial=0) < self.evaluation.samples)
 
     def counted(self, names: tuple[str, ...] | None) -> list[int]:
         """Operating points of these names; all when None."""
@@ -214,6 +206,34 @@ class BoxModel:
         held = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
         settled = np.linalg.solve(np.where(held[:, None, None], matrices, np.eye(6)), pull)
         return np.where(held, settled @ pull / -weight[2], math.inf)
+
+    def torque_roll(self, frequency: float, lower: Array, upper: Array) -> Array:
+        """Least residual over boxes, shape (boxes,): its rows are linear in x (E14, E19)."""
+        along, _ = torque_roll_rows(self.mounting(self.lower))
+        square = (math.tau * frequency) ** 2
+        rows = self.stiffness(0.5 * (lower + upper)) @ along / square - along
+        size = np.linalg.norm(rows, axis=1)
+        unit = rows / np.where(size > 0.0, size, 1.0)[:, None]
+        bent = np.abs(unit @ (self._slopes["stiffness"] @ along / square).T)
+        return np.asarray(np.maximum(size - np.sum(bent * 0.5 * (upper - lower), axis=1), 0.0))
+
+    def share(self, motions: Sequence[int], lower: Array, upper: Array) -> Array:
+        """What the least share of these motions in a mode of their own is not over in boxes, shape (boxes,) (E7).
+
+        A box turns a mode by no more than the change of A over its distance from the others (Davis and Kahan).
+        """
+        squares, modes = np.linalg.eigh(self.stiffness(0.5 * (lower + upper)))
+        change = 0.5 * (upper - lower) @ np.linalg.norm(self._slopes["stiffness"], ord=2, axis=(1, 2))
+        apart = np.abs(squares[:, :, None] - squares[:, None, :]) + np.where(np.eye(6) > 0.0, np.inf, 0.0)
+        room = np.maximum(apart.min(axis=2) - 2.0 * change[:, None], 0.0)
+        turned = np.where(room > 0.0, change[:, None] / np.where(room > 0.0, room, 1.0), 1.0)
+        found = np.full(len(lower), np.inf)
+        for motion in motions:
+            shape, momentum = self._root[:, motion], np.linalg.inv(self._root)[motion]
+            shares = (shape @ modes) * (momentum @ modes)
+            size = np.linalg.norm(shape) * np.linalg.norm(momentum)
+            found = np.minimum(found, (shares + 2.0 * size * np.minimum(turned, 1.0)).max(axis=1))
+        return found
 
     def total_stiffness(self, x: Array) -> Array:
         """Sum over mounts and axes at many designs, shape (boxes,) [N/m]."""
@@ -279,74 +299,6 @@ class BoxModel:
         top = self._parts(self.mounting(self.upper))
         still = float(np.linalg.norm(top.springs + 1j * top.losses))
         return np.asarray(motion * (still + lines.omegas * float(np.linalg.norm(top.dampers))))
-
-    def under(self, quantity: Measure, lines: Lines, at: Expansion) -> Under:
-        """A linear function under a mean, maximum or root mean square of forces or travel, for every box (E38)."""
-        names = [mount.name for mount in self.problem.engine.mounts]
-        chosen = quantity.places(names)
-        rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
-        factors = np.tile(np.array(quantity.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
-        answer = self.answer(lines, at, quantity.channel, rows, factors)
-        counted = self.counted(quantity.points)
-        whole = sum(self.problem.points[k].weight for k in counted)
-        share = np.array([point.weight for point in self.problem.points]) / whole
-        weights = share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen)
-        norm = quantity.norm
-        if norm.is_euclidean:
-            return root_under(answer, weights)
-        found = [self._sampled(quantity, answer, lines, p, len(chosen)) for p in counted if np.any(lines.points == p)]
-        if not found or not norm.of_row_lengths:
-            nothing = np.zeros(len(at.centres))
-            return Under(nothing, np.zeros_like(at.centres), nothing)
-        if not norm.sums_lengths:
-            best = np.argmax([each.value for each in found], axis=0)
-            pick = np.arange(len(best))
-            value, slopes, rest = (np.array([getattr(e, part) for e in found]) for part in ("value", "slopes", "rest"))
-            return Under(value[best, pick], slopes[best, pick], rest[best, pick])
-        points = [p for p in counted if np.any(lines.points == p)]
-        value, slopes = (
-            sum(share[p] * getattr(each, part) for p, each in zip(points, found, strict=True))
-            for part in ("value", "slopes")
-        )
-        rest = np.sqrt(np.einsum("k,bk->b", weights, answer.rest**2))
-        return Under(np.asarray(value), np.asarray(slopes), rest)
-
-    def _sampled(self, quantity: Measure, answer: Answer, lines: Lines, p: int, mounts: int) -> Under:
-        """Mean or maximum over the samples of one period at one operating point."""
-        own = np.flatnonzero(lines.points == p)
-        wrench = self._evaluation.loads[p].wrench
-        step = wrench.base / self.problem.engine.cycle.base_order
-        places = lines.places[own] * int(step)
-        samples = self._evaluation.samples
-        apart = int(np.gcd.reduce(places)) or 1
-        apart = apart if samples % apart == 0 else 1
-        places, samples = places // apart, samples // apart
-        value, slopes, rest = answer.value[:, own], answer.slopes[:, own], answer.rest[:, own]
-        # orders beyond half the samples fold: a phase a sample and order takes them all alike
-        turns = np.exp(2j * math.pi / samples * (np.outer(np.arange(samples), places) % samples))
-        rows = np.einsum("tk,bkr->btr", turns, value).real.reshape(len(value), samples, mounts, 3)
-        size = np.linalg.norm(rows, axis=-1)
-        along = rows / np.where(size > 0.0, size, 1.0)[..., None]
-        if quantity.norm.sums_lengths:
-            share = 1.0 / (samples * mounts)
-            duals = np.einsum("tk,btr->bkr", turns, along.reshape(len(value), samples, -1))
-            slope = share * np.einsum("bkr,bknr->bn", duals, slopes).real
-            return Under(share * size.sum(axis=(1, 2)), slope, rest[:, 0])
-        t, mount = np.divmod(size.reshape(len(value), -1).argmax(axis=1), mounts)
-        box = np.arange(len(value))
-        there = slopes.reshape(*slopes.shape[:3], mounts, 3)[box, :, :, mount]
-        slope = np.einsum("bk,bkna,ba->bn", turns[t], there, along[box, t, mount]).real
-        return Under(size[box, t, mount], slope, rest.sum(axis=1))
-
-
-def root_under(answer: Answer, weights: Array) -> Under:
-    """Under the root of a weighted sum of squares; orders whose series need not end count as nothing."""
-    known = np.isfinite(answer.rest)
-    value = np.where(known[..., None], answer.value, 0.0)
-    size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
-    slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), answer.slopes).real
-    rest = np.sqrt(np.einsum("k,bk->b", weights, np.where(known, answer.rest, 0.0) ** 2))
-    return Under(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest)
 
 
 def _both_ways(second: ComplexArray) -> ComplexArray:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,12 @@ from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
+from laufruhe.problem.channels import Channel, motion_indices
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.box_response import BoxModel, Expansion, Lines, Under, root_under
+from laufruhe.prove.box_norms import Under, root_under, under
+from laufruhe.prove.box_response import BoxModel, Expansion, Lines
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -61,10 +64,9 @@ class Divided:
 
 
 def divides(problem: Problem) -> bool:
-    """Whether stiffness alone is open, and some of the objective is known over boxes."""
+    """Whether stiffness alone is open, and more of it is never less of a mount's own."""
     stiffness = all(d.is_stiffness and all(drive.gain > 0.0 for drive in d.mount_drives) for d in problem.decisions)
-    known = any(term.measure.on_mounts or _is_ratio(term.measure) for term in problem.objective)
-    return bool(problem.decisions) and stiffness and known
+    return bool(problem.decisions) and stiffness
 
 
 def divided_bound(problem: Problem, value: float, room: float) -> Divided:
@@ -163,9 +165,9 @@ class _Search:
         total, slopes, pull = np.zeros(len(lower)), np.zeros_like(lower), np.zeros_like(lower)
         for weight, quantity, lines, left_out in self._terms:
             at = self.model.expanded(lines, lower, upper)
-            under = self.model.under(quantity, lines, at)
-            total += weight * (under.value - under.rest - left_out)
-            slopes += weight * under.slopes
+            least = under(self.model, quantity, lines, at)
+            total += weight * (least.value - least.rest - left_out)
+            slopes += weight * least.slopes
             pull = np.maximum(pull, _pull(at))
         found = self._constant + _known(total - np.abs(slopes).sum(axis=1))
         for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
@@ -173,7 +175,7 @@ class _Search:
                 ratio, pulled = self._ratio(asked, lower, upper)
                 found, pull = np.asarray(found + weight * ratio), np.maximum(pull, pulled)
             else:
-                found = np.asarray(found + weight * _least(self.model, asked, lower, upper))
+                found = np.asarray(found + weight * RANGES[asked.channel](self.model, asked, lower, upper)[0])
         found = np.where(self._cannot(lower, upper), np.inf, found)
         return found, np.argmax(np.nan_to_num(pull) + 1e-12 * (upper - lower) / upper.max(), axis=1)
 
@@ -182,8 +184,8 @@ class _Search:
         out = np.zeros(len(lower), dtype=bool)
         for maximum, quantity, lines, left_out in self._limits:
             at = self.model.expanded(lines, lower, upper)
-            under = self.model.under(quantity, lines, at)
-            out |= _known(under.value - under.rest - left_out - np.abs(under.slopes).sum(axis=1)) > maximum
+            least = under(self.model, quantity, lines, at)
+            out |= _known(least.value - least.rest - left_out - np.abs(least.slopes).sum(axis=1)) > maximum
         for limit in self.problem.mount_limits:
             if _is_ratio(limit.measure):
                 out |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
@@ -203,16 +205,16 @@ class _Search:
         lines = self._ratio_lines(quantity)
         rows = np.arange(3 * len(self.problem.engine.mounts), dtype=np.intp)
         at, still = (self.model.expanded(each, lower, upper) for each in (lines, lines.still()))
-        over, under = (
+        over, firm = (
             self.model.answer(each, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
             for each, expansion in ((lines, at), (lines.still(), still))
         )
         best = np.zeros(len(lower))
         for group in _groups(quantity, lines):
             weights = group.astype(float)
-            top, bottom = root_under(over, weights), root_under(under, weights)
-            bent = np.einsum("k,bk->b", weights, np.linalg.norm(under.slopes, axis=-1).sum(axis=-1) ** 2)
-            known = np.all(np.isfinite(under.rest[:, group]), axis=1) & (bottom.value > 0.0)
+            top, bottom = root_under(over, weights), root_under(firm, weights)
+            bent = np.einsum("k,bk->b", weights, np.linalg.norm(firm.slopes, axis=-1).sum(axis=-1) ** 2)
+            known = np.all(np.isfinite(firm.rest[:, group]), axis=1) & (bottom.value > 0.0)
             bend = bent / (2.0 * np.where(known, bottom.value, 1.0))
             least = _least_ratio(top, Under(bottom.value, bottom.slopes, bottom.rest + bend))
             best = np.maximum(best, np.where(known, least, 0.0))
@@ -256,7 +258,8 @@ def _felt(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, flo
     kept = np.ones(len(felt), dtype=bool)
     out = order[together <= budget]
     kept[out] = False
-    return lines.kept(kept), float(felt[out].sum())
+    # a peak to peak is twice a largest length at most
+    return lines.kept(kept), (1.0 if quantity.norm.of_row_lengths else 2.0) * float(felt[out].sum())
 
 
 def _pull(at: Expansion) -> Array:
@@ -269,28 +272,33 @@ def _known(bound: Array) -> Array:
     return np.maximum(np.where(np.isfinite(bound), bound, 0.0), 0.0)
 
 
-def _least(model: BoxModel, quantity: Measure, lower: Array, upper: Array) -> Array:
-    """Least sag or total stiffness on every box: at its stiffest or softest corner; zero for all else."""
-    if quantity.channel is channels.SAG:
-        return model.sag(upper)
-    if quantity.channel is channels.TOTAL_STIFFNESS:
-        return model.total_stiffness(lower)
-    return np.zeros(len(lower))
+def _frequencies(model: BoxModel, x: Array) -> Array:
+    """Natural frequencies at designs, shape (boxes, 6) [Hz]."""
+    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(model.stiffness(x)), 0.0)) / math.tau)
+
+
+Ranges: TypeAlias = Callable[[BoxModel, Measure, Array, Array], tuple[Array | float, Array | float]]
+RANGES: Mapping[Channel, Ranges] = {
+    channels.SAG: lambda model, _, lower, upper: (model.sag(upper), model.sag(lower)),
+    channels.TOTAL_STIFFNESS: lambda model, _, lower, upper: (
+        model.total_stiffness(lower), model.total_stiffness(upper)
+    ),
+    channels.TORQUE_ROLL: lambda model, m, lower, upper: (model.torque_roll(m.frequency, lower, upper), math.inf),
+    channels.DECOUPLING: lambda model, m, lower, upper: (-math.inf, model.share(motion_indices(m), lower, upper)),
+    channels.FREQUENCIES: lambda model, _, lower, upper: (
+        _frequencies(model, lower)[:, -1], _frequencies(model, upper)[:, 0]
+    ),
+}  # fmt: skip
+"""Of a number of the mounts on boxes, what it is not under and what it is not over: more stiffness lowers sag
+and raises every frequency (E39). Of several numbers the last is not under the one, the first not over the other."""
 
 
 def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:
-    """Whether a limit is broken all over a box; more stiffness lowers sag and raises every frequency (E39)."""
-    least, most = limit.minimum * (1.0 - SLACK), limit.maximum * (1.0 + SLACK)
-    measure = limit.measure.channel
-    if measure is channels.SAG:
-        return np.asarray((model.sag(upper) > most) | (model.sag(lower) < least))
-    if measure is channels.TOTAL_STIFFNESS:
-        return np.asarray((model.total_stiffness(lower) > most) | (model.total_stiffness(upper) < least))
-    if measure is not channels.FREQUENCIES:
-        return np.zeros(len(lower), dtype=bool)
-    low, high = (np.sqrt(np.maximum(np.linalg.eigvalsh(model.stiffness(x)), 0.0)) / math.tau for x in (lower, upper))
-    out = (high[:, 0] < least) | (low[:, -1] > most)
+    """Whether a limit is broken all over a box (E39)."""
+    least, most = RANGES[limit.measure.channel](model, limit.measure, lower, upper)
+    out = np.zeros(len(lower), dtype=bool) | (least > limit.maximum * (1.0 + SLACK))
+    out |= most < limit.minimum * (1.0 - SLACK)
     if limit.outside is not None:
         a, b = limit.outside[0] * (1.0 + SLACK), limit.outside[1] * (1.0 - SLACK)
-        out |= np.any((low > a) & (high < b), axis=1)
+        out |= np.any((_frequencies(model, lower) > a) & (_frequencies(model, upper) < b), axis=1)
     return np.asarray(out)

@@ -26,6 +26,8 @@ SLACK = 1e-5
 # share by which two designs are worth the same
 SAME = 1e-6
 MOST_MARGINS = 3
+# excess over a limit that is more than a peak between the samples
+NEAR = 0.05
 ITERATIONS = 150
 MOST_AROUND = 3
 # share of the size that a search counted in from which it is done again in a smaller one, and how often
@@ -90,6 +92,7 @@ class MountSearch:
         self.joint = SmoothProgram(problem, self._size, moves=moves)
         self._given = given_design(problem, initial) if moves is None else None
         self.best: Found | None = None
+        self._near: list[Found] = []
         self.optima: tuple[LocalOptimum, ...] = ()
 
     def run(self) -> None:
@@ -151,16 +154,20 @@ class MountSearch:
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._take(optima)
 
-    def _take(self, optima: Sequence[LocalOptimum], joint: SmoothProgram | None = None) -> None:
+    def _take(self, optima: Sequence[LocalOptimum]) -> None:
         """Judge where starts ended; whatever the solver says of an end, the exact model tells."""
-        self.optima += tuple(optima) if joint is None else ()
-        joint = self.joint if joint is None else joint
+        self.optima += tuple(optima)
         for optimum in optima:
-            design = self._judged(optimum, joint)
+            design = self._judged(optimum, self.joint)
             if design is not None:
-                found = Found(design, joint, optimum)
-                if self.best is None or found.rank < self.best.rank:
-                    self.best = found
+                found = Found(design, self.joint, optimum)
+                self._keep(found)
+                if FEASIBLE < design.excess <= NEAR:
+                    self._near.append(found)
+
+    def _keep(self, found: Found) -> None:
+        if self.best is None or found.rank < self.best.rank:
+            self.best = found
 
     def _judged(self, optimum: LocalOptimum, joint: SmoothProgram) -> Design | None:
         if not np.all(np.isfinite(optimum.x)):
@@ -178,19 +185,32 @@ class MountSearch:
         return np.clip(nudge, self.moves.lower, self.moves.upper)
 
     def _tighten(self) -> None:
-        """Again with limits a little tighter: a peak between the samples breaks its limit by a little."""
+        """Again with limits a little tighter, from ends that promise more: a peak between the samples breaks them."""
+        worth = sorted(self._near, key=lambda found: found.design.value)
+        self._near = []
+        for near in [found for k, found in enumerate(worth) if k == 0 or _is_other(found, worth[k - 1])][:MOST_AROUND]:
+            best = self.best
+            if best is None or best.design.excess > FEASIBLE or near.design.value < best.design.value:
+                self._tightened(near)
+
+    def _tightened(self, near: Found) -> None:
         margin = 0.0
         for _ in in_time(range(MOST_MARGINS)):
-            best = self.best
-            if best is None or best.optimum is None or not FEASIBLE < best.design.excess <= 0.05:
+            if near.optimum is None or not FEASIBLE < near.design.excess <= NEAR:
                 break
-            margin += 1.001 * best.design.excess
+            margin += 1.001 * near.design.excess
             joint = SmoothProgram(self.problem, self._size, margin, self.moves)
-            self.best = None
-            self._take(solve_nonlinear(joint.program, [best.optimum.x], workers=1), joint)
-            if self.best is None or self.best.design.excess > best.design.excess:
-                self.best = best
+            ends = solve_nonlinear(joint.program, [near.optimum.x], workers=1)
+            design = self._judged(ends[0], joint) if ends else None
+            if design is None:
                 break
+            near = Found(design, joint, ends[0])
+            self._keep(near)
+
+
+def _is_other(found: Found, other: Found) -> bool:
+    """Whether two ends are worth different amounts."""
+    return abs(found.design.value - other.design.value) > 1e-3 * abs(other.design.value)
 
 
 def _decided(joint: SmoothProgram, x: Array) -> tuple[Array, Array]:

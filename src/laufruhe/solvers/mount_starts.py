@@ -84,18 +84,20 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
 
 
 def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, wanted: int) -> tuple[Array, float]:
-    """Points of the pool that break limits on mounts least and are worth most; a third taken as they come.
+    """Points of the pool that break limits least and are worth most; a third taken as they come.
 
     With them the least objective of the pool and of the design as given.
     """
     given = replace(initial, samples=POOL_SAMPLES, resonance="")
+    # unbalances are still to be decided, and may keep a limit on loads
+    limits = problem.mount_limits if problem.unbalances else problem.limits
     misses, values = np.full(len(pool), np.inf), np.full(len(pool), np.inf)
     for k, row in in_time(enumerate(pool)):
         try:
             design = remounted(given, problem.design(row[:count].tolist(), problem.mount_decisions))
         except ModelError:
             continue
-        misses[k] = sum(max(design.standing(limit).excess, 0.0) for limit in problem.mount_limits)
+        misses[k] = sum(max(design.standing(limit).excess, 0.0) for limit in limits)
         values[k] = objective_value(problem, design)
     known = values[np.isfinite(values)]
     middle = float(np.median(known)) if len(known) else 0.0
