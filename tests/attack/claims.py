@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from attack.families import toml
+from attack.families import moving_mass, toml
 from attack.openings import Openings
 from attack.plain_loads import number
-from attack.plain_scene import Table
+from attack.plain_scene import Table, terms_of
 from attack.rivals import Rival, best_star, convex_rival, least_broken, local_rival
 
 SAMPLED = 1e-5
 """Of how a value is read, beside the error that the result states: samples of the plain model."""
-KINKED = 5e-5
+KINKED = 1e-4
 """The same where gas acts: its kinks lie between the samples of the plain model."""
 KEPT = 3e-5
 """Share of a limit by which a design may pass it."""
@@ -149,7 +149,7 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
     vector, told = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
     scene = openings.scene(vector, told)
     value, initial = result.objective.value, result.objective.initial
-    floor = 1e-9 * (initial if np.isfinite(initial) and initial > 0.0 else 1.0)
+    floor = 1e-9 * max(initial if np.isfinite(initial) else 0.0, _size(table))
     reading = KINKED if "gas" in table else SAMPLED
     _judge_value(verdict, result, scene, value, reading, floor)
     rival = _rival(openings, vector, told, value, rng, most)
@@ -174,6 +174,14 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
         verdict.beaten = max(over, 0.0)
         if verdict.gap and rival.value < value * (1.0 - verdict.gap) * (1.0 - reading) - floor:
             verdict.wrong.append(f"gap {verdict.gap:.3g}, but a rival is better by {over:.3g}")
+
+
+def _size(table: Table) -> float:
+    """Of the loads of one piston at the highest speed, where loads are asked for [N, N m]."""
+    if not any(word in term["quantity"] for term in terms_of(table) for word in ("force", "couple", "moment")):
+        return 1e-9
+    speed = max(number(point["speed"]) for point in table["operating_points"])
+    return 0.1 * moving_mass(table["engine"]) * speed**2
 
 
 def _judge_value(verdict: Verdict, result: Any, scene: Any, value: float, reading: float, floor: float) -> None:

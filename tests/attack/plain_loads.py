@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -17,7 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-SAMPLES = 4096
+# more of them resolve the bends of gas torque better
+SAMPLES = int(os.environ.get("ATTACK_SAMPLES", "4096"))
 # of crank speed; what lies above is under rounding
 LAST_ORDER = 60
 PASCAL = {"Pa": 1.0, "bar": 1e5}
@@ -167,7 +169,7 @@ def seiliger(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
 
 
 ATMOSPHERE = 101325.0
-FINE = 16 * SAMPLES
+FINE = max(16 * 4096, 4 * SAMPLES)
 EXPONENTS = ("compression_exponent", "expansion_exponent")
 DEFAULTS = {"compression_ratio": 17.0, "compression_exponent": 1.35, "expansion_exponent": 1.3}
 

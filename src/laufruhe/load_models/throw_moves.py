@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 REACH = math.radians(60.0)
 # [rad]
 STAYS = 1e-8
+APART = 1e-6
+"""What cylinders that move fire apart at least [rad]: those that fire at once have no order."""
 
 
 class ThrowMoves:
@@ -40,7 +42,8 @@ class ThrowMoves:
     """
 
     def __init__(self, phasing: Phasing, layout: Layout, start: Candidate, intervals: Intervals) -> None:
-        self.phasing, self.layout, self.start, self.intervals = phasing, layout, start, intervals
+        self.phasing, self.layout, self.start = phasing, layout, start
+        self.intervals = Intervals(max(intervals.least, min(APART, intervals.most)), intervals.most)
         self._throws = range(0 if phasing.throw_bounds else 1, len(start.throws))
         self._open_bank, self._open_split = _is_open(phasing.bank), _is_open(phasing.split)
         self.size = len(self._throws) + self._open_bank + self._open_split
