@@ -15,7 +15,7 @@ help:
 	@echo "make test-fast  tests of every room, under a minute on two cores"
 	@echo "make test       all tests, minutes"
 	@echo "make attack     random problems against an independent model, ATTACK='--number 100'"
-	@echo "make matrix     every kind of decision, measure and layout together; hours, results/matrix/ (MATRIX='--share 0.1')"
+	@echo "make matrix     every kind of decision, measure and layout together, an hour and more; MATRIX='--share 0.1'"
 	@echo "make lint       style, types, direction of imports"
 	@echo "make format     put the source into the project's style"
 	@echo "make bench      benchmarks, which write results/benchmarks/; an hour and more"
