@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from laufruhe.errors import SolverError
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import limited, passed
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
@@ -168,4 +168,5 @@ def _none(problem: Problem, answer: Answer) -> Result:
 def _uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
     from laufruhe.solvers.uneven import solve_uneven
 
-    return solve_uneven(problem, phasing, even)
+    with limited(phasing.time_limit):
+        return solve_uneven(problem, phasing, even)
