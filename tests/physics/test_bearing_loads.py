@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, Rod, Rotor, Seiliger, Shaft, SliderCrank
+from laufruhe.machine.kinematics import piston_acceleration, rod_acceleration
 from laufruhe.numerics.turns import cis
 from laufruhe.physics.bearing_loads import beam_shares, lever_shares, main_bearing_forces, pin_forces
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -214,3 +215,28 @@ def test_a_beam_keeps_forces_and_moments() -> None:
     assert beam_shares([0.0, 1.0], [0.25, 1.5]) == pytest.approx(lever_shares([0.0, 1.0], [0.25, 1.5]))
     # the textbook's beam on three supports, loaded in the middle of one span: 13/32, 11/16, -3/32
     assert beam_shares([0.0, 1.0, 2.0], [0.5])[:, 0] == pytest.approx([13 / 32, 11 / 16, -3 / 32])
+
+
+def test_peaks_stand_where_heat_comes_at_once() -> None:
+    """The pressure jumps there, between any steps: the largest load is found whatever these are."""
+    engine = engine_of(0)
+    found = []
+    for steps in (360, 720, 1440):
+        pins = pin_forces(engine, POINT, replace(EXACT, samples=steps))
+        values = np.concatenate([pins.sample(steps), pins.values(pins.bends)])
+        found.append(np.linalg.norm(values, axis=2).max(axis=0))
+    # by the formula itself, close to either side of the dead centre
+    part = engine.slider_cranks[1]
+    top = part.dead_centres[0]
+    gas = part.piston_area * (GAS.peak_pressure - GAS.crankcase_pressure)
+    acceleration = part.crank_radius * piston_acceleration(np, top, part.rod_ratio, part.offset_ratio)
+    along = -part.reciprocating_mass * acceleration * POINT.speed**2 - gas
+    sine = part.rod_ratio * math.sin(top) - part.offset_ratio
+    across = -along * sine / math.sqrt(1.0 - sine**2)
+    turning = rod_acceleration(np, top, part.rod_ratio, part.offset_ratio) * POINT.speed**2
+    across -= part.rod_inertia_deficit * turning / (part.rod_length * math.sqrt(1.0 - sine**2))
+    pull = part.rotating_mass * part.crank_radius * POINT.speed**2 * cmath.exp(1j * top)
+    assert found[1] == pytest.approx(found[2], rel=1e-6)
+    assert found[0] == pytest.approx(found[2], rel=1e-4)
+    assert found[2][1] >= abs(complex(along, across) + pull) * (1.0 - 1e-9)
+    assert found[2][1] == pytest.approx(abs(complex(along, across) + pull), rel=0.02)

@@ -65,7 +65,7 @@ def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     gas = fidelity.gas_of(point)
     masses = fidelity.kept(star_loads(engine, point.speed, lambda part: (_of_masses(part, fidelity),)))
     total = masses if gas is None else masses + fidelity.kept(gas_loads(engine, gas, fidelity))
-    return Spectrum(total.base, total.coefficients @ ROLL)
+    return total.each(lambda wrench: wrench @ ROLL)
 
 
 def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:

@@ -206,10 +206,6 @@ def _inside(
     return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True)
 
 
-def _at_one_place(signal: Spectrum) -> Spectrum:
-    return Spectrum(signal.base, signal.coefficients[:, None, None])
-
-
 def _names_of_mounts(engine: Engine) -> Sequence[str]:
     return [mount.name for mount in engine.mounts]
 
@@ -276,7 +272,7 @@ MAIN_BEARING_PRESSURE = _inside(
 )  # fmt: skip
 CRANK_TORQUE = _inside(
     "crank torque", "N m", ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",),
-    lambda moving, at: _at_one_place(crank_torque(moving, at.point, at.fidelity)),
+    lambda moving, at: crank_torque(moving, at.point, at.fidelity).each(lambda values: values[:, None, None]),
 )  # fmt: skip
 CRANK_PIN_FORCE = _inside(
     "crank-pin force", "N", AT_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
