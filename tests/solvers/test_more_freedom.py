@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -125,3 +126,26 @@ def test_problems_with_hardly_anything_in_them(case: str, measure: str, tmp_path
         loaded(tmp_path, text + '[[constraints]]\nname = "none"\nlimit = "rms rocking couple"\nmax = "0 N m"\n')
     )
     assert held.conflict == ("none",) if held.status is Status.INFEASIBLE else held.limits[0].value <= 1e-5
+
+
+@pytest.mark.parametrize("scale", [(1e-6, 1.0, 1.0), (1e5, 1e-3, 1.0), (1.0, 1e2, 1e6), (1.0, 1.0, 1e-6)])
+@pytest.mark.parametrize("seed", range(3))
+def test_sizes_far_apart_keep_value_and_kind(seed: int, scale: tuple[float, float, float], tmp_path: Path) -> None:
+    """Masses, speed and bounds a million times as large or small: forces follow, and the proof is the same."""
+    mass, speed, bounds = scale
+    limit = "" if seed else '[[constraints]]\nlimit = "rms shaking force"\nmax = "{:g} N"\n'
+
+    def solved(m: float, n: float, b: float) -> Result:
+        text = _text(seed, FREEDOM[3], limit.format(4000 * m * n * n))
+        text = text.replace('"0.8 kg"', f'"{0.8 * m:g} kg"').replace("3000 rpm", f"{3000 * n:g} rpm")
+        grown = re.sub(r'"0 kg", "([\d.]+) kg"', lambda found: f'"0 kg", "{float(found[1]) * b * m:.17g} kg"', text)
+        return solve(loaded(tmp_path, grown))
+
+    one, other = solved(1.0, 1.0, bounds), solved(mass, speed, bounds)
+    assert one.status is other.status
+    if one.objective is not None:
+        assert one.certificate is not None
+        assert other.objective is not None
+        assert other.certificate is not None
+        assert one.certificate.kind is other.certificate.kind is Proof.GLOBAL
+        assert other.objective.value == pytest.approx(one.objective.value * mass * speed**2, rel=2e-4)
