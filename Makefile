@@ -18,6 +18,7 @@ help:
 	@echo "make matrix     every kind of decision, measure and layout together, an hour and more; MATRIX='--share 0.1'"
 	@echo "make lint       style, types, direction of imports"
 	@echo "make format     put the source into the project's style"
+	@echo "make faults     100,000 damaged files, which writes results/faults/; half an hour and more"
 	@echo "make bench      benchmarks, which write results/benchmarks/; an hour and more"
 	@echo "make pictures   the pictures of README.md again, under docs/pictures/"
 	@echo "make clean      remove caches; make distclean removes $(VENV) as well"
@@ -61,6 +62,11 @@ matrix: $(STAMP)
 # Scripts that write under results/benchmarks/.
 bench: $(STAMP)
 	@set -e; for script in tests/benchmarks/bench_*.py; do echo "$$script"; $(BIN)/python "$$script"; done
+
+# A hundred thousand damaged files through the commands; writes results/faults/README.md.
+faults: export OMP_NUM_THREADS = 1
+faults: $(STAMP)
+	$(BIN)/python tests/faults/run_faults.py
 
 pictures: $(STAMP)
 	$(BIN)/python tests/benchmarks/make_pictures.py

@@ -1,7 +1,7 @@
-"""Studies killed at random moments, alone and two at once in one folder, their kept points damaged in between.
+"""Studies and solves killed at random moments, alone and two at once in one folder, kept points damaged in between.
 
-Writes results/benchmarks/kills.md: what was tried, and every study whose files were not those of one run.
-`python tests/benchmarks/bench_kills.py 300` tries so many studies.
+Writes results/benchmarks/kills.md: what was tried, and everything whose files were not those of one run.
+`python tests/benchmarks/bench_kills.py 300` tries so many studies, and a third as many solves.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from pathlib import Path
 
 from pages import PAGES, publish
 
+from cli import solve_kills
 from studies import kills
 
 OUT = PAGES / "kills.md"
@@ -19,16 +20,23 @@ TRIED = 60
 WORDS = """{} studies of {} points in three parts, each killed one to four times at seeded random moments by SIGINT,
 SIGTERM or SIGKILL, alone or two at once in one folder, their kept points damaged after every kill, and then left to
 end. Datasets, CSV files, pictures and the report but for its table of times are compared byte by byte with those of one
-run that nothing stopped. What a crash of the machine leaves is not tried.
+run that nothing stopped. {} solves of one problem likewise, up to three times; after every kill the folder of
+results has none, or all of one run. What a crash of the machine leaves is not tried.
 """
 
 
-def page(told: kills.Told, studies: int, points: int) -> str:
+def page(told: kills.Told, studies: int, points: int, solves: int) -> str:
     """What was tried and what came of it."""
     rows = [f"| {what} | {count} |" for what, count in sorted(told.tried.items())]
     wrong = [f"- {line}" for line in told.wrong] or ["None."]
-    head = ["# Killed studies", "", WORDS.format(studies, points), "| tried | times |", "| --- | ---: |"]
-    return "\n".join([*head, *rows, "", "Studies that ended otherwise:", "", *wrong, ""])
+    head = [
+        "# Killed studies and solves",
+        "",
+        WORDS.format(studies, points, solves),
+        "| tried | times |",
+        "| --- | ---: |",
+    ]
+    return "\n".join([*head, *rows, "", "What ended otherwise:", "", *wrong, ""])
 
 
 def main() -> None:
@@ -38,7 +46,10 @@ def main() -> None:
         whole, told = kills.uninterrupted(Path(name) / "whole"), kills.Told()
         for seed in range(count):
             kills.attacked(Path(name) / "s", seed, whole, told)
-    publish(OUT, page(told, count, 4 * 7 + 12 + 1))
+        solved = solve_kills.uninterrupted(Path(name) / "solved")
+        for seed in range(count // 3):
+            solve_kills.attacked(Path(name) / "s", seed, solved, told)
+    publish(OUT, page(told, count, 4 * 7 + 12 + 1, count // 3))
     sys.exit(bool(told.wrong))
 
 

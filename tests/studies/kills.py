@@ -144,7 +144,7 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
         count, jobs = rng.choice((1, 2)), rng.choice((1, 1, 1, 2))
         running = [started(folder, jobs) for _ in range(count)]
         told.tried[f"runs of {count} at once, {jobs} core{'s' if jobs > 1 else ''} each"] += 1
-        _stopped(running, rng, whole, seed, told)
+        stopped(running, rng, whole, seed, told)
         told.tried[f"kept points: {damage(folder / 'out' / KEPT, rng)}"] += 1
     last = started(folder)
     said = last.communicate()[1]
@@ -158,7 +158,7 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
         told.wrong.append(f"seed {seed}: {', '.join(sorted(names))} differ")
 
 
-def _stopped(running: Sequence[subprocess.Popen[str]], rng: random.Random, whole: Whole, seed: int, told: Told) -> None:
+def stopped(running: Sequence[subprocess.Popen[str]], rng: random.Random, whole: Whole, seed: int, told: Told) -> None:
     """Each by a signal of its own, at a moment of its own: mostly while points are kept or files are written."""
     began, slower = time.monotonic(), len(running) ** 0.3
     moments = []
@@ -174,6 +174,6 @@ def _stopped(running: Sequence[subprocess.Popen[str]], rng: random.Random, whole
         said = process.communicate()[1]
         # what an interrupted import of a library raises is its own affair
         importing = stop is signal.SIGINT and "import" in said
-        allowed = {0, -stop} | ({130} if stop is signal.SIGINT else set())
+        allowed = {0, -stop, *(() if stop is signal.SIGKILL else (130,))}
         if not importing and (process.returncode not in allowed or "Traceback" in said):
             told.wrong.append(f"seed {seed}: {stop.name} ended with {process.returncode}: {said[-300:]}")

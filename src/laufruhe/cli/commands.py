@@ -12,7 +12,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from laufruhe.cli.screen import DONE, FAILED, above_zero, exit_statuses, handing_out, in_time, progress
+from laufruhe.cli.screen import DONE, FAILED, INTERRUPTED, above_zero, exit_statuses, handing_out, in_time, progress
 from laufruhe.cli.supervised import supervised
 
 app = typer.Typer(
@@ -174,6 +174,8 @@ def _run() -> NoReturn:
         app()
     except SystemExit as end:
         _leave(end.code if isinstance(end.code, int) else DONE)
+    except KeyboardInterrupt:
+        _leave(INTERRUPTED)
     _leave(DONE)
 
 

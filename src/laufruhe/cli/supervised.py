@@ -15,16 +15,21 @@ from laufruhe.numerics.cores import end_with_parent
 PATIENCE = 2
 """Seconds in which an interrupted command may tidy up; a solver that does not listen is ended then."""
 
+_HANDED_ON = (signal.SIGINT, signal.SIGTERM, *((signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()))
+
 
 def supervised(work: Callable[[], NoReturn]) -> NoReturn:
     """Do work that ends its process, where the system can in another one that is watched over."""
     if not hasattr(os, "fork"):
         work()
     watching = os.getpid()
+    # none comes before it is heard
+    signal.pthread_sigmask(signal.SIG_BLOCK, _HANDED_ON)
     child = os.fork()
     if child == 0:
         end_with_parent(watching)
         signal.signal(signal.SIGINT, _interrupted)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
         work()
     ended_here = False
 
@@ -37,9 +42,10 @@ def supervised(work: Callable[[], NoReturn]) -> NoReturn:
         ended_here = True
         os.kill(child, signal.SIGKILL)
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in _HANDED_ON:
         signal.signal(number, interrupt)
     signal.signal(signal.SIGALRM, end)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
     _, status = os.waitpid(child, 0)
     if os.WIFEXITED(status):
         os._exit(os.WEXITSTATUS(status))

@@ -1,0 +1,74 @@
+"""Solves killed at random moments, alone and two at once in one folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import laufruhe
+from cli import scenes
+from problem_files import written
+from studies.kills import Told, Whole, stopped
+
+
+def started(folder: Path) -> subprocess.Popen[str]:
+    """The command in a process of its own."""
+    source = str(Path(laufruhe.__file__).parents[1])
+    return subprocess.Popen(
+        [sys.executable, "-m", "laufruhe", "solve", "scene.toml", "--out", "out"],
+        cwd=folder, env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": source}, stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    """Every file of the results, without what is a matter of time; none where there are none."""
+    found = {path.name: path.read_bytes() for path in (folder / "out").glob("*")}
+    if "result.json" in found:
+        record = json.loads(found["result.json"])
+        del record["timing"]
+        found["result.json"] = json.dumps(record).encode()
+    return found
+
+
+def uninterrupted(folder: Path) -> Whole:
+    """One run in a new folder, left alone."""
+    folder.mkdir()
+    written(folder, scenes.TIGHT)
+    began = time.monotonic()
+    process = started(folder)
+    while not list(folder.glob(".unfinished-*")) and process.poll() is None:
+        time.sleep(0.01)
+    first = time.monotonic() - began
+    said = process.communicate()[1]
+    assert (process.returncode, said) == (0, "")
+    return Whole(results(folder), first, time.monotonic() - began)
+
+
+def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
+    """One problem in a new folder: solved and killed up to three times, then left alone."""
+    rng = random.Random(seed)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    written(folder, scenes.TIGHT)
+    for _ in range(rng.randint(1, 3)):
+        count = rng.choice((1, 2))
+        told.tried[f"solves, {count} at once"] += 1
+        stopped([started(folder) for _ in range(count)], rng, whole, seed, told)
+        if results(folder) not in ({}, whole.files):
+            told.wrong.append(f"seed {seed}: a killed solve left files of two runs, or not all of one")
+    last = started(folder)
+    said = last.communicate()[1]
+    left = sorted(path.name for path in folder.iterdir() if path.name not in ("scene.toml", "out"))
+    if left:
+        told.wrong.append(f"seed {seed}: {', '.join(left)} left behind")
+    if last.returncode or said or results(folder) != whole.files:
+        told.wrong.append(f"seed {seed}: the last solve ended with {last.returncode}: {said[-300:]}")

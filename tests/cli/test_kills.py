@@ -1,0 +1,24 @@
+"""A solve that is killed at any moment leaves the old results or the new ones; another makes what one run makes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cli import solve_kills
+from studies.kills import Told, Whole
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    return solve_kills.uninterrupted(tmp_path_factory.mktemp("kills") / "whole")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_results_are_those_of_one_run(seed: int, whole: Whole, tmp_path: Path) -> None:
+    told = Told()
+    solve_kills.attacked(tmp_path / "s", seed, whole, told)
+    assert told.wrong == []
+    assert {".laufruhe.json", "result.json", "report.md", "cycle.png"} <= set(whole.files)
