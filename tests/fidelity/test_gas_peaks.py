@@ -14,6 +14,7 @@ import pytest
 import laufruhe
 from fidelity.scenes import random_problem
 from lanes import first_fast
+from laufruhe.fidelity.automatic import choose
 from laufruhe.machine import GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.bearing_loads import pin_forces
@@ -205,3 +206,30 @@ def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
         truth = max(truth, float(np.sqrt((whole**2).sum(axis=1)).max()))
     assert value == pytest.approx(truth, rel=1e-4)
     assert abs(value - truth) <= error_of(problem, evaluation) * value + 1e-9 * value
+
+
+def test_a_limited_peak_keeps_its_limit_at_the_bend(tmp_path: Path) -> None:
+    """The mean would have it at 2208 N; the peak stands at the cut-off, between two steps."""
+    path, most = tmp_path / "limit.toml", 2100.0
+    text = (
+        BEND.replace("SAMPLES", "360").replace("[0, 0.4]", "[0, 1]").replace("maximum mount force", "mean mount force")
+    )
+    limit = f'[[constraints]]\nlimit = "maximum mount force"\nmax = "{most} N"\n'
+    path.write_text(text + limit, encoding="utf-8")
+    problem = laufruhe.load(path)
+    result = laufruhe.solve(problem)
+    peak = Measure(channels.MOUNT_FORCE, NORMS["maximum"])
+    held = _truth(replace(problem, engine=result.final.engine, objective=(Term(peak),)))
+    assert result.limits[0].active
+    assert held <= most * (1.0 + 1e-5)
+    assert result.limits[0].value == pytest.approx(held, rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", first_fast(range(40), 6))
+def test_automatic_fidelity_sees_the_bends(seed: int) -> None:
+    """Its estimate is above the error of a peak too, whatever it drops."""
+    problem = _problem(seed)
+    problem = replace(problem, objective=(Term(replace(problem.objective[0].measure, norm=NORMS["maximum"])),))
+    choice = choose(problem, 1e-2)
+    value = objective_value(problem, evaluate(replace(problem, fidelity=choice.fidelity)))
+    assert abs(value - _truth(problem, QUICK if seed < FAST else ANGLES)) <= choice.error_estimate * value
