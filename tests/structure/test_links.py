@@ -8,10 +8,17 @@ import pytest
 ROOT = Path(__file__).parents[2]
 # what the commands write is not kept
 WRITTEN = ROOT / "results"
-KEPT = (WRITTEN / "README.md", WRITTEN / "benchmarks", WRITTEN / "attack" / "README.md")
+KEPT = (WRITTEN / "benchmarks", *(WRITTEN / name / "README.md" for name in ("", "attack", "faults")))
 PAGES = sorted(
     path
-    for pattern in ("*.md", "docs/**/*.md", "results/README.md", "results/benchmarks/*.md", "results/attack/README.md")
+    for pattern in (
+        "*.md",
+        "docs/**/*.md",
+        "results/README.md",
+        "results/benchmarks/*.md",
+        "results/attack/README.md",
+        "results/faults/README.md",
+    )
     for path in ROOT.glob(pattern)
 )
 LINK = re.compile(r"\]\((?![a-z]+:)([^)\s]*)\)")
