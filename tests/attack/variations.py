@@ -30,10 +30,10 @@ def is_global(result: Any) -> bool:
 
 
 def doubt(*results: Any) -> float:
-    """What is left open of values, together."""
-    return sum((r.certificate.gap + r.error_estimate) * r.objective.value for r in results) + READING * max(
-        r.objective.value for r in results
-    )
+    """What is left open of values, together; beside what is given they may vanish but for rounding."""
+    left = sum((r.certificate.gap + r.error_estimate) * r.objective.value for r in results)
+    given = max(r.objective.initial for r in results if np.isfinite(r.objective.initial))
+    return left + READING * max(r.objective.value for r in results) + 1e-9 * given
 
 
 def prices(table: Table, rng: np.random.Generator, folder: Path) -> Complaints:
