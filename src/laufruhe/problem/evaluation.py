@@ -181,10 +181,10 @@ def objective_value(problem: Problem, evaluation: Evaluation) -> float:
     return sum(term.weight * evaluation.value(term.measure) for term in problem.objective)
 
 
-def samples_of(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE, finer: int = 1) -> Array:
+def samples_of(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> Array:
     """A channel at operating point k over the whole cycle, shape (samples, places, d)."""
     signal = channel.signal(evaluation.loads[k])
-    return over(evaluation.engine.cycle.base_order, [signal])[0].sample(finer * evaluation.samples)
+    return over(evaluation.engine.cycle.base_order, [signal])[0].sample(evaluation.samples)
 
 
 def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> list[CycleMeasures]:
@@ -192,7 +192,7 @@ def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE)
     signal = channel.signal(evaluation.loads[k])
     if not np.all(np.isfinite(signal.coefficients)):
         return [CycleMeasures(math.inf, math.inf, math.inf)] * signal.coefficients.shape[1]
-    fine, coarse = (lengths(_one_period(evaluation, each, BETWEEN)) for each in (signal, signal.series))
+    fine, coarse = (lengths(_one_period(evaluation, each)) for each in (signal, signal.series))
     most = np.maximum(fine.max(axis=0), lengths(signal.values(signal.bends)).max(axis=0, initial=0.0))
     return [
         replace(cycle_measures(own[:, None]), max=float(top))
@@ -200,10 +200,10 @@ def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE)
     ]
 
 
-def _one_period(evaluation: Evaluation, signal: Spectrum, finer: int) -> Array:
-    """Values over the cycle without the periods in which they repeat."""
+def _one_period(evaluation: Evaluation, signal: Spectrum) -> Array:
+    """Values between the samples too, without the periods in which they repeat."""
     base, once = evaluation.engine.cycle.base_order, signal.reduced()
     periods = once.base / base
     if periods.denominator != 1 or evaluation.samples % int(periods):
-        return over(base, [signal])[0].sample(finer * evaluation.samples)
-    return once.sample(finer * evaluation.samples // int(periods))
+        return over(base, [signal])[0].sample(BETWEEN * evaluation.samples)
+    return once.sample(BETWEEN * evaluation.samples // int(periods))
