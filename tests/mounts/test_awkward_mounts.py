@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -232,3 +233,22 @@ def test_signals_of_operating_points_have_as_many_rows_each(tmp_path: Path) -> N
     result = solve(problem_of(tmp_path, points, BLOCK, MOUNTS, asked))
     assert result.objective is not None
     assert result.objective.value <= result.objective.initial
+
+
+def test_an_end_without_numbers_says_nothing_on_the_screen(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Four throws at right angles cancel the second order: a variable over it has no slope where a search starts."""
+    engine = ENGINE.replace("[0, 180, 180, 0]", "[0, 90, 180, 270]").replace("rod_ratio = 0.26", "rod_ratio = 0.0")
+    lossy = MOUNTS.replace('position  = ["300 mm"', 'loss_factor = { between = [0.02, 0.3] }\nposition  = ["300 mm"')
+    shaft = """
+[[balancer_shafts]]
+name = "s"
+ratio = 2
+position = ["80 mm", "-60 mm"]
+unbalances = [{ x = "35 mm", radius = "40 mm", unbalance = { between = ["0 kg m", "0.03 kg m"] }, angle = 0 }]
+"""
+    asked = '[objective]\nminimise = "maximum shaking force"\norders = [2]\n[search]\nstarts = 2\n'
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = solve(problem_of(tmp_path, engine, BLOCK, lossy, shaft, asked))
+    assert result.status == "optimal"
+    assert capfd.readouterr().err == ""

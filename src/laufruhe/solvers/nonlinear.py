@@ -44,7 +44,7 @@ WORTH_EXPANDING = 3
 SHORTEST = 0.5
 # seconds of work that pay for starting processes
 WORTH_PROCESSES = 4.0
-_QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False}
+_QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False, "calc_lam_p": False}
 _OPTIONS = {
     "print_level": 0,
     "sb": "yes",
@@ -297,7 +297,9 @@ def _from_start(task: _Task, solver: Any, slopes: Any, k: int, point: Array) -> 
         if ending in (Ending.FAILED, Ending.INFEASIBLE):
             break
     f, g, gradient, jacobian = slopes(y, list(task.stages[-1]))
-    residual, violation = _judged(task, y, _flat(g), _flat(gradient), np.asarray(jacobian, dtype=float), m, b)
+    with np.errstate(invalid="ignore"):
+        # of a point without numbers nothing is a number, and that is all that is asked of it
+        residual, violation = _judged(task, y, _flat(g), _flat(gradient), np.asarray(jacobian, dtype=float), m, b)
     if not np.isfinite(residual) or not np.isfinite(float(f)):
         ending, residual, violation = Ending.FAILED, np.inf, np.inf
     return LocalOptimum(
