@@ -301,12 +301,12 @@ def complaints(problem: Problem, seed: int, budget: int = 250) -> list[str]:
     result = solve(problem)
     given = _given(problem)
     out = []
-    if result.status is Status.FAILED:
-        out.append(f"failed: {result.message}")
     met = given is not None and given.excess(problem.limits) <= 0.0
     if met and result.status in (Status.INFEASIBLE, Status.FAILED):
         out.append(f"{result.status}, and the design as given keeps all limits")
     found = searched(problem, result, seed, budget)
+    if result.status is Status.FAILED and found.excess <= 0.0:
+        out.append(f"{result.message}, and a design keeps all limits with {found.excess:.2e}")
     if result.status is Status.INFEASIBLE:
         if not result.conflict:
             out.append("infeasible, and no limit is named")
