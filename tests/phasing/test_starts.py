@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import SOONEST, Candidate, bounded_stars
 from laufruhe.solvers import solve
@@ -106,3 +107,21 @@ def test_shafts_that_may_not_be_built_are_not(tmp_path):
         engines.problem(tmp_path, 4, "four-stroke", engine.replace("65", "100"), text.replace("20", "85"), rest, "vee")
     )
     assert sum(d.value for d in result.decisions if d.name.endswith("built")) <= 1
+
+
+def test_throws_whose_middles_fire_at_once_start_beside_them(tmp_path):
+    """Banks and pins 120 degrees apart: throws at 0, 120 and 240 would fire in pairs, and have no order."""
+    engine = """throws = [0, { between = [108, 132] }, { between = [228, 252] }]
+bank_angle = 90
+split_pin_angle = 30"""
+    wide = 'intervals = { largest_deviation = "180 deg" }'
+    result = solve(engines.problem(tmp_path, 6, "two-stroke", engine, wide, engines.COUPLE, "vee"))
+    assert result.objective is not None
+    assert min(result.final.engine.firing_intervals) > SOONEST
+
+
+def test_an_order_that_throws_cannot_fire_in_is_no_design_and_no_complaint(tmp_path):
+    engine = "throws = [0, 180, { between = [150, 200] }, 0]\nfiring_order = [1, 3, 4, 2]"
+    phasing = engines.problem(tmp_path, 4, "two-stroke", engine.replace("0]", "90]"), "", engines.COUPLE).phasing
+    with pytest.raises(ModelError, match="cannot fire in the order"):
+        phasing.realise(Candidate((0.0, 1.0, 2.0, 3.0), (1, 2, 3, 4)))

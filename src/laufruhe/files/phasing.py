@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from laufruhe import units
+from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
 from laufruhe.files.engine import EngineTable, check_order, cycle_of, layout_of, told_cylinders
@@ -78,7 +79,11 @@ def opened(
     given = fixed.throws if fixed else engine.given_throws
 
     def realise(candidate: Candidate) -> Problem:
-        return _without(assemble(_with(engine, count, candidate), candidate.without_gas), candidate.left_out)
+        try:
+            return _without(assemble(_with(engine, count, candidate), candidate.without_gas), candidate.left_out)
+        except Refused as refusal:
+            # a design that a search proposes, and nothing that the file says
+            raise ModelError(str(refusal)) from refusal
 
     phasing = Phasing(
         cycle=cycle,
@@ -99,7 +104,10 @@ def opened(
         method=Method(table.method),
     )
     _check(phasing, engine)
-    problem = replace(phasing.realise(_first(phasing)), phasing=phasing)
+    try:
+        problem = replace(phasing.realise(_first(phasing)), phasing=phasing)
+    except ModelError as error:
+        raise (error.__cause__ if isinstance(error.__cause__, Refused) else error) from None
     _check_speed(problem, phasing)
     return problem
 

@@ -173,7 +173,11 @@ class MountSearch:
         if not np.all(np.isfinite(optimum.x)):
             return None
         mounts, unbalances = (iter(part) for part in joint.split(optimum.x))
-        problem = joint.designed(optimum.x)
+        try:
+            problem = joint.designed(optimum.x)
+        except ModelError:
+            # throws where a search was left may not fire in their order
+            return None
         values: list[Value] = [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions]
         return judged_at(problem, values)
 

@@ -32,6 +32,8 @@ ORDERS_WITH_GAS = 2
 _MOST_CRANKS = 200_000
 _MOST_EVALUATED = 300
 _FEWEST = 8
+# throws within bounds of their own, where neither middle nor even stars can fire
+_DRAWN = 4
 _STARTS = 12
 # a rounding of the program that times firings [rad]
 _KEPT = 1e-7
@@ -229,13 +231,18 @@ def _ends(bounds: tuple[float, float] | None) -> list[float | None]:
 def _within_bounds(phasing: Phasing, bank: float | None, split: float | None) -> list[Candidate]:
     """Throws within bounds of their own, in firing orders that they can keep."""
     free = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
-    found = []
-    for throws in bounded_stars(phasing, phasing.layout(bank, split)):
-        orders = ranked_orders(free, Candidate(throws, None, bank, split))
-        kept = [order for order in orders if min(order.intervals) > SOONEST]
-        # the orders whose intervals are nearest to those allowed
-        kept.sort(key=lambda order: _outside(phasing.intervals, order.intervals))
-        found += [Candidate(throws, order.order, bank, split) for order in kept[:2]]
+    low, high = np.array(phasing.throw_bounds).T
+    drawn = np.random.default_rng(1964).uniform(low, high, (_DRAWN, len(low)))
+    for stars in (bounded_stars(phasing, phasing.layout(bank, split)), [tuple(map(float, own)) for own in drawn]):
+        found = []
+        for throws in stars:
+            orders = ranked_orders(free, Candidate(throws, None, bank, split))
+            kept = [order for order in orders if min(order.intervals) > SOONEST]
+            # the orders whose intervals are nearest to those allowed
+            kept.sort(key=lambda order: _outside(phasing.intervals, order.intervals))
+            found += [Candidate(throws, order.order, bank, split) for order in kept[:2]]
+        if found:
+            break
     return found
 
 
