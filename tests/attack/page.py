@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -48,15 +49,32 @@ FOOT = """
 """
 
 
+def entries_of(logs: Iterable[Path]) -> list[dict[str, Any]]:
+    """Every line of the logs that is whole."""
+    texts = [text for log in logs for text in log.read_text(encoding="utf-8").splitlines()]
+    return [json.loads(text) for text in texts if text.endswith("}")]
+
+
 def lines_of(logs: Iterable[Path]) -> list[dict[str, Any]]:
     """Every problem of the logs, the last entry of each."""
-    found: dict[tuple[str, int], dict[str, Any]] = {}
-    for log in logs:
-        for text in log.read_text(encoding="utf-8").splitlines():
-            if text.endswith("}"):
-                line = json.loads(text)
-                found[line["family"], line["seed"]] = line
+    found = {(line["family"], line["seed"]): line for line in entries_of(logs)}
     return list(found.values())
+
+
+def mended(logs: Iterable[Path]) -> list[dict[str, Any]]:
+    """Entries with something wrong of problems that had nothing wrong when they were run last."""
+    entries = entries_of(logs)
+    last = {(line["family"], line["seed"]): line for line in entries}
+    return [line for line in entries if line["wrong"] and not last[line["family"], line["seed"]]["wrong"]]
+
+
+def table_of(lines: list[dict[str, Any]]) -> list[str]:
+    """What was wrong, a line each."""
+    if not lines:
+        return ["Nothing."]
+    told = [re.sub(r"\S*/attack-\w+/", "", "; ".join(line["wrong"]))[:300] for line in lines]
+    rows = [f"| {line['family']} | {line['seed']} | {text} |" for line, text in zip(lines, told, strict=True)]
+    return ["| family | seed | what |", "| --- | ---: | --- |", *rows]
 
 
 def row(name: str, lines: list[dict[str, Any]]) -> str:
@@ -73,8 +91,9 @@ def row(name: str, lines: list[dict[str, Any]]) -> str:
     return f"| {name} | {len(lines)} | {short} | {told} | {wrong} | {extra} | {seconds:.1f} |"
 
 
-def page(lines: list[dict[str, Any]], names: list[str]) -> str:
+def page(logs: list[Path], names: list[str]) -> str:
     """Figures by family, what was wrong, and what cannot be seen."""
+    lines = lines_of(logs)
     by_family = {name: [line for line in lines if line["family"] == name] for name in names}
     every = [line for group in by_family.values() for line in group]
     wrong = [line for line in every if line["wrong"]]
@@ -82,12 +101,12 @@ def page(lines: list[dict[str, Any]], names: list[str]) -> str:
     missing = [name for name, group in by_family.items() if not group]
     commits = Counter(line.get("commit", "") for line in every)
     rivals = sum(line["rivals"] for line in every)
-    told = [f"| {line['family']} | {line['seed']} | {'; '.join(line['wrong'])[:300]} |" for line in wrong]
     parts = [
         HEAD,
         "## What was run\n",
         f"{len(every)} problems, {rivals} rival designs or stars; {len(wrong)} problems with something wrong. "
-        f"Meant are {WANTED} problems of each family from each of {SEEDS} first seeds; *short* is what is left.\n",
+        f"Meant are {WANTED} problems of each family from each of {SEEDS} first seeds: "
+        f"{100.0 * len(every) / (WANTED * SEEDS * len(names)):.2g} % of that was run, *short* is what is left.\n",
         f"Commits: {', '.join(f'{name} ({count})' for name, count in commits.most_common())}. "
         "A problem that was run again counts by its last run.\n",
         "| family | problems | short | ended as | wrong | beside | mean time of a solve [s] |",
@@ -96,7 +115,9 @@ def page(lines: list[dict[str, Any]], names: list[str]) -> str:
     ]
     if missing:
         parts += ["", f"Not run at all: {', '.join(missing)}."]
-    parts += ["", "## What was wrong\n"]
-    parts += ["| family | seed | what |", "| --- | ---: | --- |", *told] if told else ["Nothing."]
+    parts += ["", "## What was wrong\n", *table_of(wrong)]
+    parts += ["", "## What was wrong before, and is not at the last run\n"]
+    parts += ["The package, the plain model or the rule of what counts as wrong was mended in between.\n"]
+    parts += table_of([line for line in mended(logs) if line["family"] in names])
     parts += ["", "`python tests/attack/run_attack.py show FAMILY --from SEED` prints a problem's file.", FOOT]
     return "\n".join(parts)

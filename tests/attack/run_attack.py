@@ -112,7 +112,7 @@ def main() -> None:
     told = parser.parse_args()
     if told.command == "page":
         PAGE.parent.mkdir(parents=True, exist_ok=True)
-        PAGE.write_text(page(lines_of(told.logs), NAMES), encoding="utf-8")
+        PAGE.write_text(page(told.logs, NAMES), encoding="utf-8")
         return
     if told.command == "show":
         print(toml(problem(told.families, told.first)[0]))
