@@ -24,9 +24,14 @@ def problem_of(folder, seed):
 
 def judge(problem):
     result = solve(problem)
-    assert result.status is not Status.FAILED, result.message
     given = evaluate(problem)
     phasing = problem.phasing
+    if result.status is Status.FAILED:
+        # no bound rules uneven throws out: that no search found one is all that is known
+        assert phasing is not None, result.message
+        assert phasing.continuous, result.message
+        assert given.excess(problem.limits) > 0.0, result.message
+        return
     if result.status is Status.INFEASIBLE:
         assert result.message or result.conflict
         return
