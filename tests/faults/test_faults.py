@@ -206,11 +206,10 @@ def test_too_much_at_once_is_refused_in_a_line(tmp_path: Path) -> None:
     refused(spoilt(tmp_path, 'speed = "2500 rpm"', f"{steps}201"), "operating_points", "201", "200")
     path = spoilt(tmp_path, 'speed = "2500 rpm"', f"{steps}200")
     assert CliRunner().invoke(app, ["check", str(path)]).exit_code == 0
-    shafts = "\n".join(
-        f'[[counterweights]]\nname = "{k}"\nopposite_throw = 1\nunbalance = {{ between = ["0 kg m", "1 kg m"] }}'
-        for k in range(40)
-    )
-    path = written(tmp_path, path.read_text(encoding="utf-8") + shafts)
+    weight = '[[counterweights]]\nname = "{}"\nopposite_throw = 1\nunbalance = {{ between = ["0 kg m", "1 kg m"] }}\n'
+    many = scenes.GIVEN + "".join(weight.format(k) for k in range(201))
+    refused(written(tmp_path, many, "many"), "200.unbalance", "beside 200 other numbers")
+    path = written(tmp_path, path.read_text(encoding="utf-8") + "".join(weight.format(k) for k in range(40)))
     refused(path, "million numbers", verb="solve")
 
 

@@ -32,6 +32,7 @@ from laufruhe.problem.problem import Problem, Search
 DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 10_000_000
 """Of a file: tables within tables, entries of one list or table, and bytes."""
 LARGEST = 2**63 - 1
+MOST_OPEN = 200
 # control characters but tab and line feed, and those that turn the direction of reading
 _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 
@@ -167,7 +168,10 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
 
 
 def _check_decided(decisions: Sequence[Decision]) -> None:
-    """Refuse what is open and moves nothing."""
+    """Refuse what is open and moves nothing, and more than is decided in minutes."""
+    if len(decisions) > MOST_OPEN:
+        remedy = "fix some, or let some follow others"
+        raise Refused(decisions[MOST_OPEN].name, None, f"is open beside {MOST_OPEN} other numbers", remedy)
     for decision in decisions:
         if not any(drive.acts for drive in decision.drives):
             raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")
