@@ -20,6 +20,7 @@ from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.star_search import search_stars
 from laufruhe.solvers.uneven import local_optimum
 from phasing import engines
+from problem_files import loaded
 from smooth import AtItsValues, smooth_value
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -201,3 +202,29 @@ def test_the_trade_lies_between_its_bounds(name):
         assert point.lower_bound <= point.value
     assert result.phasing.trade[0].lower_bound >= 0.95 * result.phasing.even_value
     assert result.phasing.trade[1].lower_bound > 0.5 * result.phasing.trade[1].value
+
+
+IN_STEP = """
+title = "Throws that want to stand in step"
+[engine]
+layout = "inline"
+cycle = "two-stroke"
+stroke = "100 mm"
+rod_ratio = 0.25
+reciprocating_mass = "1 kg"
+cylinder_spacing = "100 mm"
+throws = [0, { between = [100, 180] }, 180, 5]
+[[operating_points]]
+speed = "1500 rpm"
+[objective]
+minimise = "rms shaking force"
+orders = [1]
+"""
+
+
+@pytest.mark.slow
+def test_throws_that_want_to_stand_in_step_come_as_near_as_they_can_fire(tmp_path):
+    # two that fire at once have no order: the second throw stops short of the third
+    result = solve(loaded(tmp_path, IN_STEP))
+    second = result.final.engine.slider_cranks[1].throw
+    assert math.pi - 1e-4 < second < math.pi
