@@ -55,7 +55,7 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
         return no_star(problem, none_fires(phasing)[0])
     if not families:
         return _uneven(problem, phasing, None)
-    answer = searched(problem, phasing, families)
+    answer = searched(replace(problem, tolerance=_share(problem)), phasing, families)
     if not answer.designs:
         if phasing.continuous:
             return _uneven(problem, phasing, None)
@@ -127,11 +127,10 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     best, first = fired[0]
     left_out = phasing.without(_needed(problem, phasing, best))
     candidate = replace(best.candidate, firing_order=first.firing_orders[0].order, left_out=left_out)
-    result = solve_fixed(replace(phasing.realise(candidate), tolerance=problem.tolerance, phasing=None))
+    result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem), phasing=None))
     value = result.objective.value if result.objective else best.value
-    # a star's own tolerance, and that by which another has to be better
     certificate = certified(
-        value, answer.bound, nothing_of(problem), 2.0 * problem.tolerance, Reach.WHOLE,
+        value, answer.bound, nothing_of(problem), problem.tolerance, Reach.WHOLE,
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in fired[1:])]
@@ -150,8 +149,8 @@ def _needed(problem: Problem, phasing: Phasing, best: Decided) -> tuple[int, ...
     nothing = nothing_of(problem)
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
         fewer = tuple(j for j in kept if j != k)
-        again = solve_design(model, best.steps, fewer, owners, problem.tolerance, nothing)
-        if again is not None and again[0].value <= best.value + room_of(best.value, problem.tolerance, nothing):
+        again = solve_design(model, best.steps, fewer, owners, _share(problem), nothing)
+        if again is not None and again[0].value <= best.value + room_of(best.value, _share(problem), nothing):
             kept = fewer
     return kept
 
