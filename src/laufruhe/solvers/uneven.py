@@ -8,7 +8,7 @@ the even star it started from, because the exact model compares the two.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,13 +19,13 @@ from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import in_time
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.measure import Term
+from laufruhe.problem.measure import Side, Term
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.uneven_bound import steady_bound, uneven_bound
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, no_star, with_star
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, no_star, with_star
 from laufruhe.solvers.mount_starts import columns_of, unbalances_of
 from laufruhe.solvers.nonlinear import solve_nonlinear
 from laufruhe.solvers.ranking import TradePoint, ranked_star, ranking_result
@@ -43,6 +43,8 @@ LEAST_UNIT = 1e-3
 # share that keeps a design that stands on a limit from breaking it by a rounding
 SOFT_LIMIT = 1e-7
 SOFTEST = 1e-6
+# share by which two ends of a search are one optimum
+SAME = 1e-6
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 TRADE_STARTS = 3
 
@@ -116,6 +118,7 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> S
     if not moves.size or _is_nothing(best):
         return best
     smooth = SmoothProgram(problem, _size(problem, best), moves=moves, slack=SOFT_LIMIT, softest=SOFTEST)
+    prices: Mapping[Side, float] | None = None
     for optimum in solve_nonlinear(smooth.program, _points(smooth, best), workers=1, max_seconds=30.0):
         if not optimum.usable:
             continue
@@ -124,8 +127,17 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> S
         if answer is None or not intervals.holds(firing_intervals(phasing, candidate), 1e-7):
             continue
         if best is None or answer.value < best.value * (1.0 - 1e-9):
-            best = answer
-    return best
+            best, prices = answer, smooth.prices(optimum)
+        elif prices is None and answer.value < best.value * (1.0 + SAME):
+            prices = smooth.prices(optimum)
+    return None if best is None else _priced(best, prices or {})
+
+
+def _priced(design: StarDesign, prices: Mapping[Side, float]) -> StarDesign:
+    """With what its limits cost while throws may move, less than with fixed ones; unknown where not told."""
+    result = design.result
+    limits = limit_values(result.problem, result.final, prices, design.value)
+    return replace(design, result=replace(result, limits=limits))
 
 
 def _is_nothing(best: StarDesign | None) -> bool:
