@@ -69,7 +69,7 @@ def test_a_kill_at_any_moment(makers: int, swaps: bool, tmp_path: Path) -> None:
         time.sleep(0.3 + rng.random() * 0.3)
         for one in running:
             one.send_signal(signal.SIGKILL)
-            assert one.wait() == -signal.SIGKILL
+        assert [one.wait() for one in running] == [-signal.SIGKILL] * makers
         if swaps:
             names, texts = held(folder)
             assert len(texts) == 1

@@ -62,6 +62,14 @@ class Set:
 
     def check(self) -> frozenset[str]:
         """The files that earlier runs made there; what they did not make is never touched (`InputError`)."""
+        if not self.folder.parent.is_dir():
+            return self.checked()
+        # not while another run swaps the folder
+        with _held(self.folder.parent):
+            return self.checked()
+
+    def checked(self) -> frozenset[str]:
+        """As `check`, by who keeps the folder above to itself."""
         folder = self.folder
         above = next(path for path in (folder, *folder.parents) if path.exists())
         if not above.is_dir():
@@ -108,7 +116,7 @@ def staged(wanted: Set) -> Iterator[Path]:
                 shutil.copymode(wanted.folder, stage)
         yield stage
         with _held(wanted.folder.parent):
-            made = wanted.check()
+            made = wanted.checked()
             if wanted.adds:
                 for name in made - {entry.name for entry in stage.iterdir()}:
                     shutil.copy2(wanted.folder / name, stage)
