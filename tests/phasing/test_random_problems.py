@@ -42,9 +42,9 @@ def judge(problem):
     assert result.certificate.lower_bound <= result.objective.value
 
 
-RIGID_SEEDS = [seed for seed in range(2, 400) if Writer(seed).mounts == RIGID]
-OTHER_SEEDS = [seed for seed in range(400) if Writer(seed).mounts not in (RIGID, OPEN)]
-OPEN_SEEDS = [seed for seed in range(200) if Writer(seed).mounts == OPEN]
+RIGID_SEEDS = [seed for seed in range(2, 160) if Writer(seed).mounts == RIGID]
+OTHER_SEEDS = [seed for seed in range(120) if Writer(seed).mounts not in (RIGID, OPEN)]
+OPEN_SEEDS = [seed for seed in range(50) if Writer(seed).mounts == OPEN]
 
 
 @pytest.mark.parametrize("seed", first_fast(RIGID_SEEDS, 16))

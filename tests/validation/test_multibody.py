@@ -38,7 +38,7 @@ ROUNDING = 1e-7
 SPEED = 200.0
 RADIUS, LENGTH, PISTON, BORE = 0.050, 0.200, 1.0, 0.090
 CRANKCASE = 1e5
-TRACE_POINTS = 1440
+TRACE_POINTS = 46080
 ROD = ConnectingRod(LENGTH, mass=2.0, centre=0.08, inertia=0.65 * 2.0 * 0.08 * 0.12)
 """2 kg with 65 % of the inertia of its two masses."""
 

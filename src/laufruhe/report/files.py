@@ -112,7 +112,8 @@ def staged(wanted: Set) -> Iterator[Path]:
         with _reporting(wanted):
             wanted.check()
             stage = until_then.enter_context(_stage_for(wanted.folder))
-            if wanted.folder.exists():
+            # there may be none, or none while another run puts its own there
+            with suppress(FileNotFoundError):
                 shutil.copymode(wanted.folder, stage)
         yield stage
         with _held(wanted.folder.parent):
