@@ -109,7 +109,9 @@ def test_program_and_search_agree_on_couples(tmp_path, cylinders):
     for method in ("search", "program"):
         problem = engines.problem(tmp_path, cylinders, phasing=f'method = "{method}"\nbest = 1')
         by[method] = solve(problem)
-        assert by[method].status is Status.OPTIMAL
+        # SCIP's bound is good to its own tolerances, which are shares of far larger couples
+        assert by[method].status is Status.OPTIMAL or by[method].certificate.gap < 1e-3
+    assert by["search"].status is Status.OPTIMAL
     scale = by["search"].objective.initial
     assert by["program"].objective.value == pytest.approx(by["search"].objective.value, rel=1e-6, abs=1e-6 * scale)
     assert by["program"].certificate.lower_bound <= by["search"].objective.value * (1.0 + 1e-9)
