@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank, kinematics
 from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
-from laufruhe.numerics.turns import as_turn, cis
+from laufruhe.numerics.turns import as_turn, cis, star_sum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import pressure_at, pressure_breaks
 from laufruhe.physics.mechanism import resolved_orders
-from laufruhe.physics.shaking_loads import order_index, rotor_wrench, spread
+from laufruhe.physics.shaking_loads import order_index, rotor_loads, spread
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -138,10 +138,7 @@ def bearing_pressures(engine: Engine, forces: Spectrum) -> Spectrum:
 
 
 def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
-    index = order_index(cycle, abs(rotor.shaft.ratio))
-    out = np.zeros((index + 1, 3), dtype=complex)
-    out[index] = rotor_wrench(rotor, speed)[:3]
-    return Spectrum(cycle.base_order, out)
+    return rotor_loads((rotor,), speed, cycle).each(lambda wrench: wrench[:, :3])
 
 
 @lru_cache(maxsize=256)
@@ -151,8 +148,7 @@ def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None,
         raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
     ratio = part.shaft.ratio
     series = _inertia_orders(part, fidelity) * (ratio * speed) ** 2
-    phases = np.array([cis(part.star_turn * h) for h in range(len(series))])
-    moved = series * phases[:, None]
+    moved = series * star_sum(np.ones((1, 1)), [part.star_turn], np.arange(len(series)))
     moved = moved if ratio > 0.0 else moved.conj()
     load = fidelity.kept(spread(moved, order_index(cycle, abs(ratio)), cycle))
     if gas is not None:

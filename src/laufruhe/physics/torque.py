@@ -103,7 +103,8 @@ def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
         If the crank would stop within the cycle.
     """
     torque = crank_torque(engine, point, fidelity)
-    values = torque.sample(FINE * fidelity.samples)
+    # it bends where the gas does: its ends may stand there
+    values = np.concatenate([torque.sample(FINE * fidelity.samples), torque.values(torque.bends)])
     mean = float(torque.coefficients[0].real)
     uneven = crank_motion(engine, point, fidelity).unevenness if fidelity.is_uneven else None
     return TorqueFacts(
