@@ -24,6 +24,25 @@ _DEFINITIONS = (
     "pferdestaerke = 75 * kilogram_force * meter / second = PS",
 )
 
+COMMON = {
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "kg m": {"kg m": 1.0, "kg mm": 1e-3, "g cm": 1e-5},
+    "kg m^2": {"kg m^2": 1.0, "kg cm^2": 1e-4},
+    "Pa": {"Pa": 1.0, "bar": 1e5, "kp/cm^2": 98066.5},
+    "N": {"N": 1.0, "kN": 1e3, "kp": 9.80665},
+    "N m": {"N m": 1.0},
+    "N/m": {"N/m": 1.0, "N/mm": 1e3, "kN/mm": 1e6},
+    "Hz": {"Hz": 1.0},
+    "rad": {"rad": 1.0, "deg": math.radians(1.0)},
+    "rad/s": {"rad/s": 1.0, "rpm": math.tau / 60.0},
+    "m/s": {"m/s": 1.0},
+    "s": {"s": 1.0},
+    "": {"%": 1e-2},
+}
+"""SI values of units that problem files are full of, by what they measure: the registry takes long to load."""
+_COMMON_UNITS = {unit for units in COMMON.values() for unit in units}
+
 
 class UnitError(ValueError):
     """A text that is no number with the unit wanted: rule first, then remedy after '; '."""
@@ -42,12 +61,20 @@ def _registry() -> pint.UnitRegistry[Any]:
 @cache
 def _factor(unit: str, wanted: str) -> float:
     """SI value of one `unit` of the dimension of `wanted`."""
-    registry = _registry()
     unit = _POWER.sub(r"^\1", unit)
     if wanted == "Hz" and "Hz" not in unit:
         # radians have no dimension, so rpm would be taken for a frequency 2 pi too high
         raise UnitError(f"'{unit}' is no frequency in Hz; {advice(wanted)}")
     other = UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}")
+    if wanted in COMMON and unit in _COMMON_UNITS:
+        if unit not in COMMON[wanted]:
+            raise other
+        return COMMON[wanted][unit]
+    return _by_registry(unit, wanted, other)
+
+
+def _by_registry(unit: str, wanted: str, other: UnitError) -> float:
+    registry = _registry()
     try:
         parsed = registry.parse_units(unit)
         one = registry.Quantity(1.0, parsed)

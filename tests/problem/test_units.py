@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from laufruhe.units import UnitError, dimension_name, example, parse, shown
+from laufruhe.units import COMMON, UnitError, _by_registry, dimension_name, example, parse, shown
 
 GRAVITY = 9.80665
 DIMENSIONS = ["m", "kg", "kg m", "kg m^2", "Pa", "N", "N m", "N/m", "rad", "rad/s", "m/s", ""]
@@ -100,6 +100,17 @@ class TestParse:
     def test_newton_metres_in_one_word(self) -> None:
         """As engineers write them; a registry may take them for a count of yarn."""
         assert parse("120 Nm", "N m") == 120.0
+
+    @pytest.mark.parametrize("wanted", COMMON)
+    def test_common_units_are_those_of_the_registry(self, wanted: str) -> None:
+        """What is known without it, to the last bit; and what it does not take for this dimension, they do not."""
+        units = {unit for row in COMMON.values() for unit in row}
+        for unit in units:
+            try:
+                known = _by_registry(unit, wanted, UnitError())
+            except UnitError:
+                known = None
+            assert COMMON[wanted].get(unit) == known, unit
 
     @given(st.floats(-1e300, 1e300), st.sampled_from(["m", "kg", "Pa", "N m"]))
     def test_every_float_in_its_own_unit(self, value: float, unit: str) -> None:

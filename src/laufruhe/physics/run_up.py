@@ -14,11 +14,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.namespaces import NUMBERS
@@ -190,11 +189,17 @@ def _integrated(
 ) -> Array:
     """States from a start on, those of several columns one below the other."""
     scale = float(np.abs(start).max(initial=0.0)) or 1e-6
-    found = solve_ivp(
+    return _solved(
         rates, (0.0, until), start.reshape(-1), "DOP853", t_eval=times, rtol=tolerance,
         atol=tolerance * min(scale, 1e-3), max_step=until / 64,
     )  # fmt: skip
-    return np.asarray(found.y)
+
+
+def _solved(*told: Any, **more: Any) -> Array:
+    """States that SciPy finds; loaded late, for a check or a solve needs none of it."""
+    from scipy.integrate import solve_ivp
+
+    return np.asarray(solve_ivp(*told, **more).y)
 
 
 def _shot(run: Callable[[Array], Array], size: float, tolerance: float, has_stops: bool) -> Array:
@@ -286,7 +291,7 @@ def run_through(
     count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
     for k, (start, end) in enumerate(pairwise(edges)):
         times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
-        states = solve_ivp(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least).y
+        states = _solved(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least)
         force[k] = np.linalg.norm(model.mount_forces(states[:6], states[6:]), axis=-1).max()
         travel[k] = np.linalg.norm((model.travels @ states[:6]).T.reshape(len(times), -1, 3), axis=-1).max()
         state = states[:, -1]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, Seiliger, SliderCrank, Wiebe
+from laufruhe.numerics.roots import rising_root
 from laufruhe.physics.cylinder_volume import ChargedCylinder, dead_centres, gas_exchange_pressure, in_bar
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -50,9 +51,6 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
     ModelError
         With the range that can be reached.
     """
-    # late, for it takes longer than all the rest of a small problem
-    from scipy.optimize import brentq
-
     end = compression_end_pressure(gas)
     if gas.peak_pressure < end * (1.0 - _ROUNDING):
         raise ModelError(
@@ -72,21 +70,11 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
         return 1.0
     if gas.imep >= most:
         return gas.compression_ratio
-    return float(
-        brentq(
-            lambda ratio: seiliger_imep(gas, cycle, ratio) - gas.imep,
-            1.0,
-            gas.compression_ratio,
-            xtol=1e-15,
-            rtol=1e-15,
-        )
-    )
+    return rising_root(lambda ratio: seiliger_imep(gas, cycle, ratio) - gas.imep, 1.0, gas.compression_ratio)
 
 
 def cut_off_angle(gas: Seiliger, part: SliderCrank, cycle: Cycle) -> float:
     """Crank angle from the firing dead centre at which the heat ends [rad] (G5)."""
-    from scipy.optimize import brentq
-
     top, bottom = dead_centres(part)
     cylinder = ChargedCylinder(gas, part, cycle)
     wanted = cylinder.smallest * seiliger_cut_off(gas, cycle)
@@ -96,7 +84,7 @@ def cut_off_angle(gas: Seiliger, part: SliderCrank, cycle: Cycle) -> float:
 
     if beyond(top) >= 0.0 or beyond(bottom) <= 0.0:
         return top if beyond(top) >= 0.0 else bottom
-    return float(brentq(beyond, top, bottom, xtol=1e-15, rtol=1e-15))
+    return rising_root(beyond, top, bottom)
 
 
 def compression_end_pressure(gas: Seiliger) -> float:

@@ -16,6 +16,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
+from laufruhe.solvers.places import solve_places
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import beyond_mounts, solve_unbalances
 
@@ -92,8 +93,6 @@ def _stars_on_mounts(problem: Problem, say: Say) -> Result:
 
 
 def _places(problem: Problem, say: Say) -> Result:
-    from laufruhe.solvers.places import solve_places
-
     return solve_within(problem, lambda at: solve_places(at, say))
 
 
