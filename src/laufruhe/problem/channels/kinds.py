@@ -1,0 +1,163 @@
+"""Kinds of channels: what keys narrow them, which sides of them may be limited, and what moves them (M1-M5, E6-E15)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import ClassVar
+
+from laufruhe.machine import Engine, Role
+from laufruhe.machine.clearances import Span
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.loads import PointLoads
+
+OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
+ON_BLOCK = ("operating_points", "orders")
+AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
+    (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
+)
+
+
+class Needs(StrEnum):
+    """What an engine must have before a channel means anything."""
+
+    NOTHING = ""
+    MOUNTS = "mounts"
+    ELASTIC = "elastic mounts"
+    BEARINGS = "main bearings"
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One thing that is measured.
+
+    Attributes
+    ----------
+    name, unit
+        As files and reports say it; SI.
+    keys
+        That narrow it in a file.
+    needs
+        What the engine must have.
+    sides
+        That a limit may have.
+    minimised
+        Whether it may be an objective.
+    of_loads
+        Whether it depends on what excites the block.
+    size
+        Of what cancels in it where it is zero; zero where loads, masses or nothing do.
+    span
+        Least and largest of its numbers while shafts stand between their places in two engines, if it is of these.
+    """
+
+    name: str
+    unit: str
+    keys: tuple[str, ...] = ()
+    needs: Needs = Needs.NOTHING
+    sides: tuple[str, ...] = ("max",)
+    minimised: bool = True
+    size: float = 0.0
+    of_loads: bool = False
+    span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
+    is_load: ClassVar[bool] = False
+    is_mass: ClassVar[bool] = False
+    is_number: ClassVar[bool] = False
+    is_mounting: ClassVar[bool] = False
+    is_placing: ClassVar[bool] = False
+
+    def __str__(self) -> str:
+        return self.name
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Whether it may change with decisions of these kinds."""
+        return bool(kinds)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadChannel(Channel):
+    """A signal over the cycle, linear in the loads; it has a norm.
+
+    Attributes
+    ----------
+    signal
+        Coefficients of shape (n, places, d) from the loads at an operating point.
+    part
+        Components of the wrench where its one place is the block; None where its places are the mounts.
+    feels_gas
+        Whether the roll moment is in it: gas gives no force (eq. 1).
+    lever
+        Power of a throw's place that its load grows with; None where loads do not add up by places alone.
+    places
+        Names of the places of its signal, by which a file may narrow it; none where that is the block.
+    is_inside
+        Whether it acts inside the crankcase, so that neither the block nor its mounts feel it.
+    """
+
+    keys: tuple[str, ...] = ON_BLOCK
+    signal: Callable[[PointLoads], Spectrum] = field(kw_only=True)
+    part: slice | None = None
+    feels_gas: bool = True
+    lever: int | None = None
+    places: Callable[[Engine], Sequence[str]] = lambda _: ()
+    is_inside: bool = False
+    is_load: ClassVar[bool] = True
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Mounts move what they transmit, and nothing of what the block feels."""
+        return bool(kinds if self.part is None and not self.is_inside else set(kinds) - OF_MOUNTS)
+
+
+@dataclass(frozen=True, eq=False)
+class MassChannel(Channel):
+    """Masses of the rotors of some roles, added up."""
+
+    keys: tuple[str, ...] = ("of",)
+    roles: tuple[Role, ...] = field(kw_only=True)
+    is_mass: ClassVar[bool] = True
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Unbalances, and shafts that may be left out."""
+        return Kind.UNBALANCE in kinds or Kind.STAR in kinds
+
+
+@dataclass(frozen=True, eq=False)
+class NumberChannel(Channel):
+    """Numbers of a design, and no signal.
+
+    Attributes
+    ----------
+    values
+        The first is the one that is shown, all of them keep a limit.
+    """
+
+    values: Callable[[Asked, Answered], Sequence[float]] = field(kw_only=True)
+    is_number: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, eq=False)
+class MountChannel(NumberChannel):
+    """A block on its mounts."""
+
+    needs: Needs = Needs.ELASTIC
+    is_mounting: ClassVar[bool] = True
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Mounts, and all that moves loads where these count."""
+        return bool(kinds) if self.of_loads else bool(set(kinds) & OF_MOUNTS)
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceChannel(NumberChannel):
+    """Where balancer shafts stand."""
+
+    keys: tuple[str, ...] = ("of",)
+    minimised: bool = False
+    is_placing: ClassVar[bool] = True
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Places alone."""
+        return Kind.PLACE in kinds
