@@ -161,6 +161,32 @@ def dimension_of(text: str) -> str | None:
     return None
 
 
+_LENGTH, _MASS, _FORCE = "(?:[nµumcdk]?m|in|inch|ft)", "(?:[mkM]?g|t|lb)", "(?:[mkM]?N|k?p|kgf|lbf)"
+_BY, _OVER, _SQUARE = r"(?: ?[*·.] ?| )", " ?/ ?", r"(?:\^|\*\*)?2"
+_WRITTEN = {
+    "m": _LENGTH,
+    "kg": _MASS,
+    "kg m": f"{_MASS}{_BY}{_LENGTH}",
+    "kg m^2": f"{_MASS}{_BY}{_LENGTH}{_SQUARE}",
+    "Pa": f"[hkMG]?Pa|m?bar|psi|atm?|{_FORCE}{_OVER}{_LENGTH}{_SQUARE}",
+    "N": _FORCE,
+    "N m": f"[kM]?Nm|{_FORCE}{_BY}{_LENGTH}",
+    "N/m": f"{_FORCE}{_OVER}{_LENGTH}",
+    "N s/m": f"{_FORCE}{_BY}s{_OVER}{_LENGTH}|{_MASS}{_OVER}s",
+    "Hz": "[kM]?Hz",
+    "rad": "m?rad|radians?|deg|degrees?|°|turns?",
+    "rad/s": "rpm|(?:rad|deg|turns?|revolutions?) ?/ ?(?:s|min)",
+    "m/s": f"(?:{_LENGTH}) ?/ ?(?:s|min|h)",
+    "s": "[nµum]?s|min|minutes?|h|hours?",
+}
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?:/[0-9]+)?"
+
+
+def pattern(unit: str) -> str:
+    """What a number of this dimension looks like, as an editor checks it: units as they are usually written."""
+    return f"^ *{_NUMBER} *(?:{_WRITTEN[unit]}) *$"
+
+
 _SHOWN = {
     "rad": ("deg", math.degrees(1.0)),
     "rad/s": ("rpm", 30.0 / math.pi),

@@ -12,18 +12,23 @@ from typing import Any
 import jsonschema
 import pytest
 
+from laufruhe import units
 from laufruhe.files.problem_file import schema, shipped_schema
 from laufruhe.files.reader import load
-from problem_files import READY
+from laufruhe.files.ready import schema_file
+from laufruhe.studies.reader import study_schema
+from problem_files import PROBLEMS, READY
 
 LANCHESTER = next(path for path in READY if path.stem == "tractor-four-lanchester")
+STUDIES = [path for path in sorted(PROBLEMS.glob("*.toml")) if path not in READY]
+NUMBERS = ("m", "kg", "kg m", "kg m^2", "Pa", "N", "N m", "N/m", "N s/m", "Hz", "rad", "rad/s", "m/s", "s")
 
 
 @pytest.fixture(scope="module")
-def validator() -> jsonschema.Draft202012Validator:
+def validator() -> jsonschema.Draft7Validator:
     found = json.loads(shipped_schema())
-    jsonschema.Draft202012Validator.check_schema(found)
-    return jsonschema.Draft202012Validator(found)
+    jsonschema.Draft7Validator.check_schema(found)
+    return jsonschema.Draft7Validator(found)
 
 
 def test_shipped_schema_is_the_generated_one() -> None:
@@ -32,7 +37,7 @@ def test_shipped_schema_is_the_generated_one() -> None:
 
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
-def test_ready_problems_validate(path: Path, validator: jsonschema.Draft202012Validator) -> None:
+def test_ready_problems_validate(path: Path, validator: jsonschema.Draft7Validator) -> None:
     """Editors find nothing wrong with what the reader takes."""
     validator.validate(tomllib.loads(path.read_text(encoding="utf-8")))
     assert load(path).name == path.stem
@@ -76,7 +81,7 @@ def _drop(*keys: str | int) -> Any:
         _drop("operating_points"),
     ],
 )
-def test_damaged_problems_do_not(change: Any, validator: jsonschema.Draft202012Validator) -> None:
+def test_damaged_problems_do_not(change: Any, validator: jsonschema.Draft7Validator) -> None:
     """One thing wrong is enough, for the editor and for the reader."""
     tables = tomllib.loads(LANCHESTER.read_text(encoding="utf-8"))
     damaged = copy.deepcopy(tables)
@@ -94,5 +99,48 @@ def test_every_key_of_a_problem_file_is_explained() -> None:
     code = re.findall(r"`[^`\n]+`|^(?:    |```)[^\n]*$|^\[[^\n]*$|^[a-z_]+ *=[^\n]*$", text, re.MULTILINE)
     known = set(re.findall(r"[a-z_]+", "\n".join(code)))
     tables = json.loads(shipped_schema())
-    keys = {key for table in (tables, *tables["$defs"].values()) for key in table.get("properties", {})}
+    keys = {key for table in (tables, *tables["definitions"].values()) for key in table.get("properties", {})}
     assert not keys - known
+
+
+def test_numbers_are_checked_with_their_unit(validator: jsonschema.Draft7Validator) -> None:
+    """Whatever the reader shows as an example of a dimension passes, and no other dimension's example does."""
+    for unit in NUMBERS:
+        found = re.compile(units.pattern(unit))
+        assert found.match(units.example(unit))
+        assert not [other for other in NUMBERS if other != unit and found.match(units.example(other))]
+
+
+@pytest.fixture(scope="module")
+def study_validator() -> jsonschema.Draft7Validator:
+    found = json.loads(schema_file(is_study=True)[1])
+    jsonschema.Draft7Validator.check_schema(found)
+    return jsonschema.Draft7Validator(found)
+
+
+def test_shipped_study_schema_is_the_generated_one() -> None:
+    assert schema_file(is_study=True)[1] == study_schema()
+
+
+@pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)
+def test_ready_studies_validate(path: Path, study_validator: jsonschema.Draft7Validator) -> None:
+    study_validator.validate(tomllib.loads(path.read_text(encoding="utf-8")))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        _set("study", "parts", 0, "titel", value="x"),
+        _set("study", "parts", 0, "kind", value="fraction"),
+        _set("study", "parts", 0, "sweep", 0, "spacing", value="even"),
+        _set("study", "parts", 0, "cases", 0, "equal_power_to", value="4"),
+        _drop("study"),
+    ],
+)
+def test_damaged_studies_do_not(change: Any, study_validator: jsonschema.Draft7Validator) -> None:
+    tables = tomllib.loads((LANCHESTER.parent / "tractor-sweeps.toml").read_text(encoding="utf-8"))
+    damaged = copy.deepcopy(tables)
+    change(damaged)
+    assert damaged != tables
+    with pytest.raises(jsonschema.ValidationError):
+        study_validator.validate(damaged)

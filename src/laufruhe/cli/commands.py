@@ -50,7 +50,48 @@ StopOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECON
 JOBS = "Processes that may be used.  [default: one a core]"
 JobsOption = Annotated[int | None, typer.Option("--jobs", metavar="N", help=JOBS)]
 StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)]
+FROM = "An engine of the catalogue, or a ready problem, to begin with."
+COPIED = "Ready problems to copy, with all files that they refer to."
+SHOWN = "Engines to show: published figures, source, and what is assumed."
 Problems = Annotated[list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False)]
+
+
+@app.command()
+def init(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Problem file to write.")] = Path("problem.toml"),
+    name: Annotated[str | None, typer.Option("--from", metavar="NAME", help=FROM)] = None,
+) -> None:
+    """Write a problem file to begin with, commented, and the schema that editors check it by.
+
+    Asks what it is about, unless --from says so.
+    """
+    with exit_statuses(file):
+        from laufruhe.cli.begin import begun
+
+        typer.echo(begun(file, name), nl=False)
+
+
+@app.command()
+def examples(
+    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME...]", help=COPIED, show_default=False)] = None,
+    to: Annotated[Path, typer.Option("--to", metavar="DIR", help="Folder of the copies.")] = Path(),
+) -> None:
+    """List the ready problems by what they are for, or copy some of them."""
+    with exit_statuses(to):
+        from laufruhe.cli.begin import copied, listed
+
+        typer.echo(copied(names, to) if names else listed(), nl=False)
+
+
+@app.command()
+def engines(
+    names: Annotated[list[str] | None, typer.Argument(metavar="[KEY...]", help=SHOWN, show_default=False)] = None,
+) -> None:
+    """List the engines of the catalogue, or show what is published of some of them."""
+    with exit_statuses(Path("laufruhe")):
+        from laufruhe.cli.begin import catalogue, described
+
+        typer.echo(described(names) if names else catalogue(), nl=False)
 
 
 @app.command()

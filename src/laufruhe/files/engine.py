@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
+from laufruhe.files.catalogue import with_catalogue_key
 from laufruhe.files.complaints import Refused, blamed_on, nearest, one_of
 from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
@@ -87,6 +88,8 @@ def _with_layout_keys(table: type[T]) -> type[T]:
 @_with_layout_keys
 class EngineTable(Table):
     """What the engine is."""
+
+    model_config = ConfigDict(json_schema_extra=with_catalogue_key)
 
     layout: str
     cycle: Literal["two-stroke", "four-stroke"]

@@ -95,7 +95,7 @@ class Number:
         if not self.unit:
             return {"type": "number"}
         told = {"description": units.dimension_name(self.unit), "examples": [units.example(self.unit)]}
-        text = {"type": "string", **told}
+        text = {"type": "string", "pattern": units.pattern(self.unit), **told}
         return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
 
     def _read(self, given: Any) -> float | Open:

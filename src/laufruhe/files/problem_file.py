@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
+from typing import Any
 
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from laufruhe.files import fields as f
 from laufruhe.files.asked import ConstraintTable, ObjectiveTable
@@ -56,8 +57,15 @@ class ProblemFile(Table):
 
 def schema() -> str:
     """The schema as the models have it now."""
-    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **ProblemFile.model_json_schema()}
-    return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
+    return schema_text(ProblemFile)
+
+
+def schema_text(model: type[BaseModel]) -> str:
+    """The schema of a file in the draft that editors support."""
+    found = model.model_json_schema(ref_template="#/definitions/{model}")
+    whole: dict[str, Any] = {"$schema": "http://json-schema.org/draft-07/schema#", **found}
+    whole["definitions"] = whole.pop("$defs")
+    return json.dumps(whole, indent=2, ensure_ascii=False) + "\n"
 
 
 def shipped_schema() -> str:

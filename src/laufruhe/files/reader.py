@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from laufruhe.errors import Complaint, InputError, ModelError
 from laufruhe.files.asked import Scene, limits_of, objective_of
 from laufruhe.files.bearings import bearings_of
+from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, complaints_of, key_path
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
@@ -69,10 +70,16 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
 
 
 def tables_of(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file, their keys not yet checked; `InputError` where it is none."""
+    """The tables of a TOML file, their keys not yet checked; `InputError` where it is none.
+
+    An engine of the catalogue is written out in them.
+    """
     tables = _tables(path)
     _check_shape(tables, path)
-    return tables
+    try:
+        return with_catalogue(tables)
+    except Refused as refused:
+        raise InputError(str(path), (refused.complaint,)) from None
 
 
 def _check_shape(tables: dict[str, Any], path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,6 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 from laufruhe.errors import Complaint, InputError
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
+from laufruhe.files.problem_file import schema_text
 from laufruhe.files.reader import tables_of
 from laufruhe.files.study_tables import MOST_POINTS, axis_of, joined
 from laufruhe.studies.kinds import KINDS
@@ -105,3 +107,28 @@ def _check_sweeps(part: SweptPart, path: Path, where: str) -> None:
 
 def _refused(path: Path, where: str, value: str, rule: str, remedy: str) -> InputError:
     return InputError(str(path), (Complaint(where, value, rule, remedy),))
+
+
+def study_schema() -> str:
+    """The schema of study files, for editors: what a part leaves out may stand in [study.common]."""
+    found = json.loads(schema_text(StudyFile))
+    holder = found["definitions"]["StudyTable"]["properties"]["parts"]
+    kinds = {kind: ref.rsplit("/", 1)[1] for kind, ref in holder["items"]["discriminator"]["mapping"].items()}
+    keys: dict[str, Any] = {}
+    for name in kinds.values():
+        found["definitions"][name].pop("required", None)
+        told = found["definitions"][name]["properties"]
+        keys |= {key: {"description": one["description"]} if "description" in one else {} for key, one in told.items()}
+    # a condition for each kind: an editor then marks the key that is wrong, and not the whole part
+    holder["items"] = {
+        "type": "object",
+        "properties": {**keys, "kind": {"enum": list(kinds)}},
+        "allOf": [
+            {
+                "if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]},
+                "then": {"$ref": f"#/definitions/{name}"},
+            }
+            for kind, name in kinds.items()
+        ],
+    }
+    return json.dumps(found, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,180 @@
+"""A problem file to begin with: every table that is usually wanted, with what to change beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from laufruhe import units
+from laufruhe.files.catalogue import CatalogueEngine, engine_named, shown
+from laufruhe.files.reader import load_tables
+from laufruhe.files.ready import schema_line
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.spectrum import order_amplitude
+from laufruhe.physics.shaking_loads import shaking_loads
+
+SPEED = "3000 rpm"
+_ASIDE = 0.25
+_OVERHANG = 0.1
+# share of one cylinder's own force, or that force at the spacing of two, from which an order is worth balancing
+_FELT = 0.02
+_HEAD = """\
+{schema}
+# Numbers with a dimension are text with a unit: "120 mm", "1.25 kg", "2500 rpm"; bare ones are degrees or plain.
+# A number is left open, to be decided, as {{ between = [low, high] }}; start = value says where it stands now.
+# laufruhe check FILE validates, laufruhe solve FILE decides, laufruhe evaluate FILE takes the design as given.
+
+title = {title}
+{engine}
+[[operating_points]]            # several may follow, each with a name and a weight
+speed = "{speed}"
+
+# [gas]                         # pressure on the pistons; it acts on the roll moment alone
+# model = "seiliger"
+# imep = "9 bar"                # indicated mean effective pressure
+# peak_pressure = "70 bar"
+
+[mounts]                        # assumed: put yours here; x forward from the middle of the crank, y left, z up
+names = ["front left", "front right", "rear left", "rear right"]
+positions = [
+{mounts}
+]
+
+{balance}
+[objective]
+minimise = "mean mount force"   # or "maximum mount force", "rms shaking force" ...
+
+# [[constraints]]
+# limit = "maximum mount force"
+# max = "900 N"
+"""
+
+
+@dataclass(frozen=True)
+class _Excitation:
+    """What an engine leaves free of an order: force and couple are felt, or not."""
+
+    order: int
+    force: float
+    couple: float
+    felt: bool
+
+    def __str__(self) -> str:
+        return f"order {self.order}: force {self.force:.4g} N, couple {self.couple:.4g} N m"
+
+
+def draft_of_engine(name: str) -> str:
+    """A problem about an engine of the catalogue; `Refused` where there is none of that name."""
+    found = engine_named(name, "engine")
+    return _draft(found.name, _catalogue_table(found), found.engine)
+
+
+def draft_of_table(title: str, engine: Mapping[str, Any]) -> str:
+    """A problem about an engine that is described; `InputError` where it cannot be."""
+    lines = "\n".join(f"{key} = {toml_value(value)}" for key, value in engine.items())
+    return _draft(title, f"\n[engine]\n{lines}\n", engine)
+
+
+def _catalogue_table(found: CatalogueEngine) -> str:
+    lines = {key: f"# {key} = {toml_value(value)}" for key, value in found.engine.items()}
+    told = [line for key, line in lines.items() if key not in found.assumed]
+    own = [line for key, line in lines.items() if key in found.assumed]
+    note = [f"# {found.note}"] if found.note else []
+    return "\n".join([
+        "", f"# Published: {found.source}.", *note,
+        "[engine]", f'catalogue = "{found.key}"',
+        "# What it takes from there; without its #, a line takes the place of the catalogue's.", *told,
+        "# Assumed, for no source gives them; the report says so until you put your own:", *own, "",
+    ])  # fmt: skip
+
+
+def _draft(title: str, engine: str, table: Mapping[str, Any]) -> str:
+    tables = {"title": title, "engine": dict(table), "operating_points": [{"speed": SPEED}]}
+    built = load_tables(tables, Path("draft.toml")).engine
+    half = max(abs(part.x) for part in built.slider_cranks) + _OVERHANG
+    places = [(x, y) for x in (half, -half) for y in (_ASIDE, -_ASIDE)]
+    mounts = "\n".join(f'    ["{1e3 * x:g} mm", "{1e3 * y:g} mm", "0 mm"],' for x, y in places)
+    balance = _balance(built)
+    return _HEAD.format(
+        schema=schema_line(), title=toml_value(title), engine=engine, speed=SPEED, mounts=mounts, balance=balance
+    )
+
+
+def _free(engine: Engine) -> list[_Excitation]:
+    """Free forces and couples of first and second order, the roll moment left out."""
+    speed = units.parse(SPEED, "rad/s")
+    wrench = shaking_loads(engine, OperatingPoint(SPEED, speed))
+    parts = engine.slider_cranks
+    one = max(part.reciprocating_mass * part.crank_radius for part in parts) * speed**2
+    apart = max((abs(part.x) for part in parts), default=0.0) or 0.1
+    found = []
+    for order in (1, 2):
+        amplitudes = wrench.at(order)
+        force = float(order_amplitude(amplitudes[:3]))
+        couple = float(order_amplitude(amplitudes[4:]))
+        felt = force > _FELT * one or couple > _FELT * one * apart
+        found.append(_Excitation(order, _rounded(force, one), _rounded(couple, one * apart), felt))
+    return found
+
+
+def _rounded(value: float, scale: float) -> float:
+    return 0.0 if value < 1e-9 * scale else value
+
+
+def _balance(engine: Engine) -> str:
+    """Weights and shafts that may take off what is free."""
+    free = _free(engine)
+    lines = [f"# Free at {SPEED}: {'; '.join(map(str, free))}."]
+    half = max(abs(part.x) for part in engine.slider_cranks)
+    moment = sum(part.reciprocating_mass * part.crank_radius for part in engine.slider_cranks)
+    if free[0].felt:
+        lines += _webs(half, moment)
+    if free[1].felt:
+        ratio = max(part.rod_ratio for part in engine.slider_cranks)
+        lines += _pair(half, 0.25 * ratio * moment)
+    if not any(one.felt for one in free):
+        lines += ["# Nothing of first or second order is left to balance; weights are shown as an example."]
+        lines += _webs(half, moment)
+    return "\n".join(lines) + "\n"
+
+
+def _webs(half: float, moment: float) -> list[str]:
+    lines = ["# weights that turn with the crank"]
+    for name, x in (("front", half), ("rear", -half)) if half else (("web", 0.0),):
+        lines += ["[[counterweights]]", f'name = "{name}"', f'x = "{1e3 * x:g} mm"', *_open(moment), ""]
+    return lines
+
+
+def _pair(half: float, moment: float) -> list[str]:
+    lines = ["# two shafts at twice crank speed, against each other"]
+    for name, ratio, y in (("left", 2, 100), ("right", -2, -100)):
+        lines += [
+            "[[balancer_shafts]]", f'name = "{name}"', f"ratio = {ratio}",
+            f'position = ["{y} mm", "-100 mm"]   # y, z',
+        ]  # fmt: skip
+        for place, x in (("front", half), ("rear", -half)) if half else (("middle", 0.0),):
+            named = [f'name = "{place}"', f'x = "{1e3 * x:g} mm"']
+            lines += ["[[balancer_shafts.unbalances]]", *named, *_open(moment)]
+        lines.append("")
+    return lines
+
+
+def _open(moment: float) -> list[str]:
+    size = f"{10.0 ** math.ceil(math.log10(moment)):.6g}" if moment else "1"
+    upper = next(f"{step * float(size) / 10.0:.6g}" for step in (1, 2, 5, 10) if step * float(size) / 10.0 >= moment)
+    return [f'unbalance = {{ between = ["0 kg m", "{upper} kg m"] }}', "angle = { between = [0, 360] }"]
+
+
+def toml_value(value: Any) -> str:
+    """A value as a TOML file has it."""
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    if isinstance(value, list):
+        return f"[{', '.join(map(toml_value, value))}]"
+    return np.format_float_positional(value, trim="-") if isinstance(value, float) else shown(value)

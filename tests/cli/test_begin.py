@@ -1,0 +1,102 @@
+"""Beginning without the repository: init, examples and engines from an empty folder."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from laufruhe.cli import app
+from laufruhe.files.reader import load
+from laufruhe.files.ready import SCHEMAS, ready
+from laufruhe.studies.reader import load_study
+from problem_files import PROBLEMS
+
+run = CliRunner()
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_every_ready_problem_has_a_use() -> None:
+    assert sorted(ready()) == sorted(path.stem for path in PROBLEMS.glob("*.toml"))
+    listed = run.invoke(app, ["examples"]).output
+    assert all(f"  {name} " in listed for name in ready())
+
+
+def test_the_wheel_carries_them() -> None:
+    told = tomllib.loads((PROBLEMS.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    assert told["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"] == {"problems": "laufruhe/problems"}
+
+
+@pytest.mark.parametrize("name", ["bmw-b48", "tractor-single"])
+def test_init_writes_a_problem_that_loads(here: Path, name: str) -> None:
+    assert run.invoke(app, ["init", "mine.toml", "--from", name]).exit_code == 0
+    text = (here / "mine.toml").read_text(encoding="utf-8")
+    assert text.startswith("#:schema ./laufruhe.schema.json\n")
+    assert {path.name for path in here.iterdir()} == {"mine.toml", "laufruhe.schema.json"}
+    assert load(here / "mine.toml").objective
+
+
+def test_init_leaves_what_is_there(here: Path) -> None:
+    (here / "problem.toml").write_text("mine", encoding="utf-8")
+    found = run.invoke(app, ["init", "--from", "bmw-b48"])
+    assert found.exit_code == 2
+    assert "problem.toml: exists already" in found.output
+    assert [path.name for path in here.iterdir()] == ["problem.toml"]
+
+
+def test_init_with_nobody_to_ask_says_what_to_do(here: Path) -> None:
+    found = run.invoke(app, ["init"])
+    assert (found.exit_code, list(here.iterdir())) == (2, [])
+    assert "add --from" in found.output
+
+
+@pytest.mark.parametrize(
+    ("typed", "cylinders"),
+    [
+        ("\nMy four\n\n\n\n\n\n\n\n\n\n", 4),
+        ("\nMy twin\nvee\n\n2\n60\n\n\n\n\n0.4 kg\n", 2),
+        ("\nMy single\n\n\n1\n\n\n\n\n", 1),
+    ],
+)
+def test_init_asks(here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, cylinders: int) -> None:
+    monkeypatch.setattr("laufruhe.cli.begin._someone_answers", lambda: True)
+    found = run.invoke(app, ["init"], input=typed)
+    assert found.exit_code == 0, found.output
+    assert len(load(here / "problem.toml").engine.cylinders) == cylinders
+
+
+def test_copies_bring_what_they_refer_to(here: Path) -> None:
+    assert run.invoke(app, ["examples", "tractor-sweeps", "tractor-two", "--to", "mine"]).exit_code == 0
+    made = {path.name for path in (here / "mine").iterdir()}
+    assert {"tractor-sweeps.toml", "tractor-single.toml", "tractor-two.toml", *SCHEMAS} <= made
+    load_study(here / "mine" / "tractor-sweeps.toml")
+    # once more: the same files are no loss
+    assert run.invoke(app, ["examples", "tractor-two", "--to", "mine"]).exit_code == 0
+
+
+def test_engines_are_listed_and_shown() -> None:
+    assert "bmw-s85" in run.invoke(app, ["engines"]).output
+    shown = run.invoke(app, ["engines", "buick-3800"]).output
+    assert "Source: Wikipedia" in shown
+    assert 'reciprocating_mass = "0.81 kg"   # assumed' in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["examples", "tractor-fourr"], "is no ready problem"),
+        (["engines", "bmw-b49"], "did you mean 'bmw-b48'?"),
+        (["init", "--from", "bmw-b49"], "did you mean 'bmw-b48'?"),
+    ],
+)
+def test_what_is_not_there_is_refused(here: Path, words: list[str], line: str) -> None:
+    found = run.invoke(app, words)
+    assert found.exit_code == 2
+    assert line in found.output

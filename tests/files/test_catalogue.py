@@ -1,0 +1,109 @@
+"""Engines of the catalogue: consistent in themselves, and taken as defaults of a problem."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from laufruhe import units
+from laufruhe.errors import InputError
+from laufruhe.files.catalogue import engines
+from laufruhe.files.drafts import draft_of_engine
+from laufruhe.files.reader import load
+from laufruhe.machine.layouts import LAYOUTS
+from laufruhe.problem.problem import Problem
+from problem_files import loaded
+
+POINT = '[[operating_points]]\nspeed = "3000 rpm"\n'
+
+
+def _problem(folder: Path, key: str, own: str = "") -> Problem:
+    return loaded(folder, f'title = "One"\n[engine]\ncatalogue = "{key}"\n{own}\n{POINT}')
+
+
+def test_there_are_at_least_thirty() -> None:
+    assert len(engines()) >= 30
+
+
+@pytest.mark.parametrize("key", engines())
+def test_bore_and_stroke_make_the_published_displacement(key: str, tmp_path: Path) -> None:
+    """Bore, stroke and number of cylinders come from the source; so does the displacement, told on its own."""
+    found = engines()[key]
+    parts = _problem(tmp_path, key).engine.slider_cranks
+    volume = sum(0.25 * math.pi * (part.bore or 0.0) ** 2 * part.stroke for part in parts)
+    assert volume == pytest.approx(1e-6 * float(found.displacement.split()[0]), rel=0.004)
+    assert found.source
+    assert found.engine["layout"] in LAYOUTS
+    assert set(found.assumed) <= set(found.engine)
+    assert "reciprocating_mass" in found.assumed
+
+
+@pytest.mark.parametrize(
+    ("key", "intervals"),
+    [
+        ("yamaha-trx850", [270, 450]),
+        ("harley-evolution-1200", [315, 405]),
+        ("buick-231-odd-fire", [90, 90, 90, 150, 150, 150]),
+        ("buick-3800", [120] * 6),
+        ("bmw-s85", [54] * 5 + [90] * 5),
+        ("ferrari-f136", [90] * 8),
+    ],
+)
+def test_cranks_fire_as_their_makers_say(key: str, intervals: list[float], tmp_path: Path) -> None:
+    found = sorted(math.degrees(angle) for angle in _problem(tmp_path, key).engine.firing_intervals)
+    assert found == pytest.approx(intervals)
+
+
+def test_cross_plane_engines_of_three_makers_have_one_crank(tmp_path: Path) -> None:
+    """Their firing orders differ, and were published in three ways of numbering."""
+    stars = [[part.throw for part in _problem(tmp_path, key).engine.cylinders] for key in (
+        "chevrolet-350", "chevrolet-ls1", "ford-302", "ford-modular-4-6", "mercedes-m113-5-0")]  # fmt: skip
+    assert all(star == pytest.approx(stars[0]) for star in stars)
+
+
+def test_what_a_problem_says_itself_counts(tmp_path: Path) -> None:
+    given = _problem(tmp_path, "chevrolet-350")
+    own = _problem(tmp_path, "chevrolet-350", 'rod_ratio = 0.29\nreciprocating_mass = "1 kg"')
+    assert own.engine.cylinders[0].rod_ratio == pytest.approx(0.29)
+    assert own.engine.cylinders[0].crank_radius == given.engine.cylinders[0].crank_radius
+    assert "reciprocating mass 0.94 kg" in given.assumptions[-1]
+    assert "reciprocating mass" not in own.assumptions[-1]
+    assert "Hot Rod" in own.source
+
+
+def test_a_name_alone_is_an_engine(tmp_path: Path) -> None:
+    problem = loaded(tmp_path, f'title = "One"\nengine = "bmw-b48"\nsource = "mine"\n{POINT}')
+    assert len(problem.engine.cylinders) == 4
+    assert problem.source.startswith("mine; engine: ")
+
+
+def test_throws_left_open_take_those_of_the_catalogue_away(tmp_path: Path) -> None:
+    problem = _problem(tmp_path, "mercedes-om605", 'throws = "open"\n[objective]\nminimise = "rms shaking force"')
+    assert problem.phasing is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('engine = "bmw-b49"', "did you mean 'bmw-b48'?"),
+        ('engine = "warp"', "laufruhe engines lists them"),
+        ("[engine]\ncatalogue = 5", "engine.catalogue = 5: is no engine of the catalogue"),
+    ],
+)
+def test_an_engine_that_is_not_there_is_refused_in_a_line(text: str, line: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as refused:
+        loaded(tmp_path, f'title = "One"\n{text}\n{POINT if "[" in text else ""}')
+    assert line in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("key", ["yamaha-sr500", "subaru-ej20", "bmw-b58", "buick-3800", "junkers-jumo-205"])
+def test_a_draft_is_a_problem_with_something_open(key: str, tmp_path: Path) -> None:
+    path = tmp_path / "draft.toml"
+    path.write_text(draft_of_engine(key), encoding="utf-8")
+    problem = load(path)
+    assert problem.decisions
+    assert problem.assumptions
+    assert units.shown(problem.points[0].speed, "rad/s") == "3000 rpm"
