@@ -17,7 +17,20 @@ FILE_LINES = 350
 FUNCTION_LINES = 45
 # Libraries that cost tens of milliseconds to load, and modules that load one, may be imported where they are
 # needed. The commands may import anything late, so that `--help` answers at once, and so may the package itself.
-HEAVY = {"casadi", "clarabel", "cvxpy", "matplotlib", "mpmath", "netCDF4", "pint", "pyscipopt", "scipy", "xarray"}
+HEAVY = {
+    "casadi",
+    "clarabel",
+    "cvxpy",
+    "distributed",
+    "matplotlib",
+    "mpmath",
+    "netCDF4",
+    "pint",
+    "pyscipopt",
+    "scipy",
+    "xarray",
+    "zarr",
+}
 LATE_ROOMS = ("", "cli")
 # Modules whose objects answer for themselves: nobody outside asks which one it is.
 NORMS, CHANNELS = "laufruhe.numerics.norms", "laufruhe.problem.channels"

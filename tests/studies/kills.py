@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import laufruhe
-from laufruhe.studies.runner import KEPT
+from laufruhe.studies.kept_points import KEPT
 
 PROBLEM = Path(__file__).parents[2] / "problems" / "tractor-single.toml"
 STUDY = """

@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 
 from laufruhe.studies import run
+from laufruhe.studies.kept_points import KEPT, KeptPoints
 from laufruhe.studies.reader import load_study
-from laufruhe.studies.runner import KEPT, KeptPoints
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 MARKS = [f"{k:032x}" for k in range(5)]

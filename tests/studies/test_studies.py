@@ -27,12 +27,12 @@ from laufruhe.files.study_tables import CaseTable
 from laufruhe.problem.measure import Limit
 from laufruhe.solvers import solve
 from laufruhe.studies import Point, Scenes, kinds, run, runner
+from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
 from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
-from laufruhe.studies.runner import KEPT
 from laufruhe.studies.swept import solved
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

@@ -12,7 +12,17 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from laufruhe.cli.screen import DONE, FAILED, INTERRUPTED, above_zero, exit_statuses, handing_out, in_time, progress
+from laufruhe.cli.screen import (
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    above_zero,
+    at_work,
+    exit_statuses,
+    handing_out,
+    in_time,
+    progress,
+)
 from laufruhe.cli.supervised import supervised
 
 app = typer.Typer(
@@ -49,6 +59,8 @@ STOP = "Stop after so many seconds; what is finished is kept."
 StopOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=STOP)]
 JOBS = "Processes that may be used.  [default: one a core]"
 JobsOption = Annotated[int | None, typer.Option("--jobs", metavar="N", help=JOBS)]
+SCHEDULER = "Let the Dask workers of the scheduler at ADDRESS do the work."
+SchedulerOption = Annotated[str | None, typer.Option("--scheduler", metavar="ADDRESS", help=SCHEDULER)]
 StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)]
 FROM = "An engine of the catalogue, or a ready problem, to begin with."
 COPIED = "Ready problems to copy, with all files that they refer to."
@@ -135,6 +147,7 @@ def study(
     json: StudyJsonOption = None,
     out: OutOption = None,
     jobs: JobsOption = None,
+    scheduler: SchedulerOption = None,
     time_limit: StopOption = None,
 ) -> None:
     """Run the sweeps and comparisons of a study file.
@@ -142,7 +155,9 @@ def study(
     Finished points are kept; a study that was interrupted goes on where it stopped.
     """
     kept = "interrupted; finished points are kept, the same command goes on"
-    with exit_statuses(problem, kept), in_time(time_limit), handing_out(json, problem) as hand_out:
+    with (
+        exit_statuses(problem, kept), in_time(time_limit), handing_out(json, problem) as hand_out, at_work(scheduler),
+    ):  # fmt: skip
         from laufruhe.cli.study import studied
 
         with progress() as say:

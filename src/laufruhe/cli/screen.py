@@ -62,6 +62,19 @@ def in_time(seconds: float | None) -> Iterator[None]:
         yield
 
 
+@contextmanager
+def at_work(scheduler: str | None) -> Iterator[None]:
+    """What is typed as --scheduler: whoever works there does what can be done side by side."""
+    if scheduler is None:
+        yield
+        return
+    from laufruhe.numerics.cluster import cluster
+    from laufruhe.numerics.workers import working_on
+
+    with cluster(scheduler) as workers, working_on(workers):
+        yield
+
+
 def complain(lines: str) -> None:
     """To standard error."""
     typer.echo(lines, err=True)

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -33,8 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.budget import in_time, left, passed
-from laufruhe.numerics.cores import processors
-from laufruhe.solvers.processes import answer, apart
+from laufruhe.numerics.workers import count_of, each, executor_for
 
 Array = NDArray[np.float64]
 
@@ -212,7 +212,7 @@ def solve_nonlinear(
     max_iterations: int = 500,
     max_seconds: float = 60.0,
 ) -> tuple[LocalOptimum, ...]:
-    """Local optima from every start, the best usable one first.
+    """Local optima from every start, the best usable one first; `SolverError` where workers die again and again.
 
     Parameters
     ----------
@@ -221,23 +221,18 @@ def solve_nonlinear(
     starts
         Points, each of shape (n,); those outside the bounds are brought in.
     workers
-        Processes at most; as many as processors when left out, and none where the work is over sooner.
+        Workers at most; as many as processors when left out, and none where the work is over sooner.
     max_iterations, max_seconds
         Of every start and stage.
-
-    Raises
-    ------
-    SolverError
-        If a process dies.
     """
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
     task = _task(program, max_iterations, max_seconds, len(points) >= WORTH_EXPANDING)
     # one start tells whether the others are worth processes of their own
     began = time.perf_counter()
-    found, rest = _run(task, points[:1]), [] if passed() else points[1:]
-    count = min(len(rest), workers if workers is not None else processors())
+    found, rest = _run((task, points[:1])), [] if passed() else points[1:]
+    count = min(len(rest), workers if workers is not None else count_of())
     shared = count > 1 and (time.perf_counter() - began) * len(rest) > WORTH_PROCESSES
-    found += apart("laufruhe.solvers.nonlinear", task, rest, count) if shared else _run(task, rest)
+    found += _shared(task, rest, count) if shared else _run((task, rest))
     return tuple(sorted(found, key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
 
 
@@ -268,7 +263,15 @@ def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, ma
     )  # fmt: skip
 
 
-def _run(task: _Task, points: Sequence[tuple[int, Array]]) -> list[LocalOptimum]:
+def _shared(task: _Task, points: Sequence[tuple[int, Array]], count: int) -> list[LocalOptimum]:
+    """Optima of starts that `count` workers share. To set the program up costs as much as a start: once each."""
+    shares = [(task, points[k::count]) for k in range(count)]
+    with executor_for(count) as executor, closing(each(_run, shares, executor, patient=True)) as answers:
+        return [optimum for _, some in answers for optimum in some]
+
+
+def _run(share: tuple[_Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
+    task, points = share
     if not points:
         return []
     oracle = ca.Function.deserialize(task.oracle)
@@ -342,8 +345,3 @@ def _slack(multiplier: Array, value: Array, lower: Array, upper: Array) -> float
     distance = np.abs(np.where(multiplier > 0.0, upper - value, value - lower))
     # a side at infinity can carry nothing: its multiplier itself is the violation
     return float((size * np.where(np.isfinite(distance), distance, 1.0)).max(initial=0.0))
-
-
-def serve() -> None:
-    """Read a share of the starts from standard input, write their optima to standard output."""
-    answer(_run)

@@ -1,0 +1,82 @@
+"""A Dask cluster as an executor, by the address of its scheduler."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager, suppress
+from typing import Any, ParamSpec, TypeVar
+
+from laufruhe.errors import Complaint, InputError, SolverError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+PATIENCE = 60.0
+"""Seconds in which the first worker has to come."""
+
+
+class Cluster(Executor):
+    """The workers of a `distributed.Client`."""
+
+    def __init__(self, client: Any) -> None:
+        from distributed.scheduler import KilledWorker
+
+        self._client, self._inner = client, client.get_executor(pure=False)
+        self.losses = (KilledWorker,)
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Ask for a call; while the scheduler is away it waits."""
+        if self._client.status in ("closing", "closed"):
+            raise RuntimeError("the connection is closed")
+        found: Future[T] = self._inner.submit(fn, *args, **kwargs)
+        return found
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Nothing is left to end: the client belongs to who has made it."""
+
+    @property
+    def count(self) -> int:
+        """Threads of all workers that are there."""
+        known = self._client.scheduler_info(n_workers=-1)["workers"].values()
+        return max(sum(int(worker["nthreads"]) for worker in known), 1)
+
+    @property
+    def gone(self) -> str:
+        """What is said where nobody works any more."""
+        return f"the cluster at {self._client.scheduler.address if self._client.scheduler else 'its address'} is gone"
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
+    """The workers of the scheduler at an address, such as tcp://10.0.0.1:8786.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed, or nobody answers there.
+    SolverError
+        If no worker comes.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        rule, remedy = "needs Dask, which is not installed", "pip install 'laufruhe[cluster]'"
+        raise InputError("laufruhe", (Complaint("--scheduler", address, rule, remedy),)) from None
+    # what is lost and found again is told by who asked for it
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        client = Client(address, set_as_default=False, timeout=10)
+    except (OSError, ValueError, TypeError) as error:
+        why = str(error).partition(":")[0] or type(error).__name__
+        complaint = Complaint("--scheduler", address, f"does not answer ({why})", "start one: dask scheduler")
+        raise InputError("laufruhe", (complaint,)) from None
+    try:
+        with suppress(TimeoutError):
+            client.wait_for_workers(1, PATIENCE)
+        if not client.scheduler_info()["workers"]:
+            raise SolverError(f"no worker came to {address} in {PATIENCE:.0f} s; start one: dask worker {address}")
+        yield Cluster(client)
+    finally:
+        client.close(timeout=2)

@@ -1,0 +1,184 @@
+"""Processes on this machine as an executor: each an interpreter of its own.
+
+Neither forks of a threaded process nor the caller's main module are involved, so it works from any script, notebook
+or test. A process that dies takes with it the one call that it was at; the next call gets a new one.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future
+from queue import SimpleQueue
+from types import TracebackType
+from typing import Any, ParamSpec, TypeAlias, TypeVar
+
+from laufruhe.errors import SolverError
+from laufruhe.numerics.cores import end_with_parent, processors
+
+P = ParamSpec("P")
+T = TypeVar("T")
+_Call: TypeAlias = tuple[Future[Any], bytes]
+_THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+_PROGRAM = "from laufruhe.numerics.processes import serve; serve({})"
+
+
+class WorkerDied(BrokenExecutor):
+    """The process that a call was in has ended without an answer."""
+
+
+class Processes(Executor):
+    """Up to `count` processes, started as calls come, ended with the executor or whoever has it.
+
+    They have one thread each for their linear algebra and never hear Ctrl-C: who has them says when they end.
+    """
+
+    def __init__(self, count: int | None = None) -> None:
+        self.count = count if count is not None else processors()
+        self._calls: SimpleQueue[_Call | None] = SimpleQueue()
+        self._lock = threading.Lock()
+        self._tenders: list[threading.Thread] = []
+        self._children: set[subprocess.Popen[bytes]] = set()
+        self._open = 0
+        self._closed = False
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Ask for a call; what is called, and with what, has to be picklable."""
+        future: Future[T] = Future()
+        call = pickle.dumps((fn, args, kwargs))
+        with self._lock:
+            if self._closed:
+                raise RuntimeError("cannot schedule new futures after shutdown")
+            self._open += 1
+            if len(self._tenders) < min(self.count, self._open):
+                tender = threading.Thread(target=self._tend, daemon=True)
+                self._tenders.append(tender)
+                tender.start()
+        self._calls.put((future, call))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes when all calls are answered, or at once where these are cancelled."""
+        with self._lock:
+            self._closed = True
+            children, tenders = tuple(self._children), tuple(self._tenders)
+        if cancel_futures:
+            while not self._calls.empty():
+                call = self._calls.get()
+                if call is not None:
+                    call[0].cancel()
+            for child in children:
+                child.kill()
+        for _ in tenders:
+            self._calls.put(None)
+        for tender in tenders if wait else ():
+            tender.join()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        # after an error nobody waits for the other calls
+        self.shutdown(cancel_futures=kind is not None)
+
+    @property
+    def pids(self) -> tuple[int, ...]:
+        """Of the processes that run."""
+        return tuple(child.pid for child in self._children)
+
+    def _tend(self) -> None:
+        """Hand call after call to one process; in one thread, for the process ends with the thread that started it."""
+        child: subprocess.Popen[bytes] | None = None
+        while (call := self._calls.get()) is not None:
+            future, asked = call
+            if future.set_running_or_notify_cancel():
+                try:
+                    child = self._started() if child is None else child
+                    is_answer, found = _exchanged(child, asked)
+                except (OSError, EOFError, pickle.UnpicklingError) as error:
+                    self._ended(child)
+                    child = None
+                    died = WorkerDied("a process that was at work has died; is there memory enough?")
+                    died.__cause__ = error
+                    future.set_exception(died)
+                else:
+                    future.set_result(found) if is_answer else future.set_exception(found)
+            with self._lock:
+                self._open -= 1
+        self._ended(child)
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        path = os.pathsep.join(p for p in sys.path if p)
+        child = subprocess.Popen(
+            [sys.executable, "-c", _PROGRAM.format(os.getpid())],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
+            env={**os.environ, **_THREADS, "PYTHONPATH": path},
+        )  # fmt: skip
+        with self._lock:
+            self._children.add(child)
+            closed = self._closed
+        if closed:
+            child.kill()
+        return child
+
+    def _ended(self, child: subprocess.Popen[bytes] | None) -> None:
+        if child is not None:
+            with self._lock:
+                self._children.discard(child)
+            child.kill()
+            child.wait()
+            for stream in (child.stdin, child.stdout):
+                if stream is not None:
+                    try:
+                        stream.close()
+                    except OSError:
+                        # what was not written any more
+                        continue
+
+
+def _exchanged(child: subprocess.Popen[bytes], asked: bytes) -> tuple[bool, Any]:
+    assert child.stdin is not None
+    assert child.stdout is not None
+    pickle.dump(asked, child.stdin)
+    child.stdin.flush()
+    is_answer, found = pickle.load(child.stdout)
+    return bool(is_answer), found
+
+
+def serve(parent: int) -> None:
+    """Answer calls from standard input on standard output, until whoever asks is gone."""
+    answers = os.fdopen(os.dup(1), "wb")
+    # what a library prints is no answer
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    end_with_parent(parent)
+    calls: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_listen, args=(calls,), daemon=True).start()
+    while True:
+        answers.write(_answered(calls.get()))
+        answers.flush()
+
+
+def _listen(calls: SimpleQueue[bytes]) -> None:
+    """Take calls in, in a thread of its own: that nobody asks any more is noticed in the middle of a call too."""
+    while True:
+        try:
+            calls.put(pickle.load(sys.stdin.buffer))
+        except BaseException:
+            os._exit(1)
+
+
+def _answered(call: bytes) -> bytes:
+    try:
+        fn, args, kwargs = pickle.loads(call)
+        return pickle.dumps((True, fn(*args, **kwargs)))
+    except BaseException as error:
+        try:
+            error.add_note(traceback.format_exc())
+            pickle.loads(failed := pickle.dumps((False, error)))
+        except Exception:
+            failed = pickle.dumps((False, SolverError(f"{type(error).__name__}: {error}")))
+        return failed

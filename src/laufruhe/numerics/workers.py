@@ -1,0 +1,167 @@
+"""Who does pieces of work: processes on this machine, a cluster, or whatever has the interface of an executor.
+
+All that runs side by side asks here: points of studies, problems of a trade, boxes, stars, starts. Who works changes
+how long it takes, never what is found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Generic, ParamSpec, TypeVar
+
+from laufruhe.errors import SolverError
+from laufruhe.numerics.budget import in_time, left, limited, passed
+from laufruhe.numerics.cores import processors
+from laufruhe.numerics.processes import Processes
+
+P = ParamSpec("P")
+T = TypeVar("T")
+A = TypeVar("A")
+
+AHEAD = 3
+"""Pieces that are asked for at once, for each worker: none waits for the next one."""
+LOSSES = 3
+"""Times that one piece may be lost with its worker; what ends several is the fault of the piece."""
+LONGEST_WAIT = 1e9
+
+_given: ContextVar[Executor | None] = ContextVar("given", default=None)
+
+
+class Here(Executor):
+    """The process itself: a call is answered when it is asked for."""
+
+    count = 1
+
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """The call, done."""
+        future: Future[T] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+HERE = Here()
+
+
+class TimeIsOver(SolverError):
+    """The time limit was reached before all pieces were done."""
+
+
+class WorkersGone(SolverError):
+    """Nobody works any more, or a piece ends each of its workers."""
+
+
+@contextmanager
+def working_on(executor: Executor | None) -> Iterator[None]:
+    """Pieces of what is done within are handed to an executor; with None each search starts processes as it needs."""
+    before = _given.set(executor)
+    try:
+        yield
+    finally:
+        _given.reset(before)
+
+
+def given() -> Executor | None:
+    """The executor that the work within was given to."""
+    return _given.get()
+
+
+@contextmanager
+def executor_for(most: int | None = None) -> Iterator[Executor]:
+    """The executor that was given, or up to `most` processes of this machine."""
+    executor = _given.get()
+    if executor is not None:
+        yield executor
+        return
+    with Processes(most) as own:
+        yield own
+
+
+def count_of(executor: Executor | None = None) -> int:
+    """How many pieces an executor does side by side; of the one given, or the processes that would be, when None."""
+    executor = _given.get() if executor is None else executor
+    if executor is None:
+        return processors()
+    known = getattr(executor, "count", None) or getattr(executor, "_max_workers", None)
+    return known if isinstance(known, int) else processors()
+
+
+def each(
+    work: Callable[[T], A], pieces: Iterable[T], executor: Executor, patient: bool = False
+) -> Generator[tuple[int, A], None, None]:
+    """What becomes of every piece, with its number, as it comes; the error of the first one that fails.
+
+    Pieces are taken as workers get free. One that is lost with its worker is asked for again.
+
+    Parameters
+    ----------
+    patient
+        At the time limit (`laufruhe.numerics.budget`) wait for the pieces that were begun, which know of it.
+
+    Raises
+    ------
+    TimeIsOver
+        At the time limit, unless patient.
+    WorkersGone
+        If a piece is lost again and again, or nobody works any more.
+    """
+    rest = enumerate(in_time(pieces) if patient else pieces)
+    asked = _Asked(work, executor)
+    try:
+        while True:
+            while len(asked.pieces) < AHEAD * count_of(executor) and (following := next(rest, None)) is not None:
+                asked.ask(*following)
+            if not asked.pieces:
+                return
+            seconds = LONGEST_WAIT if patient else min(max(left(), 0.0), LONGEST_WAIT)
+            for future in wait(asked.pieces, seconds, FIRST_COMPLETED).done:
+                yield from asked.answers(future)
+            if passed() and asked.pieces and not patient:
+                raise TimeIsOver("the time limit is over")
+    finally:
+        for future in asked.pieces:
+            future.cancel()
+
+
+class _Asked(Generic[T, A]):
+    """Pieces that an executor was asked for, their numbers, and how often each was lost."""
+
+    def __init__(self, work: Callable[[T], A], executor: Executor) -> None:
+        self._work, self._executor = work, executor
+        self.pieces: dict[Future[A], tuple[int, T, int]] = {}
+
+    def ask(self, number: int, piece: T, losses: int = 0) -> None:
+        """Hand a piece out."""
+        try:
+            future = self._executor.submit(_within, left(), self._work, piece)
+        except (RuntimeError, OSError) as error:
+            raise _nobody(self._executor, error) from None
+        self.pieces[future] = (number, piece, losses)
+
+    def answers(self, future: Future[A]) -> Iterator[tuple[int, A]]:
+        """What has become of a piece; nothing where it was lost and is asked for again."""
+        number, piece, losses = self.pieces.pop(future)
+        try:
+            answer = future.result()
+        except (CancelledError, BrokenExecutor, *getattr(self._executor, "losses", ())) as lost:
+            if losses + 1 >= LOSSES:
+                raise _nobody(self._executor, lost) from None
+            self.ask(number, piece, losses + 1)
+        else:
+            yield number, answer
+
+
+def _within(seconds: float, work: Callable[[T], A], piece: T) -> A:
+    """A piece, where it is done: there it starts no workers of its own."""
+    with limited(seconds), working_on(HERE):
+        return work(piece)
+
+
+def _nobody(executor: Executor, error: BaseException) -> WorkersGone:
+    said = getattr(executor, "gone", "a worker was killed again and again")
+    return WorkersGone(f"{said} ({error})" if str(error) else str(said))

@@ -1,0 +1,66 @@
+"""Points of a study that are finished, each on disk as soon as it is known."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Collection, Iterator
+from contextlib import AbstractContextManager
+from io import FileIO
+from pathlib import Path
+
+from laufruhe.studies.part import Record
+
+KEPT = ".unfinished-points.jsonl"
+# of a line: enough to tell it from any other, and from itself with anything changed
+_SUM = 32
+
+
+class KeptPoints(AbstractContextManager["KeptPoints"]):
+    """Those records of a file that are wanted, by fingerprint; each is on disk as soon as it is known.
+
+    Every line begins with a checksum of the rest of it. What is cut, changed or no point at all does not fit its
+    checksum, counts as not there, and is left alone: its point is solved again. Lines are added whole, between two ends
+    of line, so that neither a cut line nor another study in the same folder spoils them.
+    """
+
+    def __init__(self, path: Path, wanted: Collection[str]) -> None:
+        self.path = path
+        self.records: Record = {}
+        self.seconds: dict[str, float] = {}
+        self._stream: FileIO | None = None
+        for mark, seconds, record in _sound(path):
+            if mark in wanted:
+                self.records[mark], self.seconds[mark] = record, seconds
+
+    def keep(self, mark: str, seconds: float, record: Record) -> None:
+        """Write a record and what it took; it has left the process when this returns."""
+        if self._stream is None:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._stream = FileIO(self.path, "a")
+        line = json.dumps([mark, round(seconds, 6), record]).encode()
+        rest = memoryview(b"\n%b %b\n" % (_checksum(line), line))
+        while rest:
+            # a full disk takes a part, and then complains
+            rest = rest[self._stream.write(rest) :]
+        self.records[mark], self.seconds[mark] = record, seconds
+
+    def __exit__(self, *_: object) -> None:
+        if self._stream is not None:
+            os.fsync(self._stream.fileno())
+            self._stream.close()
+
+
+def _sound(path: Path) -> Iterator[tuple[str, float, Record]]:
+    """Fingerprint, seconds and record of every line that is as it was written."""
+    if path.is_file():
+        with path.open("rb") as lines:
+            for line in lines:
+                found, _, rest = line.rstrip(b"\n").partition(b" ")
+                if found == _checksum(rest):
+                    yield json.loads(rest)
+
+
+def _checksum(line: bytes) -> bytes:
+    return hashlib.sha256(line).hexdigest()[:_SUM].encode()

@@ -1,0 +1,148 @@
+"""Pieces of work side by side: whoever does them, each is answered once, and a death costs only what it was at."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from laufruhe.errors import InputError
+from laufruhe.files.reader import tables_of
+from laufruhe.numerics.budget import left, limited
+from laufruhe.numerics.cluster import cluster
+from laufruhe.numerics.processes import Processes, WorkerDied
+from laufruhe.numerics.workers import (
+    HERE,
+    Here,
+    TimeIsOver,
+    WorkersGone,
+    count_of,
+    each,
+    executor_for,
+    given,
+    working_on,
+)
+
+# what workers are asked for has to be found by them by its name: functions of Python's own, and of the package
+POWERS = [(k, 3) for k in range(40)]
+
+
+def power(pair: tuple[int, int]) -> int:
+    return int(pair[0] ** pair[1])
+
+
+@pytest.mark.parametrize("executor", [HERE, ThreadPoolExecutor(3)], ids=["here", "threads"])
+def test_every_piece_is_answered_once_by_any_executor(executor: Executor) -> None:
+    found = list(each(power, POWERS, executor))
+    assert sorted(found) == [(k, k**3) for k in range(40)]
+
+
+@pytest.mark.slow
+def test_processes_answer_and_pass_errors_on() -> None:
+    with Processes(2) as pool:
+        assert sorted(each(abs, range(-20, 0), pool)) == [(k, 20 - k) for k in range(20)]
+        assert len(pool.pids) == 2
+        assert pool.submit(os.getpid).result() in pool.pids
+        with pytest.raises(ZeroDivisionError):
+            pool.submit(divmod, 1, 0).result()
+        # an error with a constructor of its own, from another interpreter
+        with pytest.raises(InputError, match="does not exist") as caught:
+            pool.submit(tables_of, Path("no-such.toml")).result()
+        assert caught.value.complaints
+        pids = pool.pids
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+    with pytest.raises(RuntimeError, match="after shutdown"):
+        pool.submit(abs, -1)
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_costs_no_answer() -> None:
+    with Processes(2) as pool, closing(each(time.sleep, [0.05] * 30, pool)) as found:
+        done = [next(found)[0]]
+        for pid in pool.pids:
+            os.kill(pid, signal.SIGKILL)
+        done += [number for number, _ in found]
+        assert sorted(done) == list(range(30))
+        assert pool.submit(abs, -1).result() == 1
+
+
+@pytest.mark.slow
+def test_what_ends_its_workers_is_given_up() -> None:
+    with Processes(1) as pool:
+        with pytest.raises(WorkerDied):
+            pool.submit(os._exit, 3).result()
+        with pytest.raises(WorkersGone, match="again and again"):
+            list(each(os._exit, [3], pool))
+
+
+@pytest.mark.slow
+def test_no_process_outlives_an_error() -> None:
+    began, pool = time.monotonic(), Processes(2)
+
+    def fails() -> None:
+        with pool:
+            pool.submit(time.sleep, 60)
+            while not pool.pids:
+                time.sleep(0.01)
+            pids.extend(pool.pids)
+            raise ZeroDivisionError
+
+    pids: list[int] = []
+    with pytest.raises(ZeroDivisionError):
+        fails()
+    assert time.monotonic() - began < 30.0
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+def test_time_that_is_left_goes_with_a_piece() -> None:
+    with limited(100.0):
+        ((_, seconds),) = each(lambda _: left(), [0], HERE)
+    assert 90.0 < seconds <= 100.0
+
+
+def test_at_the_time_limit_patience_waits_for_what_was_begun() -> None:
+    pieces = [0.2] * 50
+    with ThreadPoolExecutor(2) as pool, limited(0.1):
+        with pytest.raises(TimeIsOver):
+            list(each(time.sleep, pieces, pool))
+        begun = list(each(time.sleep, pieces, pool, patient=True))
+    assert 1 <= len(begun) < 50
+
+
+def test_a_worker_starts_no_workers() -> None:
+    with ThreadPoolExecutor(1) as pool:
+        assert list(each(lambda _: given(), [0], pool)) == [(0, HERE)]
+    assert given() is None
+    with working_on(HERE), executor_for(4) as executor:
+        assert isinstance(executor, Here)
+        assert count_of() == 1
+    assert count_of() >= 1
+
+
+def test_pieces_are_taken_as_workers_get_free() -> None:
+    taken = []
+
+    def pieces() -> object:
+        for k in range(1000):
+            taken.append(k)
+            yield (k, 1)
+
+    with ThreadPoolExecutor(2) as pool, closing(each(power, pieces(), pool)) as found:  # type: ignore[arg-type]
+        next(found)
+        assert len(taken) <= 12
+
+
+def test_without_dask_the_option_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"needs Dask, which is not installed; pip install 'laufruhe\[cluster\]'"):
+        cluster("tcp://127.0.0.1:1").__enter__()
