@@ -7,13 +7,16 @@ from laufruhe.machine.gas import Charge, GasModel, PressureTrace, Seiliger, Wieb
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.slider_crank import Rod, SliderCrank
+from laufruhe.machine.torsion import Absorber, Disc, Section, Torsion
 
 __all__ = [
     "CRANKSHAFT",
+    "Absorber",
     "Bearing",
     "Block",
     "Charge",
     "Cycle",
+    "Disc",
     "Engine",
     "GasModel",
     "Mount",
@@ -22,8 +25,10 @@ __all__ = [
     "Rod",
     "Role",
     "Rotor",
+    "Section",
     "Seiliger",
     "Shaft",
     "SliderCrank",
+    "Torsion",
     "Wiebe",
 ]

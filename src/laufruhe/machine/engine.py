@@ -15,6 +15,7 @@ from laufruhe.machine.gas import GasModel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.machine.torsion import Torsion
 from laufruhe.numerics.spectrum import as_order
 from laufruhe.numerics.turns import as_turn, cis, within
 
@@ -76,6 +77,8 @@ class Engine:
         The body that elastic mounts carry; without one the mounts are rigid.
     bearings
         Main bearings of its shafts; empty where nothing is asked of them.
+    torsion
+        Discs and shafts that its crankshaft twists between; None where nothing is asked of them.
     """
 
     name: str
@@ -85,6 +88,7 @@ class Engine:
     mounts: tuple[Mount, ...] = ()
     block: Block | None = None
     bearings: tuple[Bearing, ...] = ()
+    torsion: Torsion | None = None
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "bearings"):

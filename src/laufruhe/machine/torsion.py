@@ -1,0 +1,197 @@
+"""The crankshaft as discs on shafts without mass, and the absorbers that hang on it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from laufruhe.errors import ModelError
+
+STEEL = 80e9
+"""Shear modulus of a shaft [Pa] where none is given."""
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A disc that turns with the crankshaft.
+
+    Attributes
+    ----------
+    inertia
+        Of all that turns with it, the mean of its pistons and rods included [kg m2] (V1).
+    damping
+        Viscous, against the block [N m s/rad].
+    cylinders
+        Names of the slider-cranks that drive it; none of a pulley or flywheel.
+    """
+
+    name: str
+    inertia: float
+    damping: float = 0.0
+    cylinders: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.inertia > 0.0:
+            raise ModelError(f"disc '{self.name}' has an inertia of {self.inertia:g} kg m2; it must be positive")
+        if self.damping < 0.0:
+            raise ModelError(f"disc '{self.name}' has a negative damping")
+
+
+@dataclass(frozen=True)
+class Section:
+    """A shaft without mass from each disc to the next.
+
+    Attributes
+    ----------
+    stiffness
+        [N m/rad].
+    damping
+        Viscous, of its twist [N m s/rad].
+    loss_factor
+        Hysteretic: its stiffness is k (1 + i eta).
+    diameter, bore
+        Of its weakest place [m]; needed for a stress only.
+    """
+
+    name: str
+    stiffness: float
+    damping: float = 0.0
+    loss_factor: float = 0.0
+    diameter: float | None = None
+    bore: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.stiffness > 0.0:
+            raise ModelError(f"shaft '{self.name}' has a stiffness of {self.stiffness:g} N m/rad; it must be positive")
+        if self.damping < 0.0 or self.loss_factor < 0.0:
+            raise ModelError(f"shaft '{self.name}' has a negative damping")
+        if self.diameter is not None and not 0.0 <= self.bore < self.diameter:
+            raise ModelError(f"shaft '{self.name}' has a bore of {self.bore:g} m in a diameter of {self.diameter:g} m")
+
+    @property
+    def modulus(self) -> float:
+        """Polar section modulus [m3] (V8)."""
+        if self.diameter is None:
+            raise ModelError(f"shaft '{self.name}' has no diameter, so its stress is not known; give it one")
+        return math.pi / 16.0 * (self.diameter**4 - self.bore**4) / self.diameter
+
+
+@dataclass(frozen=True)
+class Absorber:
+    """A ring that hangs on a disc: what it takes up, the shaft is spared.
+
+    Attributes
+    ----------
+    on
+        Name of its disc.
+    inertia
+        Of the ring, or of a pendulum's mass about the crank axis [kg m2].
+    stiffness, loss_factor
+        Of its rubber [N m/rad].
+    damping
+        Viscous, between disc and ring [N m s/rad].
+    order
+        That a pendulum is tuned to: the pull of its rotation is a spring J (n w)^2 (V11).
+    damping_ratio
+        Of a pendulum, of its critical damping.
+    """
+
+    name: str
+    on: str
+    inertia: float
+    stiffness: float = 0.0
+    loss_factor: float = 0.0
+    damping: float = 0.0
+    order: float = 0.0
+    damping_ratio: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.inertia > 0.0:
+            raise ModelError(f"absorber '{self.name}' has no inertia, so it absorbs nothing; give its ring one")
+        if min(self.stiffness, self.loss_factor, self.damping, self.order, self.damping_ratio) < 0.0:
+            raise ModelError(f"absorber '{self.name}' has a negative stiffness, damping or order")
+        if not (self.stiffness or self.damping or self.order):
+            raise ModelError(f"nothing holds the ring of absorber '{self.name}'; give stiffness, damping or order")
+
+    def stiffness_at(self, speed: float) -> float:
+        """Of rubber and of the pull of rotation [N m/rad]."""
+        return self.stiffness + self.inertia * (self.order * speed) ** 2
+
+    def damping_at(self, speed: float) -> float:
+        """Viscous [N m s/rad]."""
+        return self.damping + 2.0 * self.damping_ratio * self.order * speed * self.inertia
+
+
+@dataclass(frozen=True)
+class Torsion:
+    """A chain of discs from front to rear, with absorbers on it.
+
+    Attributes
+    ----------
+    discs
+        From the front (C3).
+    sections
+        From each disc to the next, one fewer.
+    absorbers
+        On any of the discs.
+    output
+        Name of the disc where the load takes its torque.
+    """
+
+    discs: tuple[Disc, ...]
+    sections: tuple[Section, ...]
+    absorbers: tuple[Absorber, ...] = ()
+    output: str = ""
+
+    def __post_init__(self) -> None:
+        names = [part.name for part in (*self.discs, *self.absorbers)]
+        double = next((name for name, count in Counter(names).items() if count > 1), None)
+        if double is not None:
+            raise ModelError(f"two discs are called '{double}'; give each its own name")
+        if len(self.discs) < 2 or len(self.sections) != len(self.discs) - 1:
+            raise ModelError("a shaft that twists needs two discs at least, and a section from each to the next")
+        for absorber in self.absorbers:
+            self.index(absorber.on)
+
+    def index(self, name: str) -> int:
+        """Of a disc in the chain."""
+        for k, disc in enumerate(self.discs):
+            if disc.name == name:
+                return k
+        raise ModelError(f"there is no disc '{name}' on the crankshaft")
+
+    @cached_property
+    def driven(self) -> int:
+        """Index of the disc where the load takes its torque: the last where none is named."""
+        return self.index(self.output) if self.output else len(self.discs) - 1
+
+    def scaled(self, length: float, mass: float) -> Torsion:
+        """The same in another size and of the same material: stiffness grows as the cube of length."""
+        inertia, stiffness = mass * length**2, length**3
+        damping = math.sqrt(inertia * stiffness)
+        discs = (replace(d, inertia=d.inertia * inertia, damping=d.damping * damping) for d in self.discs)
+        sections = (
+            replace(s, stiffness=s.stiffness * stiffness, damping=s.damping * damping, bore=s.bore * length,
+                    diameter=None if s.diameter is None else s.diameter * length)
+            for s in self.sections
+        )  # fmt: skip
+        absorbers = (
+            replace(a, inertia=a.inertia * inertia, stiffness=a.stiffness * stiffness, damping=a.damping * damping)
+            for a in self.absorbers
+        )
+        return Torsion(tuple(discs), tuple(sections), tuple(absorbers), self.output)
+
+
+def stiffness_of(pieces: Sequence[tuple[float, float, float]], shear_modulus: float = STEEL) -> float:
+    """Torsional stiffness of round pieces of shaft one behind another [N m/rad] (V2).
+
+    Parameters
+    ----------
+    pieces
+        Length, diameter and bore of each [m].
+    """
+    compliance = sum(32.0 * length / (math.pi * (diameter**4 - bore**4)) for length, diameter, bore in pieces)
+    return shear_modulus / compliance

@@ -1,0 +1,287 @@
+"""Torsional vibration of the crankshaft: natural modes, vector sums, and the steady twist of every section (V1-V12).
+
+Discs on shafts without mass turn about their even speed by small angles q:
+
+    J q'' + C q' + K q = T,        order by order   (K + i H + i h w C - (h w)^2 J) q_h = T_h      (V5)
+
+with T the torque of gas, pistons and rods on each throw (T1), H what hysteresis adds to K. The textbook's
+chapter 2.9 is behind it: discs and shafts, half the reciprocating mass, critical speeds, main orders, stress.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, SliderCrank, Torsion
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.turns import as_turn, phasors
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.torque import crank_torque
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+_STEPS = 1024
+_SINGULAR = 1e-13
+_FREE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class TorsionalModes:
+    """Undamped natural modes, the lowest first, rigid turning left out (V4).
+
+    Attributes
+    ----------
+    frequencies
+        [Hz], shape (modes,).
+    shapes
+        Angle of every disc, shape (discs, modes), the largest of each one.
+    rings
+        Angle of every absorber's ring, shape (absorbers, modes).
+    """
+
+    frequencies: Array
+    shapes: Array
+    rings: Array
+
+
+def reduced_inertia(part: SliderCrank) -> float:
+    """Mean over a turn of what piston and rod reduce to the crank, and the mass at its pin [kg m2] (V1; textbook 2.9).
+
+    With a long rod half the reciprocating mass at the crank radius.
+    """
+    motion = part.motion(np, 2.0 * math.pi * np.arange(_STEPS) / _STEPS)
+    swinging = sum(
+        mass * float(np.mean(np.abs(velocity * np.ones(_STEPS)) ** 2)) for mass, (_, velocity, _) in motion.points
+    )
+    turning = sum(
+        inertia * float(np.mean((rate * np.ones(_STEPS)) ** 2)) for inertia, (rate, _) in motion.swings if inertia
+    )
+    return part.rotating_mass * part.crank_radius**2 + swinging + turning
+
+
+def natural_modes(chain: Torsion, speed: float = 0.0) -> TorsionalModes:
+    """Of the undamped chain with its rings; a pendulum's is that of a speed [rad/s] (V4)."""
+    inertia, stiffness = _inertias(chain), _stiffness(chain, speed).real
+    root = np.sqrt(inertia)
+    squares, shapes = np.linalg.eigh(stiffness / np.outer(root, root))
+    shapes = shapes / root[:, None]
+    # one rigid turn, and one more for each ring that nothing but a fluid holds
+    free = 1 + sum(absorber.stiffness_at(speed) == 0.0 for absorber in chain.absorbers)
+    squares, shapes = squares[free:], shapes[:, free:]
+    count = len(chain.discs)
+    size = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
+    shapes = shapes / size
+    # upright at the front
+    shapes = shapes * np.where(shapes[0] < -_FREE, -1.0, 1.0)
+    return TorsionalModes(np.sqrt(np.maximum(squares, 0.0)) / math.tau, shapes[:count], shapes[count:])
+
+
+def vector_sums(engine: Engine, orders: Sequence[float], modes: TorsionalModes) -> Array:
+    """|sum_k a_k e^{-i h phi_k}| over the cylinders, shape (orders, modes) (V6; textbook 2.9).
+
+    phi_k is when cylinder k fires, a_k how far its throw swings in the mode: work that equal
+    cylinders put into it in that order, over that of one where the mode is largest.
+    """
+    swings, fires = [], []
+    for disc, shape in zip(chain_of(engine).discs, modes.shapes, strict=True):
+        for part in _driving(engine, disc.cylinders):
+            swings.append(shape)
+            fires.append(-as_turn(part.firing_angle) / engine.cycle.turns)
+    multiples = np.array([round(order * engine.cycle.turns) for order in orders])
+    sums = phasors(fires, multiples) @ np.array(swings)
+    floor = (len(fires) + 2) * np.finfo(float).eps * np.abs(swings).sum(axis=0)
+    return np.asarray(np.where(np.abs(sums) <= floor, 0.0, np.abs(sums)))
+
+
+def main_orders(engine: Engine, highest: float) -> tuple[float, ...]:
+    """Orders in which all cylinders work together, multiples of z/2 or z: the same for every firing order (V7)."""
+    first = len(engine.cylinders) / engine.cycle.turns
+    return tuple(k * first for k in range(1, int(highest / first + 1e-9) + 1))
+
+
+def critical_speed(frequency: float, order: float) -> float:
+    """Crank speed [rad/s] at which an order meets a natural frequency [Hz], 60 f / h in rpm (V6)."""
+    return math.tau * frequency / order
+
+
+def chain_of(engine: Engine) -> Torsion:
+    """The chain of an engine that has one.
+
+    Raises
+    ------
+    ModelError
+        If it has none.
+    """
+    if engine.torsion is None:
+        raise ModelError("twist of the crankshaft needs its discs and shafts; add [torsion]")
+    return engine.torsion
+
+
+def has_torsion(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
+    """Whether the twist of the crankshaft is modelled: of one crankshaft whose speed is taken as even."""
+    return engine.torsion is not None and not fidelity.is_uneven
+
+
+def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Torque of gas, pistons and rods on every disc, shape (n, discs) [N m] (T1).
+
+    Raises
+    ------
+    ModelError
+        If the crank speed is uneven, or a cylinder works on another shaft.
+    """
+    if fidelity.is_uneven:
+        raise ModelError("twist is modelled about an even crank speed; leave crank_inertia out")
+    base, turns, chain = engine.cycle.base_order, engine.cycle.turns, chain_of(engine)
+    driving = [(k, part) for k, disc in enumerate(chain.discs) for part in _driving(engine, disc.cylinders)]
+    series = [(k, part, cylinder_torque(engine.cycle, part, point, fidelity)) for k, part in driving]
+    total = np.zeros((max((len(own) for *_, own in series), default=1), len(chain.discs)), dtype=complex)
+    for k, part, own in series:
+        total[: len(own), k] += own * phasors([-as_turn(part.firing_angle) / turns], np.arange(len(own)))[:, 0]
+    return Spectrum(base, total)
+
+
+def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
+    """Coefficients of one cylinder's torque by order of the cycle [N m], counted from its firing (T1)."""
+    if part.shaft != CRANKSHAFT:
+        raise ModelError(f"{part.name} works on shaft '{part.shaft.name}'; twist is modelled of one crankshaft")
+    first = replace(part, name="cylinder", x=0.0, bank=0.0, throw=part.fires_at, firing_angle=0.0)
+    return _cylinder_torque(cycle, first, replace(point, name="", weight=1.0), fidelity)
+
+
+@lru_cache(maxsize=256)
+def _cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity) -> ComplexArray:
+    found = crank_torque(Engine("one cylinder", cycle, (part,)), point, fidelity)
+    series = found.rebased(cycle.base_order).coefficients
+    series.setflags(write=False)
+    return series
+
+
+def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
+    """Twist of every section for one N m on every disc, shape (orders, sections, discs) [rad/(N m)] (V5).
+
+    Of order zero the load takes the torque at its disc, and what stands between them twists.
+
+    Raises
+    ------
+    ModelError
+        If an order stands on a natural frequency that nothing damps.
+    """
+    count, sections = len(chain.discs), np.arange(len(chain.sections))
+    out = np.zeros((len(orders), len(sections), count), dtype=complex)
+    still = orders == 0.0
+    # what drives in front of a section goes through it unless the load takes it there
+    through = np.arange(count)[None, :] <= sections[:, None]
+    taken = (chain.driven <= sections)[:, None]
+    stiff = np.array([section.stiffness for section in chain.sections])
+    out[still] = (through * 1.0 - taken) / stiff[:, None]
+    angles = _receptances(chain, orders[~still], speed)[:, :count, :count]
+    out[~still] = angles[:, :-1] - angles[:, 1:]
+    return out
+
+
+def section_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
+    """What a section makes of its twist, k (1 + i eta) + i h w c, shape (orders, sections) [N m/rad] (V8)."""
+    stiff = np.array([s.stiffness * complex(1.0, s.loss_factor) for s in chain.sections])
+    damping = np.array([s.damping for s in chain.sections])
+    found = stiff + 1j * speed * orders[:, None] * damping
+    return np.where(orders[:, None] == 0.0, found.real, found)
+
+
+def twist(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Angle of each section's front end before its rear end, shape (n, sections) [rad] (V5); its mean under way."""
+    torques = throw_torques(engine, point, fidelity)
+    flexible = receptances(chain_of(engine), torques.orders, point.speed)
+    return Spectrum(torques.base, np.einsum("hsd,hd->hs", flexible, torques.coefficients))
+
+
+def shaft_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Torque in each section, shape (n, sections) [N m], towards the rear (V8)."""
+    turned = twist(engine, point, fidelity)
+    stiff = section_stiffness(chain_of(engine), turned.orders, point.speed)
+    return Spectrum(turned.base, turned.coefficients * stiff)
+
+
+def shaft_stress(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Shear stress of every section that has a diameter, shape (n, those sections) [Pa] (V8; textbook 2.9)."""
+    chain = chain_of(engine)
+    own = [k for k, section in enumerate(chain.sections) if section.diameter is not None]
+    moduli = np.array([chain.sections[k].modulus for k in own])
+    return shaft_torque(engine, point, fidelity).each(lambda torque: torque[:, own] / moduli)
+
+
+def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Array:
+    """Power that each absorber turns to heat, shape (absorbers,) [W] (V12)."""
+    chain, torques = chain_of(engine), throw_torques(engine, point, fidelity)
+    orders, series = torques.orders[1:], torques.coefficients[1:]
+    count = len(chain.discs)
+    angles = np.einsum("hrd,hd->hr", _receptances(chain, orders, point.speed)[:, :, :count], series)
+    heat = []
+    for k, absorber in enumerate(chain.absorbers):
+        swing = np.abs(angles[:, count + k] - angles[:, chain.index(absorber.on)]) ** 2
+        rate = orders * point.speed
+        lost = absorber.stiffness * absorber.loss_factor * rate + absorber.damping_at(point.speed) * rate**2
+        heat.append(0.5 * float(np.sum(lost * swing)))
+    return np.array(heat)
+
+
+def _receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
+    """Inverse of the dynamic stiffness of every order but zero, shape (orders, discs and rings twice)."""
+    rate = (orders * speed)[:, None, None]
+    dynamic = _stiffness(chain, speed) + 1j * rate * _damping(chain, speed) - rate**2 * np.diag(_inertias(chain))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        try:
+            found = np.linalg.inv(dynamic)
+        except np.linalg.LinAlgError:
+            found = np.full_like(dynamic, np.inf)
+    size = np.abs(found).max(axis=(1, 2)) * np.abs(dynamic).max(axis=(1, 2))
+    undamped = np.flatnonzero(~(size * _SINGULAR < 1.0))
+    if len(undamped):
+        raise ModelError(
+            f"order {orders[undamped[0]]:g} meets a natural frequency of the crankshaft at "
+            f"{speed * 30.0 / math.pi:.5g} rpm, and nothing damps it; give damping, or another speed"
+        )
+    return np.asarray(found)
+
+
+def _inertias(chain: Torsion) -> Array:
+    return np.array([part.inertia for part in (*chain.discs, *chain.absorbers)])
+
+
+def _stiffness(chain: Torsion, speed: float) -> ComplexArray:
+    """K + i H of discs and rings (V3, V11)."""
+    links = [(k, k + 1, s.stiffness * complex(1.0, s.loss_factor)) for k, s in enumerate(chain.sections)]
+    for k, a in enumerate(chain.absorbers, len(chain.discs)):
+        links.append((chain.index(a.on), k, a.stiffness_at(speed) + 1j * a.stiffness * a.loss_factor))
+    return _linked(chain, links)
+
+
+def _damping(chain: Torsion, speed: float) -> Array:
+    """C of discs and rings (V3, V10)."""
+    links = [(k, k + 1, complex(s.damping)) for k, s in enumerate(chain.sections)]
+    links += [
+        (chain.index(a.on), k, complex(a.damping_at(speed))) for k, a in enumerate(chain.absorbers, len(chain.discs))
+    ]
+    against_block = [disc.damping for disc in chain.discs] + [0.0] * len(chain.absorbers)
+    return np.asarray(_linked(chain, links).real + np.diag(against_block))
+
+
+def _linked(chain: Torsion, links: Sequence[tuple[int, int, complex]]) -> ComplexArray:
+    count = len(chain.discs) + len(chain.absorbers)
+    out = np.zeros((count, count), dtype=complex)
+    for a, b, value in links:
+        out[[a, b], [a, b]] += value
+        out[[a, b], [b, a]] -= value
+    return out
+
+
+def _driving(engine: Engine, names: Sequence[str]) -> list[SliderCrank]:
+    return [part for part in engine.slider_cranks if part.name in names]
