@@ -16,6 +16,7 @@ LONGEST = 100
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
 # kp/cm2 as it is typed for kp/cm^2; H2O keeps its figure
 _POWER = re.compile(r"(?<=[a-z])([23])\b")
+_OF_ANGLES = ("rad", "rad/s", "N m/rad", "N m s/rad")
 # full names that speak of an angle
 _TURNING = re.compile("radian|degree|turn|revolution|arcminute|arcsecond|grad")
 _DEFINITIONS = (
@@ -86,7 +87,7 @@ def _by_registry(unit: str, wanted: str, other: UnitError) -> float:
         if type(error).__name__ == "DimensionalityError":
             raise other from None
         raise UnitError(f"unit '{unit}' is not known; {advice(wanted)}") from None
-    if (_TURNING.search(str(parsed)) is not None) != (wanted in ("rad", "rad/s")):
+    if (_TURNING.search(str(parsed)) is not None) != (wanted in _OF_ANGLES):
         # a radian has no dimension, so 50 Hz would pass for 50 rad/s and 15 deg for a ratio
         raise other
     if not math.isclose(doubled, 2.0 * ratio):
@@ -103,6 +104,9 @@ _EXAMPLES = {
     "N": ("a force", "900 N"),
     "N m": ("a moment", "120 N m"),
     "N/m": ("a stiffness", "300 N/mm"),
+    "N m/rad": ("a torsional stiffness", "1.2e6 N m/rad"),
+    "N m s/rad": ("a torsional damping", "2 N m s/rad"),
+    "W": ("a power", "500 W"),
     "N s/m": ("a viscous damping", "800 N s/m"),
     "Hz": ("a frequency", "12 Hz"),
     "rad": ("an angle", "90 deg"),
@@ -173,6 +177,9 @@ _WRITTEN = {
     "N m": f"[kM]?Nm|{_FORCE}{_BY}{_LENGTH}",
     "N/m": f"{_FORCE}{_OVER}{_LENGTH}",
     "N s/m": f"{_FORCE}{_BY}s{_OVER}{_LENGTH}|{_MASS}{_OVER}s",
+    "N m/rad": f"(?:[kM]?Nm|{_FORCE}{_BY}{_LENGTH}){_OVER}(?:rad|deg)",
+    "N m s/rad": f"(?:[kM]?Nm|{_FORCE}{_BY}{_LENGTH}){_BY}s{_OVER}(?:rad|deg)",
+    "W": "[mkM]?W|PS|hp",
     "Hz": "[kM]?Hz",
     "rad": "m?rad|radians?|deg|degrees?|°|turns?",
     "rad/s": "rpm|(?:rad|deg|turns?|revolutions?) ?/ ?(?:s|min)",

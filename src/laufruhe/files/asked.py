@@ -26,8 +26,15 @@ _NEEDS = {
     Needs.MOUNTS: ("needs mounts", "add [mounts], or ask for a shaking force"),
     Needs.ELASTIC: ("needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]'),
     Needs.BEARINGS: ("needs main bearings", "list them in [[main_bearings]]"),
+    Needs.TORSION: ("needs the discs and shafts of the crankshaft", "add [torsion]"),
+    Needs.DIAMETERS: ("needs the diameter of a shaft", "give one in [torsion]"),
 }
-_PLACES = {"mounts": "mount", "bearings": "main bearing", "cylinders": "cylinder"}
+_PLACES = {
+    "mounts": "mount",
+    "bearings": "main bearing",
+    "cylinders": "cylinder",
+    "sections": "shaft section",
+}
 _KEYS = ("operating_points", "orders", *_PLACES, "direction_weights", "motions", "frequency", "of")
 _ROUNDING = 1e-9
 _SIDES = ("min", "max", "outside")
@@ -39,6 +46,7 @@ class QuantityTable(Table):
     mounts: list[str] | None = None
     bearings: list[str] | None = None
     cylinders: list[str] | None = None
+    sections: list[str] | None = f.told("Of the crankshaft, named after the discs that they join.")
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     direction_weights: f.Three[f.NonNegative] | None = None
@@ -86,8 +94,7 @@ class Scene:
             raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
         channel, norm = MEASURES[name]
         at, of = where.rsplit(".", 1)[0], getattr(table, "of", None)
-        has = {Needs.MOUNTS: self.engine.mounts, Needs.ELASTIC: self.engine.block, Needs.BEARINGS: self.engine.bearings}
-        if channel.needs in has and not has[channel.needs]:
+        if not self._has(channel.needs):
             raise Refused(where, name, *_NEEDS[channel.needs])
         self._check_keys(channel, table, at)
         weights = table.direction_weights
@@ -104,6 +111,19 @@ class Scene:
             if not shafts:
                 raise Refused(f"{at}", name, "counts balancer shafts, and there are none", "add one, or leave it out")
         return found
+
+    def _has(self, needs: Needs) -> bool:
+        """Whether the engine has what a channel needs."""
+        engine, chain = self.engine, self.engine.torsion
+        has = {
+            Needs.NOTHING: True,
+            Needs.MOUNTS: bool(engine.mounts),
+            Needs.ELASTIC: engine.block is not None,
+            Needs.BEARINGS: bool(engine.bearings),
+            Needs.TORSION: chain is not None,
+            Needs.DIAMETERS: chain is not None and any(s.diameter is not None for s in chain.sections),
+        }
+        return has[needs]
 
     def _check_keys(self, channel: Channel, table: QuantityTable, at: str) -> None:
         """Refuse keys that mean nothing for a channel, and names of what is not there."""

@@ -168,6 +168,26 @@ class OrOpen:
         return inner(given)
 
 
+@dataclass(frozen=True)
+class OneOrEach:
+    """A pydantic field that reads one value for all, or a list with one for each; gives a list either way."""
+
+    inner: Any
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        many: Any = list[self.inner]  # type: ignore[name-defined]
+        return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(many))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        many = handler(schema)
+        return {"anyOf": [many["items"], many]}
+
+    def _read(self, given: Any, inner: Callable[[Any], Any]) -> Any:
+        return inner(given if isinstance(given, list) else [given])
+
+
 def refusal(text: str) -> PydanticCustomError:
     """What a validator raises: a rule, and a remedy after '; '."""
     # braces would be read as a template
@@ -210,6 +230,12 @@ OpenUnbalance: TypeAlias = Annotated[float | Open, Number("kg m", least=0.0, ope
 OpenMass: TypeAlias = Annotated[float | Open, Number("kg", least=0.0, openable=True)]
 LossFactor: TypeAlias = Annotated[float, Number("", least=0.0, most=10.0)]
 Stiffness: TypeAlias = Annotated[float, Number("N/m", least=0.0)]
+TorsionalStiffness: TypeAlias = Annotated[float, Number("N m/rad", above=0.0)]
+TorsionalDamping: TypeAlias = Annotated[float, Number("N m s/rad", least=0.0)]
+PositiveInertia: TypeAlias = Annotated[float, Number("kg m^2", above=0.0)]
+Inertias: TypeAlias = Annotated[list[float], OneOrEach(Annotated[float, Number("kg m^2", least=0.0)])]
+TorsionalStiffnesses: TypeAlias = Annotated[list[float], OneOrEach(TorsionalStiffness)]
+TorsionalDampings: TypeAlias = Annotated[list[float], OneOrEach(TorsionalDamping)]
 Frequency: TypeAlias = Annotated[float, Number("Hz", above=0.0)]
 OpenLossFactor: TypeAlias = Annotated[float | Open, Number("", least=0.0, most=10.0, openable=True)]
 OpenLength: TypeAlias = Annotated[float | Open, Number("m", openable=True)]

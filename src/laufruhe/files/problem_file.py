@@ -19,6 +19,7 @@ from laufruhe.files.mounts import BlockTable, MountsTable
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
+from laufruhe.files.torsion import TorsionTable
 
 SCHEMA = "laufruhe.schema.json"
 
@@ -47,6 +48,7 @@ class ProblemFile(Table):
     mounts: MountsTable | None = None
     block: BlockTable | None = None
     main_bearings: list[MainBearingTable] = Field(default_factory=list)
+    torsion: TorsionTable | None = None
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
     objective: ObjectiveTable | None = None

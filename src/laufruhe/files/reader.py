@@ -25,6 +25,7 @@ from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
+from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Engine
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.problem.decision import Decision
@@ -150,7 +151,8 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     found = mounts_of(file.mounts, file.block)
     cycle = cycle_of(table)
     bearings = bearings_of(file.main_bearings, cylinders)
-    engine = Engine(file.title, cycle, cylinders, tuple(collected.rotors), found.mounts, found.block, bearings)
+    chain = torsion_of(file.torsion, cylinders, throws)
+    engine = Engine(file.title, cycle, cylinders, tuple(collected.rotors), found.mounts, found.block, bearings, chain)
     points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke)
     scene, decisions = Scene(engine, points), (*collected.decisions, *found.decisions)
     objective = objective_of(file.objective, scene)

@@ -147,7 +147,7 @@ class Torsion:
     output: str = ""
 
     def __post_init__(self) -> None:
-        names = [part.name for part in (*self.discs, *self.absorbers)]
+        names = [disc.name for disc in self.discs] + [absorber.name for absorber in self.absorbers]
         double = next((name for name, count in Counter(names).items() if count > 1), None)
         if double is not None:
             raise ModelError(f"two discs are called '{double}'; give each its own name")

@@ -193,7 +193,7 @@ def section_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArr
     stiff = np.array([s.stiffness * complex(1.0, s.loss_factor) for s in chain.sections])
     damping = np.array([s.damping for s in chain.sections])
     found = stiff + 1j * speed * orders[:, None] * damping
-    return np.where(orders[:, None] == 0.0, found.real, found)
+    return np.asarray(np.where(orders[:, None] == 0.0, found.real, found))
 
 
 def twist(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -253,7 +253,7 @@ def _receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
 
 
 def _inertias(chain: Torsion) -> Array:
-    return np.array([part.inertia for part in (*chain.discs, *chain.absorbers)])
+    return np.array([disc.inertia for disc in chain.discs] + [absorber.inertia for absorber in chain.absorbers])
 
 
 def _stiffness(chain: Torsion, speed: float) -> ComplexArray:

@@ -38,7 +38,7 @@ class Measure:
         over all, the largest, or the root mean square over all.
     at, points, rotors
         Names of the places, operating points and rotors that count; all when None. Places are
-        mounts, bearings or cylinders, as the channel has them.
+        mounts, bearings, cylinders or sections of the crankshaft, as the channel has them.
     orders
         Orders of crank speed that count; all when None.
     direction_weights
@@ -114,6 +114,11 @@ class Measure:
     def feels_gas(self) -> bool:
         """Whether gas loads it."""
         return self.is_load and self.load.feels_gas
+
+    @property
+    def feels_order(self) -> bool:
+        """Whether it changes with the firing order of one star."""
+        return self.is_load and self.load.feels_order
 
     @property
     def lever(self) -> int | None:

@@ -138,7 +138,8 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     if not rows:
         raise SolverError("the time limit is over before any fidelity was measured; raise it")
     say("uneven crank speed")
-    flywheel = _price_of_constant_speed(problem) if problem.load_terms else None
+    even_only = any(measure.is_inside for measure in problem.measures)
+    flywheel = _price_of_constant_speed(problem) if problem.load_terms and not even_only else None
     return Trade(problem, tuple(rows), truth, least, rigid_part(problem), flywheel, _price_of_time(problem), whole)
 
 

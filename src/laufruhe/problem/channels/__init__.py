@@ -34,6 +34,7 @@ from laufruhe.problem.channels.kinds import (
     NumberChannel,
     PlaceChannel,
 )
+from laufruhe.problem.channels.torsional import TORSIONAL
 from laufruhe.problem.loads import PointLoads
 
 __all__ = [
@@ -188,6 +189,6 @@ CHANNELS: Mapping[str, Channel] = {
         MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_TORQUE,
         COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
         TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
-        SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS,
+        SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *TORSIONAL,
     )
 }  # fmt: skip

@@ -16,6 +16,7 @@ from laufruhe.problem.loads import PointLoads
 
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders")
+AT_SECTIONS = (*ON_BLOCK, "sections")
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
     (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
 )
@@ -28,6 +29,8 @@ class Needs(StrEnum):
     MOUNTS = "mounts"
     ELASTIC = "elastic mounts"
     BEARINGS = "main bearings"
+    TORSION = "discs and shafts of the crankshaft"
+    DIAMETERS = "a shaft with a diameter"
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +108,26 @@ class LoadChannel(Channel):
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
     is_inside: bool = False
     is_load: ClassVar[bool] = True
+    feels_order: ClassVar[bool] = False
+    """Whether it changes with the firing order of one star."""
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Mounts move what they transmit, and nothing of what the block feels."""
         return bool(kinds if self.part is None and not self.is_inside else set(kinds) - OF_MOUNTS)
+
+
+@dataclass(frozen=True, eq=False)
+class TwistChannel(LoadChannel):
+    """A load that makes the crankshaft twist: of when every cylinder fires, and of no unbalance."""
+
+    keys: tuple[str, ...] = AT_SECTIONS
+    needs: Needs = Needs.TORSION
+    is_inside: bool = True
+    feels_order: ClassVar[bool] = True
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """Throws and firing order."""
+        return Kind.STAR in kinds
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +167,18 @@ class MountChannel(NumberChannel):
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Mounts, and all that moves loads where these count."""
         return bool(kinds) if self.of_loads else bool(set(kinds) & OF_MOUNTS)
+
+
+@dataclass(frozen=True, eq=False)
+class TorsionChannel(NumberChannel):
+    """Numbers of the discs and shafts of the crankshaft."""
+
+    needs: Needs = Needs.TORSION
+    minimised: bool = False
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """What excites them is a matter of throws and firing order, all else of discs and shafts alone."""
+        return self.of_loads and Kind.STAR in kinds
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,74 @@
+"""What can be asked of the crankshaft's twist (V4-V12)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics import torsion
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.channels.kinds import Needs, TorsionChannel, TwistChannel
+from laufruhe.problem.loads import PointLoads
+
+HIGHEST = 12.0
+"""Order up to which main orders count where none are named."""
+
+
+def _names_of_sections(engine: Engine) -> Sequence[str]:
+    return [section.name for section in torsion.chain_of(engine).sections]
+
+
+def _names_of_stressed(engine: Engine) -> Sequence[str]:
+    return [section.name for section in torsion.chain_of(engine).sections if section.diameter is not None]
+
+
+def _of_shafts(
+    name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum],
+    places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Needs = Needs.TORSION,
+) -> TwistChannel:  # fmt: skip
+    def found(loads: PointLoads) -> Spectrum:
+        if loads.moving is None:
+            raise ValueError(f"of a wrench alone there is no {name}")
+        return signal(loads.moving, loads.point, loads.fidelity).each(lambda values: values[:, :, None])
+
+    return TwistChannel(name, unit, needs=needs, signal=found, places=places)
+
+
+def _points(measure: Asked, evaluation: Answered) -> list[PointLoads]:
+    return [at for at in evaluation.loads if measure.points is None or at.point.name in measure.points]
+
+
+def _frequencies(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    """Of every speed that counts: a pendulum's is another at each."""
+    chain = torsion.chain_of(evaluation.engine)
+    speeds = dict.fromkeys(at.point.speed for at in _points(measure, evaluation))
+    return [float(f) for speed in speeds for f in torsion.natural_modes(chain, speed).frequencies]
+
+
+def _critical_speeds(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    orders = measure.orders or torsion.main_orders(evaluation.engine, HIGHEST)
+    frequencies = _frequencies(measure, evaluation)
+    return [torsion.critical_speed(f, order) for order in orders if order > 0.0 for f in frequencies]
+
+
+def _heat(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    """The most that any absorber has to give off at any point that counts."""
+    found = [torsion.absorber_heat(evaluation.engine, at.point, at.fidelity) for at in _points(measure, evaluation)]
+    return (max((float(heat) for each in found for heat in each), default=0.0),)
+
+
+SHAFT_TWIST = _of_shafts("shaft twist", "rad", torsion.twist)
+SHAFT_TORQUE = _of_shafts("shaft torque", "N m", torsion.shaft_torque)
+SHAFT_STRESS = _of_shafts("shaft stress", "Pa", torsion.shaft_stress, _names_of_stressed, Needs.DIAMETERS)
+TORSIONAL_FREQUENCIES = TorsionChannel(
+    "torsional frequencies", "Hz", ("operating_points",), sides=("min", "max", "outside"), values=_frequencies
+)
+CRITICAL_SPEEDS = TorsionChannel(
+    "critical speeds", "rad/s", ("operating_points", "orders"), sides=("min", "max", "outside"),
+    values=_critical_speeds,
+)  # fmt: skip
+ABSORBER_HEAT = TorsionChannel("absorber heat", "W", ("operating_points",), values=_heat, of_loads=True)
+
+TORSIONAL = (SHAFT_TWIST, SHAFT_TORQUE, SHAFT_STRESS, TORSIONAL_FREQUENCIES, CRITICAL_SPEEDS, ABSORBER_HEAT)

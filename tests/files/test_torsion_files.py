@@ -1,0 +1,101 @@
+"""[torsion] of a problem file: what it makes, and what it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import laufruhe
+from laufruhe.errors import InputError
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.machine import Torsion
+from laufruhe.machine.torsion import stiffness_of
+from laufruhe.physics.torsion import reduced_inertia
+from laufruhe.problem.problem import Problem
+from problem_files import PROBLEMS
+
+READY = PROBLEMS / "inline-five-torsion.toml"
+
+
+def changed(**torsion: Any) -> Problem:
+    tables = tables_of(READY)
+    tables["torsion"] |= torsion
+    return load_tables(tables, Path("five.toml"))
+
+
+def chain(problem: Problem) -> Torsion:
+    assert problem.engine.torsion is not None
+    return problem.engine.torsion
+
+
+def test_a_disc_at_every_throw_with_its_pistons() -> None:
+    engine = laufruhe.load(READY).engine
+    own = chain(laufruhe.load(READY))
+    assert [disc.name for disc in own.discs] == ["pulley", *(f"throw {k}" for k in range(1, 6)), "flywheel"]
+    assert own.sections[0].name == "pulley - throw 1"
+    (part, *_) = engine.slider_cranks
+    # 0.5 kg at the crank radius turns with the throw, its rods are in the part
+    assert own.discs[1].inertia == pytest.approx(0.006 + 0.5 * 0.045**2 + reduced_inertia(part))
+    assert own.discs[1].cylinders == ("cylinder 1",)
+    assert own.driven == 6
+
+
+def test_one_number_for_each() -> None:
+    own = chain(changed(throw_inertia=[f"0.00{k} kg m^2" for k in range(1, 6)], cylinder_damping="1 N m s/rad"))
+    steps = [b.inertia - a.inertia for a, b in zip(own.discs[1:5], own.discs[2:6], strict=True)]
+    assert steps == pytest.approx([0.001] * 4)
+    assert own.discs[3].damping == 1.0
+    pieces = [{"length": "30 mm", "diameter": "50 mm"}, {"length": "20 mm", "diameter": "60 mm", "bore": "20 mm"}]
+    section = chain(changed(crank={"pieces": pieces})).sections[2]
+    assert section.stiffness == pytest.approx(stiffness_of([(0.03, 0.05, 0.0), (0.02, 0.06, 0.02)]))
+    assert section.diameter == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("torsion", "said"),
+    [
+        ({"crank": {"stiffness": "0 N m/rad"}}, "must be more than 0 N m/rad"),
+        ({"crank": {"stiffness": "4e5 N m"}}, "is not a unit of a torsional stiffness"),
+        ({"crank": {"stiffness": ["4e5 N m/rad"] * 3}}, "has 3 numbers for 4 shafts between throws"),
+        ({"crank": {}}, "torsion.crank.stiffness: is missing; give stiffness or pieces"),
+        ({"crank": {"pieces": [{"length": "1 mm", "diameter": "9 mm", "bore": "9 mm"}]}}, "is as wide as its shaft"),
+        ({"throw_inertia": ["1 kg m^2"] * 4}, "has 4 numbers for 5 throws"),
+        ({"absorbers": [{"name": "d", "on": "pulley", "damping": "2 N m s/rad"}]}, "absorbers[1].inertia: is missing"),
+        ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "0 kg m^2"}]}, "must be more than 0 kg m^2"),
+        ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "1 kg m^2"}]}, "nothing holds the ring"),
+        ({"absorbers": [{"name": "d", "on": "puley", "inertia": "1 kg m^2"}]}, "did you mean 'pulley'"),
+        ({"output": "gearbox"}, "is no disc"),
+        ({"crank": {"stiffness": {"between": ["1e5 N m/rad", "1e6 N m/rad"]}}}, "cannot be left open"),
+        ({"discs": []}, None),
+    ],
+)
+def test_bad_input_is_one_line(torsion: dict[str, Any], said: str | None) -> None:
+    if said is None:
+        assert len(chain(changed(**torsion)).discs) == 5
+        return
+    with pytest.raises(InputError) as caught:
+        changed(**torsion)
+    assert len(str(caught.value).splitlines()) == 1
+    assert said in str(caught.value)
+
+
+def test_what_a_quantity_needs() -> None:
+    tables = tables_of(READY)
+    for objective, crank, said in (
+        ({"minimise": "maximum shaft stress", "sections": ["throw 1"]}, None, "is no shaft section here"),
+        ({"minimise": "rms shaft twist", "bearings": ["1"]}, None, "means nothing for a shaft twist"),
+        ({"minimise": "absorber heat"}, None, "is not minimised but limited"),
+        ({"minimise": "rms shaft stress"}, "none", "needs the diameter of a shaft"),
+    ):
+        own = {**tables, "objective": objective}
+        if crank:
+            stiff = {"stiffness": "1e5 N m/rad"}
+            discs = [{**disc, "shaft": stiff} for disc in tables["torsion"]["discs"]]
+            own["torsion"] = {**tables["torsion"], "crank": stiff, "discs": discs}
+        with pytest.raises(InputError, match=said):
+            load_tables(own, Path("five.toml"))
+    del tables["torsion"]
+    with pytest.raises(InputError, match=r"needs the diameter of a shaft; give one in \[torsion\]"):
+        load_tables(tables, Path("five.toml"))
