@@ -26,7 +26,7 @@ from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 # travel needs elastic mounts, and is tested with them
 ALL_LOADS = tuple(c for c in channels.CHANNELS.values() if isinstance(c, LoadChannel))
 LOADS = tuple(c for c in ALL_LOADS if c is not channels.MOUNT_TRAVEL and not c.is_inside)
-INSIDE = tuple(Measure(c, norm) for c in ALL_LOADS if c.is_inside for norm in NORMS.values())
+INSIDE = tuple(Measure(c, NORMS[norm]) for c in ALL_LOADS if c.is_inside for norm in c.norms)
 MASSES = tuple(c for c in channels.CHANNELS.values() if isinstance(c, MassChannel))
 HALF_ORDERS = Measure(channels.ROLL_MOMENT, NORMS["rms"], orders=(0.5, 1.5), points=("slow",))
 QUANTITIES = (
@@ -159,8 +159,9 @@ def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) 
 def inside() -> tuple[Problem, AffineModel]:
     """Five bearings between and beside the throws."""
     whole = scene(4)
-    bearings = tuple(Bearing(str(k), 0.25 - 0.12 * k, 0.06, 0.025) for k in range(5))
-    engine = replace(whole.engine, bearings=bearings)
+    bearings = tuple(Bearing(str(k), 0.25 - 0.12 * k, 0.06, 0.025, 0.01) for k in range(5))
+    parts = tuple(replace(part, big_end=(0.05, 0.03)) for part in whole.engine.slider_cranks)
+    engine = replace(whole.engine, slider_cranks=parts, bearings=bearings)
     own = replace(whole, engine=engine, objective=tuple(Term(measure) for measure in INSIDE))
     return own, AffineModel(own)
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.channels import CHANNELS, Needs
 
 Document = dict[str, Any]
@@ -246,7 +245,7 @@ OF_MOUNTS = ("stiffness", "loss factor", "damping", "mount place", "mount inclin
 
 MEASURES: Sequence[str] = [
     name for channel in CHANNELS.values() for name in
-    ([f"{norm} {channel}" for norm in NORMS] if channel.is_load else [channel.name])
+    ([f"{norm} {channel}" for norm in channel.norms] if channel.is_load else [channel.name])
 ]  # fmt: skip
 
 
@@ -274,6 +273,7 @@ def document_of(cell: Cell) -> Document:
     engine = {
         "cycle": str(rng.choice(["two-stroke", "four-stroke"])), "bore": "80 mm", "stroke": "84 mm", "rod_ratio": 0.27,
         "reciprocating_mass": "0.7 kg", "rotating_mass": str(rng.choice(["0 kg", "0.5 kg"])),
+        "big_end": {"diameter": "48 mm", "width": "25 mm"},
     }  # fmt: skip
     document: Document = {"title": str(cell), "engine": {**engine, **LAYOUTS[cell.layout](rng)}}
     points = [{"name": "slow", "speed": f"{rng.integers(700, 1500)} rpm"}]
@@ -290,9 +290,11 @@ def document_of(cell: Cell) -> Document:
     DECISIONS[cell.decision](document, rng)
     if cell.decision in OF_MOUNTS and cell.decision != "stiffness" and rng.random() < 0.3:
         DECISIONS["shaft and phase"](document, rng)
-    if "main-bearing" in cell.measure:
+    if "main-bearing" in cell.measure or "friction" in cell.measure:
         places = (226, 126, 26, -74, -174)
-        document["main_bearings"] = [{"x": f"{x} mm", "diameter": "70 mm", "width": "30 mm"} for x in places]
+        document["main_bearings"] = [
+            {"x": f"{x} mm", "diameter": "70 mm", "width": "30 mm", "friction": 0.01} for x in places
+        ]
     document["objective"] = {"minimise": cell.measure, **_narrowed(cell.measure, document, rng)}
     if rng.random() < 0.4:
         _add_limit(document, rng)

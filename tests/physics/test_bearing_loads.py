@@ -14,7 +14,14 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, Rod, Rotor, Seiliger, Shaft, SliderCrank
 from laufruhe.machine.kinematics import piston_acceleration, rod_acceleration
 from laufruhe.numerics.turns import cis
-from laufruhe.physics.bearing_loads import beam_shares, lever_shares, main_bearing_forces, pin_forces
+from laufruhe.physics.bearing_loads import (
+    beam_shares,
+    crank_pin_pressures,
+    lever_shares,
+    main_bearing_forces,
+    pin_forces,
+    piston_pin_forces,
+)
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import cylinder_pressure
 from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
@@ -240,3 +247,25 @@ def test_peaks_stand_where_heat_comes_at_once() -> None:
     assert found[0] == pytest.approx(found[2], rel=1e-4)
     assert found[2][1] >= abs(complex(along, across) + pull) * (1.0 - 1e-9)
     assert found[2][1] == pytest.approx(abs(complex(along, across) + pull), rel=0.02)
+
+
+def test_piston_pins_carry_what_rods_and_walls_do() -> None:
+    """P + i N along the cylinders is the force of the rods on their pins, less what turns at these."""
+    engine = engine_of(4)
+    phi = np.linspace(0.0, 4.0 * math.pi, 41)
+    found, pins = (of(engine, POINT).values(phi) for of in (piston_pin_forces, pin_forces))
+    for k, part in enumerate(engine.slider_cranks):
+        pull = part.rotating_mass * part.crank_radius * POINT.speed**2 * np.exp(1j * (phi + part.throw))
+        rod = (pins[:, k, 2] + 1j * pins[:, k, 1] - pull) * cmath.exp(-1j * part.bank)
+        assert found[:, k, 0] + 1j * found[:, k, 1] == pytest.approx(rod, rel=1e-9, abs=1e-6)
+
+
+def test_pressure_on_a_pin_is_that_of_its_rod() -> None:
+    engine = engine_of(0)
+    parts = tuple(replace(part, big_end=(0.05, 0.02 + 0.001 * k)) for k, part in enumerate(engine.slider_cranks))
+    forces = pin_forces(engine, POINT)
+    found = crank_pin_pressures(replace(engine, slider_cranks=parts), forces).sample(32)
+    areas = 0.05 * (0.02 + 0.001 * np.arange(4))
+    assert found == pytest.approx(forces.sample(32) / areas[:, None])
+    with pytest.raises(ModelError, match="cylinder 1 has no big end"):
+        crank_pin_pressures(engine, forces)

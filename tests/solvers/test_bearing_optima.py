@@ -12,6 +12,7 @@ from scipy.optimize import minimize
 import laufruhe
 from laufruhe.errors import InputError, ModelError
 from laufruhe.problem.problem import Problem
+from laufruhe.report.json_result import as_dict
 from problem_files import MOUNTS, PROBLEMS
 
 THREE = """
@@ -149,6 +150,27 @@ def test_pressure_is_force_over_area(tmp_path: Path) -> None:
     assert pressure == pytest.approx(force / (0.070 * 0.030), rel=1e-4)
 
 
+def test_friction_power_is_what_the_bearings_lose_in_sum(tmp_path: Path) -> None:
+    """mu |F| v of every bearing, by hand, added up (B7); one bearing alone is its share, and less mass costs more."""
+    rubbing = THREE.replace('width = "30 mm"', 'width = "30 mm"\nfriction = 0.012')
+    problem = read(tmp_path, rubbing + WEBS + asked("mean friction power") + limited("counterweight mass", "4 kg"))
+    result = laufruhe.solve(problem)
+    forces = bearings_by_hand(problem, np.array([d.value for d in result.decisions]))
+    lost = 0.012 * 0.035 * problem.points[0].speed * np.linalg.norm(forces, axis=-1).mean(axis=0)
+    assert result.objective.value == pytest.approx(lost.sum(), rel=2e-4)
+    assert result.certificate is not None
+    assert result.certificate.kind == "global"
+    assert [one["mean"] for one in as_dict(result)["friction"]] == pytest.approx(lost.tolist(), rel=2e-4)
+    # one coefficient and one diameter for all: the design of least mean force
+    force = laufruhe.solve(
+        read(tmp_path, THREE + WEBS + asked("mean main-bearing force") + limited("counterweight mass", "4 kg"))
+    )
+    assert force.objective.value * 4 * 0.012 * 0.035 * problem.points[0].speed == pytest.approx(lost.sum(), rel=2e-4)
+    alone = read(tmp_path, rubbing + WEBS + asked("mean friction power", 'bearings = ["2"]'))
+    measure = alone.objective[0].measure
+    assert result.final.value(measure) == pytest.approx(lost[1], rel=2e-4)
+
+
 @pytest.mark.parametrize(
     ("change", "line"),
     [
@@ -167,6 +189,9 @@ def test_what_is_not_decided_together_is_refused(tmp_path: Path, change: tuple[s
     [
         (('x = "62 mm"', 'x = "175 mm"'), r"main_bearings\[2\].x = \"175 mm\": lets its journal overlap"),
         (('x = "62 mm"', 'x = "0 mm"'), "is the place of a crank pin"),
+        (('x = "-190 mm"', 'x = "-100 mm"'), "leaves the throw of cylinder 3 at x = -125 mm beside all"),
+        (('diameter = "70 mm"', "friction = 0.01"), r"main_bearings\[1\].friction = .*: rubs on a journal"),
+        (('mean main-bearing force"', 'maximum friction power"'), "is no quantity"),
         (('x = "62 mm"', 'shaft = "left"\nx = "62 mm"'), "is no shaft with cranks"),
         (('x = "62 mm"', 'name = "1"\nx = "62 mm"'), "is the name of another bearing"),
         (('mean main-bearing force"', 'mean main-bearing force"\nbearings = ["7"]'), "is no main bearing here"),

@@ -10,7 +10,7 @@ from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.fields import Name, Table
-from laufruhe.machine import CRANKSHAFT, Bearing, SliderCrank
+from laufruhe.machine import CRANKSHAFT, Bearing, Shaft, SliderCrank
 
 
 class MainBearingTable(Table):
@@ -19,8 +19,9 @@ class MainBearingTable(Table):
     x: f.Length
     name: Name | None = f.told("Its number from the front where left out.")
     shaft: str = CRANKSHAFT.name
-    diameter: f.PositiveLength | None = f.told("Of the journal; needed for a pressure.")
+    diameter: f.PositiveLength | None = f.told("Of the journal; needed for a pressure, and for friction power.")
     width: f.PositiveLength | None = Field(default=None, description="Of the journal; needed for a pressure.")
+    friction: f.NonNegative | None = f.told("Coefficient of friction; needed for friction power.")
 
 
 def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]) -> tuple[Bearing, ...]:
@@ -31,19 +32,32 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
         where = f"main_bearings[{k + 1}]"
         if table.shaft not in shafts:
             raise Refused(f"{where}.shaft", table.shaft, "is no shaft with cranks", nearest(table.shaft, list(shafts)))
-        bearing = Bearing(table.name or str(k + 1), table.x, table.diameter, table.width, shafts[table.shaft])
+        if table.friction is not None and table.diameter is None:
+            rule = "rubs on a journal whose diameter is missing"
+            raise Refused(f"{where}.friction", table.friction, rule, "add diameter")
+        name, size = table.name or str(k + 1), (table.diameter, table.width)
+        bearing = Bearing(name, table.x, *size, table.friction, shafts[table.shaft])
         for other in found:
             _check_apart(bearing, other, where)
         if any(part.shaft == bearing.shaft and part.x == bearing.x for part in parts):
             rule = "is the place of a crank pin"
             raise Refused(f"{where}.x", units.shown(bearing.x, "m"), rule, "move it beside the throw")
         found.append(bearing)
-    for shaft in dict.fromkeys(bearing.shaft for bearing in found):
-        own = [bearing for bearing in found if bearing.shaft == shaft]
-        if len(own) < 2:
-            rule = f"leaves {shaft.name} on one bearing, which does not carry its throws"
-            raise Refused("main_bearings", None, rule, "give it two at least")
+    for shaft in shafts.values() if found else ():
+        _check_carried(shaft, [b.x for b in found if b.shaft == shaft], [p for p in parts if p.shaft == shaft])
     return tuple(found)
+
+
+def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[SliderCrank]) -> None:
+    """Every throw between two bearings; one alone may hang over."""
+    if len(bearings) < 2:
+        rule = f"leaves {shaft.name} on {['no', 'one'][len(bearings)]} bearing, which does not carry its throws"
+        raise Refused("main_bearings", None, rule, "give it two at least")
+    places = sorted({part.x for part in parts})
+    for part in parts if len(places) > 1 else ():
+        if not min(bearings) < part.x < max(bearings):
+            rule = f"leaves the throw of {part.name} at x = {units.shown(part.x, 'm')} beside all bearings"
+            raise Refused("main_bearings", None, rule, "put one on its other side")
 
 
 def _check_apart(bearing: Bearing, other: Bearing, where: str) -> None:

@@ -35,6 +35,13 @@ class RodTable(Table):
     inertia: f.Inertia = Field(description="About the centre of gravity.")
 
 
+class BigEndTable(Table):
+    """The rod's bearing on the crank pin."""
+
+    diameter: f.PositiveLength
+    width: f.PositiveLength
+
+
 class ShaftTable(Table):
     """A crankshaft of a free list of parts."""
 
@@ -102,6 +109,7 @@ class EngineTable(Table):
     reciprocating_mass: f.Mass = Field(description="Per cylinder, with the rod's share unless [engine.rod] is given.")
     rotating_mass: f.Mass = f.told("Per throw, at the crank radius.", 0.0)
     rod: RodTable | None = None
+    big_end: BigEndTable | None = f.told("Needed for the pressure on crank pins.")
     rod_inertia_deficit: f.Inertia = f.told("True inertia less that of the two masses.", 0.0)
     throws: f.Throws | None = f.told("At phi = 0; even firing where left out.")
     firing_order: FiringOrder | None = None
@@ -224,6 +232,7 @@ def _mechanism(table: EngineTable) -> tuple[Mechanism, Rod | None]:
         rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit,
         offset=table.offset,
         bore=table.bore,
+        big_end=table.big_end and (table.big_end.diameter, table.big_end.width),
     )
     return mechanism, rod
 

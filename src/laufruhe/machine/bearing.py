@@ -17,13 +17,16 @@ class Bearing:
     x
         Middle of it along the crank axis [m] (C2).
     diameter, width
-        Of its journal [m]; needed for a pressure only.
+        Of its journal [m]; needed for a pressure, the diameter for friction too.
+    friction
+        Coefficient of friction; needed for friction power only.
     """
 
     name: str
     x: float
     diameter: float | None = None
     width: float | None = None
+    friction: float | None = None
     shaft: Shaft = CRANKSHAFT
 
     def __post_init__(self) -> None:
@@ -43,3 +46,12 @@ class Bearing:
         if self.diameter is None or self.width is None:
             raise ModelError(f"bearing '{self.name}' has no diameter or no width, so its pressure is not known")
         return self.diameter * self.width
+
+    @property
+    def drag(self) -> float:
+        """Coefficient of friction times the speed of the journal over that of the crank [m] (B7)."""
+        if self.diameter is None or self.friction is None:
+            raise ModelError(
+                f"bearing '{self.name}' has no diameter or no friction, so its friction power is not known"
+            )
+        return 0.5 * self.friction * self.diameter * abs(self.shaft.ratio)

@@ -100,6 +100,8 @@ class SliderCrank:
         Piston diameter [m]; needed with gas only.
     firing_angle
         Crank angle phi at which this cylinder fires [rad], within the cycle (C5).
+    big_end
+        Diameter and width of the rod's bearing on the crank pin [m]; needed for a pressure only.
     """
 
     name: str
@@ -115,6 +117,7 @@ class SliderCrank:
     bore: float | None = None
     firing_angle: float = 0.0
     shaft: Shaft = CRANKSHAFT
+    big_end: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not self.crank_radius > 0.0:
@@ -194,6 +197,7 @@ class SliderCrank:
             rotating_mass=self.rotating_mass * mass,
             rod_inertia_deficit=self.rod_inertia_deficit * mass * length**2,
             shaft=replace(self.shaft, y=self.shaft.y * length, z=self.shaft.z * length),
+            big_end=self.big_end and (self.big_end[0] * length, self.big_end[1] * length),
         )
 
     @cached_property
@@ -214,6 +218,13 @@ class SliderCrank:
         if self.bore is None:
             raise ModelError(f"{self.name}: gas forces need a bore")
         return math.pi * self.bore**2 / 4.0
+
+    @property
+    def big_end_area(self) -> float:
+        """Projected area of the rod's bearing on its pin, diameter times width [m2]."""
+        if self.big_end is None:
+            raise ModelError(f"{self.name} has no big end, so the pressure on its pin is not known; add engine.big_end")
+        return self.big_end[0] * self.big_end[1]
 
     @property
     def stroke(self) -> float:

@@ -1,4 +1,4 @@
-"""Loads inside the crankcase: rods on their crank pins, crankshaft on its main bearings (B1-B6).
+"""Loads inside the crankcase: pistons on their walls, rods on their pins, crankshaft on its main bearings (B1-B7).
 
 Piston and small end are driven along the cylinder axis by gas and inertia, P; the rod leans on
 the cylinder wall with N, so that it turns as it does. Their sum is what the rod presses on its pin:
@@ -15,8 +15,9 @@ bearings (B6), still linear. What gears and belts add is not modelled.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from laufruhe.physics.shaking_loads import order_index, rotor_loads, spread
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+OfPart: TypeAlias = Callable[[Cycle, SliderCrank, float, GasModel | None, Fidelity], Spectrum]
 
 
 def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
@@ -51,11 +53,30 @@ def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
     ModelError
         If the crank turns unevenly, or a mechanism is no plain slider-crank.
     """
+    return _of_parts(_of_rod, engine, point, fidelity)
+
+
+def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """What drives every piston pin along its cylinder, and how its rod leans on the wall (B1, B2).
+
+    Returns
+    -------
+    Spectrum of shape (n, cylinders, 2) [N]: P away from the crank, N towards i e^{i beta}. Together they press the rod.
+
+    Raises
+    ------
+    ModelError
+        As `pin_forces`.
+    """
+    return _of_parts(_of_piston_pin, engine, point, fidelity)
+
+
+def _of_parts(of: OfPart, engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """The load of every slider-crank side by side."""
     if fidelity.is_uneven:
         raise ModelError("bearing loads are modelled at even crank speed; leave crank_inertia out")
     gas, parts = fidelity.gas_of(point), engine.slider_cranks
-    loads = [_of_rod(engine.cycle, part, point.speed, gas, fidelity) for part in parts]
-    return _side_by_side(loads, engine.cycle)
+    return _side_by_side([of(engine.cycle, part, point.speed, gas, fidelity) for part in parts], engine.cycle)
 
 
 def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -137,13 +158,28 @@ def bearing_pressures(engine: Engine, forces: Spectrum) -> Spectrum:
     return forces.each(lambda own: own / areas[:, None])
 
 
+def crank_pin_pressures(engine: Engine, forces: Spectrum) -> Spectrum:
+    """Force over projected area of every rod's bearing on its pin [Pa] (B5; textbook, example 3)."""
+    areas = np.array([part.big_end_area for part in engine.slider_cranks])
+    return forces.each(lambda own: own / areas[:, None])
+
+
+def friction_loads(engine: Engine, point: OperatingPoint, forces: Spectrum) -> Spectrum:
+    """Force times coefficient of friction times speed of the journal of every main bearing [W] (B7).
+
+    Its length is the power that turns to heat there.
+    """
+    drags = point.speed * np.array([bearing.drag for bearing in engine.bearings])
+    return forces.each(lambda own: own * drags[:, None])
+
+
 def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
     return rotor_loads((rotor,), speed, cycle).each(lambda wrench: wrench[:, :3])
 
 
 @lru_cache(maxsize=256)
-def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    """Force of one rod on its pin, shape (n, 3) (B3)."""
+def _of_piston_pin(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
+    """P and N of one cylinder, shape (n, 2) (B1, B2)."""
     if type(part) is not SliderCrank:
         raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
     ratio = part.shaft.ratio
@@ -153,6 +189,14 @@ def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None,
     load = fidelity.kept(spread(moved, order_index(cycle, abs(ratio)), cycle))
     if gas is not None:
         load = load + fidelity.kept(_gas_orders(cycle, part, gas, fidelity))
+    load.coefficients.setflags(write=False)
+    return load
+
+
+@lru_cache(maxsize=256)
+def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
+    """Force of one rod on its pin, shape (n, 3) (B3)."""
+    load = _of_piston_pin(cycle, part, speed, gas, fidelity)
     y, z = cis(as_turn(part.bank)).imag, cis(as_turn(part.bank)).real
     turned = load.each(lambda own: own @ np.array([[0.0, y, z], [0.0, z, -y]]))
     rod = Rotor("rod", part.x, part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
@@ -203,8 +247,9 @@ def _tangent(part: SliderCrank, alpha: Array) -> Array:
 
 
 def _side_by_side(loads: list[Spectrum], cycle: Cycle) -> Spectrum:
-    """Forces (n, 3) each as one signal (n, places, 3)."""
-    total = Spectrum(cycle.base_order, np.zeros((1, len(loads), 3), dtype=complex))
+    """Forces (n, d) each as one signal (n, places, d)."""
+    width = loads[0].coefficients.shape[-1] if loads else 3
+    total = Spectrum(cycle.base_order, np.zeros((1, len(loads), width), dtype=complex))
     for one, load in zip(np.eye(len(loads)), loads, strict=True):
         total = total + load.each(partial(np.einsum, "k,nd->nkd", one))
     return total

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
-from laufruhe.problem.channels import CRANK_PIN_FORCE, MAIN_BEARING_FORCE, MOUNT_FORCE, LoadChannel
+from laufruhe.problem.channels import CRANK_PIN_FORCE, FRICTION_POWER, MAIN_BEARING_FORCE, MOUNT_FORCE, LoadChannel
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Places:
-    """A force that tables, files and pictures show place by place.
+    """A force, or its power, that tables, files and pictures show place by place.
 
     Attributes
     ----------
@@ -41,14 +41,17 @@ class Places:
 MOUNTS = Places("mounts", MOUNT_FORCE, "Mount forces", "mount")
 BEARINGS = Places("main_bearings", MAIN_BEARING_FORCE, "Main-bearing forces", "bearing")
 PINS = Places("crank_pins", CRANK_PIN_FORCE, "Crank-pin forces", "pin of")
+FRICTION = Places("friction", FRICTION_POWER, "Friction power of main bearings", "bearing")
 
 
 def places_of(result: Result) -> list[Places]:
-    """Forces that this result shows: inside the crankcase those that are asked, and all where bearings are given."""
+    """What this result shows: inside the crankcase what is asked, all where bearings and their friction are given."""
     engine, problem = result.problem.engine, result.problem
     asked, inside = {measure.channel for measure in problem.measures}, has_bearing_loads(engine, problem.fidelity)
     shown = [MOUNTS] if engine.mounts else []
-    return shown + [places for places in (BEARINGS, PINS) if inside and (engine.bearings or places.channel in asked)]
+    rubs = all(bearing.friction is not None for bearing in engine.bearings)
+    given = {BEARINGS: bool(engine.bearings), PINS: bool(engine.bearings), FRICTION: bool(engine.bearings) and rubs}
+    return shown + [places for places, known in given.items() if inside and (known or places.channel in asked)]
 
 
 def hardest_point(result: Result) -> int:

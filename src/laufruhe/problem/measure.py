@@ -186,7 +186,7 @@ Side: TypeAlias = tuple[Limit, str]
 MEAN_MOUNT_FORCE = Measure(MOUNT_FORCE)
 
 MEASURES: Mapping[str, tuple[Channel, Norm]] = {
-    **{f"{norm} {c}": (c, NORMS[norm]) for c in CHANNELS.values() if c.is_load for norm in NORMS},
+    **{f"{norm} {c}": (c, NORMS[norm]) for c in CHANNELS.values() if isinstance(c, LoadChannel) for norm in c.norms},
     **{name: (channel, MEAN) for name, channel in CHANNELS.items() if not channel.is_load},
 }
 """Every measure by the name that files and reports call it."""
@@ -257,11 +257,16 @@ def bends_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> l
 
 
 def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
-    """The places and orders of a signal (n, places, d) that count, its directions weighted."""
+    """The places and orders of a signal (n, places, d) that count, its directions weighted.
+
+    Where places are added up, so many times what each has: a mean over them is then their sum.
+    """
     if measure.at is not None:
         signal = signal.each(lambda values: values[:, measure.places(measure.load.places(engine)), :])
     if measure.direction_weights is not None:
         signal = signal.each(lambda values: values * np.array(measure.direction_weights))
+    if measure.load.adds_up:
+        signal = signal.each(lambda values: values * values.shape[1])
     return signal if measure.orders is None else signal.only(measure.orders)
 
 

@@ -21,7 +21,7 @@ class Mechanism:
 
     Attributes
     ----------
-    crank_radius, rod_length, offset, bore
+    crank_radius, rod_length, offset, bore, big_end
         [m]; see `SliderCrank`.
     reciprocating_mass
         Per cylinder [kg].
@@ -41,6 +41,7 @@ class Mechanism:
     rod_inertia_deficit: float = 0.0
     offset: float = 0.0
     bore: float | None = None
+    big_end: tuple[float, float] | None = None
 
     def cylinder(
         self,
@@ -77,6 +78,7 @@ class Mechanism:
             bore=self.bore,
             firing_angle=firing_angle,
             shaft=shaft,
+            big_end=self.big_end,
         )
 
 

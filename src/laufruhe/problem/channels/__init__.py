@@ -14,7 +14,14 @@ from laufruhe.machine import Engine, Role
 from laufruhe.machine.clearances import Span, distances, reaches
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import mount_numbers
-from laufruhe.physics.bearing_loads import bearing_pressures, main_bearing_forces, pin_forces
+from laufruhe.physics.bearing_loads import (
+    bearing_pressures,
+    crank_pin_pressures,
+    friction_loads,
+    main_bearing_forces,
+    pin_forces,
+    piston_pin_forces,
+)
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
@@ -24,6 +31,8 @@ from laufruhe.problem.channels.kinds import (
     AT_BEARINGS,
     AT_CYLINDERS,
     AT_MOUNTS,
+    IN_CYLINDERS,
+    OF_BEARINGS,
     OF_MOUNTS,
     ON_BLOCK,
     Channel,
@@ -69,7 +78,7 @@ def _on_mounts(name: str, unit: str, needs: Needs, signal: Callable[[PointLoads]
 
 def _inside(
     name: str, unit: str, keys: tuple[str, ...], needs: Needs, places: Callable[[Engine], Sequence[str]],
-    signal: Callable[[Engine, PointLoads], Spectrum],
+    signal: Callable[[Engine, PointLoads], Spectrum], adds_up: bool = False,
 ) -> LoadChannel:  # fmt: skip
     """A load inside the crankcase: of what moves, whatever the block stands on."""
 
@@ -78,7 +87,7 @@ def _inside(
             raise ValueError(f"of a wrench alone there is no {name}")
         return signal(loads.moving, loads)
 
-    return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True)
+    return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True, adds_up=adds_up)
 
 
 def _names_of_mounts(engine: Engine) -> Sequence[str]:
@@ -154,6 +163,24 @@ CRANK_PIN_FORCE = _inside(
     lambda moving, at: pin_forces(moving, at.point, at.fidelity),
 )  # fmt: skip
 
+CRANK_PIN_PRESSURE = _inside(
+    "crank-pin pressure", "Pa", AT_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
+    lambda moving, at: crank_pin_pressures(moving, pin_forces(moving, at.point, at.fidelity)),
+)  # fmt: skip
+SIDE_FORCE = _inside(
+    "side force", "N", IN_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
+    lambda moving, at: piston_pin_forces(moving, at.point, at.fidelity).each(lambda values: values[..., 1:]),
+)  # fmt: skip
+ROD_FORCE = _inside(
+    "rod force", "N", IN_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
+    lambda moving, at: piston_pin_forces(moving, at.point, at.fidelity),
+)  # fmt: skip
+FRICTION_POWER = _inside(
+    "friction power", "W", OF_BEARINGS, Needs.BEARINGS, _names_of_bearings,
+    lambda moving, at: friction_loads(moving, at.point, main_bearing_forces(moving, at.point, at.fidelity)),
+    adds_up=True,
+)  # fmt: skip
+
 COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))
 BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
 ADDED_MASS = MassChannel("added mass", "kg", roles=(Role.COUNTERWEIGHT, Role.BALANCER))
@@ -186,8 +213,8 @@ CHANNELS: Mapping[str, Channel] = {
     channel.name: channel
     for channel in (
         MOUNT_FORCE, MOUNT_TRAVEL, SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT,
-        MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_TORQUE,
-        COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
+        MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE, SIDE_FORCE,
+        FRICTION_POWER, CRANK_TORQUE, COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
         TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
         SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *TORSIONAL,
     )

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from laufruhe.machine import Engine, Role
 from laufruhe.machine.clearances import Span
+from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.decision import Kind
@@ -20,6 +21,7 @@ AT_SECTIONS = (*ON_BLOCK, "sections")
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
     (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
 )
+OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
 class Needs(StrEnum):
@@ -98,6 +100,8 @@ class LoadChannel(Channel):
         Names of the places of its signal, by which a file may narrow it; none where that is the block.
     is_inside
         Whether it acts inside the crankcase, so that neither the block nor its mounts feel it.
+    adds_up
+        Whether its places are added up, so that no norm but the mean over the cycle has a meaning.
     """
 
     keys: tuple[str, ...] = ON_BLOCK
@@ -107,9 +111,15 @@ class LoadChannel(Channel):
     lever: int | None = None
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
     is_inside: bool = False
+    adds_up: bool = False
     is_load: ClassVar[bool] = True
     feels_order: ClassVar[bool] = False
     """Whether it changes with the firing order of one star."""
+
+    @property
+    def norms(self) -> Collection[str]:
+        """Names of those that it may be asked in."""
+        return (MEAN.name,) if self.adds_up else tuple(NORMS)
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Mounts move what they transmit, and nothing of what the block feels."""

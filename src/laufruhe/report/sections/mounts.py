@@ -1,4 +1,4 @@
-"""Force on every mount, main bearing and crank pin over the cycle, before and after."""
+"""Force on every mount, main bearing and crank pin over the cycle, and what bearings lose, before and after."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from laufruhe.physics.metrics import CycleMeasures
 from laufruhe.present.measures import Places, load_designs, places_of
 from laufruhe.present.numbers import DASH, number, percent
 from laufruhe.problem.evaluation import measured
+from laufruhe.problem.measure import Measure
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 
@@ -29,8 +30,11 @@ def _table(result: Result, places: Places) -> Grid:
     rows = tuple((*lead, *_cells(each, scale)) for lead, each in found)
     at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
     note = f"The design as given has none: {result.initial.resonance}." if result.initial.resonance else ""
+    if places.channel.adds_up:
+        sums = [number(design.value(Measure(places.channel))) for design in designs]
+        note = f"In sum {' before and '.join(sums)}{' after' if len(sums) > 1 else ''}, on average over the cycle."
     head = (*first, *(TWO if len(designs) > 1 else ONE))
-    return Grid(f"{places.title}{at} [N]", head, rows, note=note, left=len(first))
+    return Grid(f"{places.title}{at} [{places.channel.unit}]", head, rows, note=note, left=len(first))
 
 
 def _cells(each: list[CycleMeasures], scale: float) -> list[str]:
