@@ -232,7 +232,7 @@ def _mechanism(table: EngineTable) -> tuple[Mechanism, Rod | None]:
         rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit,
         offset=table.offset,
         bore=table.bore,
-        big_end=table.big_end and (table.big_end.diameter, table.big_end.width),
+        big_end=None if table.big_end is None else (table.big_end.diameter, table.big_end.width),
     )
     return mechanism, rod
 
