@@ -186,7 +186,7 @@ Side: TypeAlias = tuple[Limit, str]
 MEAN_MOUNT_FORCE = Measure(MOUNT_FORCE)
 
 MEASURES: Mapping[str, tuple[Channel, Norm]] = {
-    **{f"{norm} {c}": (c, NORMS[norm]) for c in CHANNELS.values() if isinstance(c, LoadChannel) for norm in c.norms},
+    **{f"{norm} {c}": (c, NORMS[norm]) for c in CHANNELS.values() for norm in c.norms},
     **{name: (channel, MEAN) for name, channel in CHANNELS.items() if not channel.is_load},
 }
 """Every measure by the name that files and reports call it."""

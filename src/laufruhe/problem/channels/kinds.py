@@ -77,6 +77,11 @@ class Channel:
     def __str__(self) -> str:
         return self.name
 
+    @property
+    def norms(self) -> Collection[str]:
+        """Names of those that it may be asked in; none where it is a number."""
+        return ()
+
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Whether it may change with decisions of these kinds."""
         return bool(kinds)
@@ -118,7 +123,7 @@ class LoadChannel(Channel):
 
     @property
     def norms(self) -> Collection[str]:
-        """Names of those that it may be asked in."""
+        """All, or the mean where places are added up."""
         return (MEAN.name,) if self.adds_up else tuple(NORMS)
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
