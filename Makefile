@@ -7,13 +7,14 @@ BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test test-fast attack matrix bench pictures lint format clean distclean
+.PHONY: help solve study test test-fast test-long attack matrix bench pictures lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
 	@echo "make study      sweeps and comparisons that STUDY describes ($(STUDY))"
 	@echo "make test-fast  tests of every room, under a minute on two cores"
 	@echo "make test       all tests, minutes"
+	@echo "make test-long  the long tail of random families, which make test leaves out"
 	@echo "make attack     random problems against an independent model, ATTACK='--number 100'"
 	@echo "make matrix     every kind of decision, measure and layout together, an hour and more; MATRIX='--share 0.1'"
 	@echo "make lint       style, types, direction of imports"
@@ -39,13 +40,16 @@ study: $(STAMP)
 	$(BIN)/laufruhe study $(STUDY)
 
 # A process for every core, one thread in each.
-test test-fast: export OMP_NUM_THREADS = 1
+test test-fast test-long: export OMP_NUM_THREADS = 1
 
 test: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) $(TESTS)
 
 test-fast: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) -m "not slow" --hypothesis-profile=fast $(TESTS)
+
+test-long: $(STAMP)
+	$(BIN)/python -m pytest $(LANES) --long $(TESTS)
 
 # What the log under results/attack/ has is not run again.
 attack: export OMP_NUM_THREADS = 1

@@ -8,6 +8,10 @@ import pytest
 from hypothesis import settings
 from hypothesis.configuration import set_hypothesis_home_dir
 
+# Tests run in a process for each core: none of them starts further ones unless it says how many.
+if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "sched_getaffinity"):
+    os.sched_getaffinity = lambda _: {0}
+
 # Set before any test module can import matplotlib: no test has a display.
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -16,6 +20,17 @@ settings.register_profile("laufruhe", derandomize=True, deadline=None, database=
 # `make test-fast` asks for this one
 settings.register_profile("fast", settings.get_profile("laufruhe"), max_examples=10)
 settings.load_profile("laufruhe")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--long", action="store_true", help="run what is marked long, and only that")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    wanted = bool(config.getoption("--long"))
+    left_out = [item for item in items if (item.get_closest_marker("long") is not None) != wanted]
+    items[:] = [item for item in items if item not in set(left_out)]
+    config.hook.pytest_deselected(items=left_out)
 
 
 def pytest_configure(config: pytest.Config) -> None:

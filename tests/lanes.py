@@ -1,14 +1,23 @@
-"""What the fast lane takes of many."""
+"""What the lanes take of many: the fast one the first few, the usual one what is quick, `make test-long` the rest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 import pytest
 
 
-def first_fast(values: Iterable[Any], fast: int) -> list[Any]:
-    """Parameters of a test, of which all but the first few are slow; a tuple is several of one case."""
-    cases = [value if isinstance(value, tuple) else (value,) for value in values]
-    return [pytest.param(*case, marks=pytest.mark.slow if k >= fast else ()) for k, case in enumerate(cases)]
+def first_fast(values: Iterable[Any], fast: int, long: Collection[Any] = ()) -> list[Any]:
+    """Parameters of a test, of which all but the first few are slow; a tuple is several of one case.
+
+    Of random families those named `long` take seconds each and guard no defect that is known;
+    `make test-long` runs them.
+    """
+    cases = [(value, value if isinstance(value, tuple) else (value,)) for value in values]
+    left_out = [marked for marked in long if marked not in [value for value, _ in cases]]
+    assert not left_out, f"no such case: {left_out}"
+    return [
+        pytest.param(*case, marks=pytest.mark.long if value in long else pytest.mark.slow if k >= fast else ())
+        for k, (value, case) in enumerate(cases)
+    ]

@@ -16,6 +16,7 @@ from problem_files import written
 
 # counts on without ever looking at a signal, as a solver may
 DEAF = "import laufruhe.solvers as s; s.solve = lambda *_, **__: sum(range(10**14))\n"
+ASLEEP = DEAF.replace("sum(range(10**14))", "__import__('time').sleep(1e4)")
 RUN = "from laufruhe.cli import main; main()"
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not hasattr(os, "fork"), reason="needs another process")]
 
@@ -32,8 +33,7 @@ def started(folder: Path, code: str) -> subprocess.Popen[str]:
     return running
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("code", [DEAF, DEAF.replace("sum(range(10**14))", "__import__('time').sleep(1e4)")])
+@pytest.mark.parametrize(("code", "number"), [(DEAF, signal.SIGTERM), (ASLEEP, signal.SIGINT)])
 def test_interrupted_within_seconds(code: str, number: signal.Signals, tmp_path: Path) -> None:
     running = started(tmp_path, code)
     began = time.monotonic()

@@ -16,7 +16,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 
 QUICK, AUTOMATIC = 150, 25
 # ten thousand engines, a thousand at a time
-SHARES, SHARE = 10, 1000
+SHARES = [(0, 300), *((first, 1000) for first in range(0, 10_000, 1000))]
 
 
 def _fidelity(rng: random.Random) -> Fidelity:
@@ -52,12 +52,11 @@ def test_estimate_is_not_idle() -> None:
     assert sorted(ratios)[len(ratios) // 2] < 12.0
 
 
-@pytest.mark.slow
 @pytest.mark.validation
-@pytest.mark.parametrize("share", range(SHARES))
-def test_estimate_on_ten_thousand_engines(share: int) -> None:
+@pytest.mark.parametrize(("first", "count"), first_fast(SHARES, 0, long=SHARES[1:]))
+def test_estimate_on_ten_thousand_engines(first: int, count: int) -> None:
     """Nothing is below without gas; with it one in a thousand: where its bends fall between steps is chance."""
-    found = {seed: _excess(seed) for seed in range(share * SHARE, (share + 1) * SHARE)}
+    found = {seed: _excess(seed) for seed in range(first, first + count)}
     assert [seed for seed, (excess, has_gas) in found.items() if excess > 0.0 and not has_gas] == []
     assert sum(excess > 0.0 for excess, _ in found.values()) <= 1
 

@@ -47,22 +47,21 @@ OTHER_SEEDS = [seed for seed in range(120) if Writer(seed).mounts not in (RIGID,
 OPEN_SEEDS = [seed for seed in range(50) if Writer(seed).mounts == OPEN]
 
 
-@pytest.mark.parametrize("seed", first_fast(RIGID_SEEDS, 16))
+@pytest.mark.parametrize("seed", first_fast(RIGID_SEEDS, 16, long=(154, 155)))
 def test_on_rigid_mounts(tmp_path, seed):
     problem = problem_of(tmp_path, seed)
     if problem is not None:
         judge(problem)
 
 
-@pytest.mark.parametrize("seed", first_fast(OTHER_SEEDS, 8))
+@pytest.mark.parametrize("seed", first_fast(OTHER_SEEDS, 8, long=(75, 88)))
 def test_on_elastic_mounts(tmp_path, seed):
     problem = problem_of(tmp_path, seed)
     if problem is not None:
         judge(problem)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", OPEN_SEEDS)
+@pytest.mark.parametrize("seed", first_fast(OPEN_SEEDS, 0, long=(0, 22, 33)))
 def test_together_with_mounts(tmp_path, seed):
     problem = problem_of(tmp_path, seed)
     if problem is not None:

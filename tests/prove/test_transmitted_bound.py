@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import cvxpy as cp
 import numpy as np
 import pytest
 
@@ -15,7 +16,7 @@ from laufruhe.physics.mounting import mounting_of
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.measure import Measure, Term
-from laufruhe.prove.quadratics import covering
+from laufruhe.prove.quadratics import Quadratic, best_prices, covering
 from laufruhe.prove.transmitted_bound import least_transmitted, softest_of, transmitted_bound
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 
@@ -51,7 +52,7 @@ def test_no_design_allowed_is_under_the_bound(name):
     given = evaluate(problem, samples=48)
     assert all(bound > 0.003 * given.value(quantity) for bound, quantity in zip(bounds, each, strict=True))
     allowed = 0
-    for k, (mounts, unbalances) in enumerate(random_designs(problem, 1000)):
+    for k, (mounts, unbalances) in enumerate(random_designs(problem, 400)):
         if k % 50 == 0:
             shaken = unbalances
             loaded = evaluate(problem, problem.design(shaken, problem.unbalances), 48)
@@ -59,7 +60,7 @@ def test_no_design_allowed_is_under_the_bound(name):
         if max(at.standing(limit).excess for limit in limits) <= 1e-6:
             allowed += 1
             assert all(at.value(quantity) >= bound for bound, quantity in zip(bounds, each, strict=True))
-    assert allowed > 100
+    assert allowed > 40
 
 
 @pytest.mark.slow
@@ -76,7 +77,7 @@ def test_every_order_of_every_design_obeys_its_own_bound():
         omega = float(wrench.orders[k]) * problem.points[0].speed
         bounds[k] = least_transmitted(loads, omega, softest.metric(NORMS["rms"], loads), softest.floors)
     assert sum(value > 0.0 for value in bounds.values()) >= 4
-    for mounts, _ in random_designs(problem, 2000, 1):
+    for mounts, _ in random_designs(problem, 500, 1):
         mounting = mounting_of(problem.design(mounts, problem.mount_decisions))
         forces = mounting.forces(wrench, problem.points[0].speed).coefficients
         for k, bound in bounds.items():
@@ -130,6 +131,25 @@ def test_the_mean_torque_is_carried_whole(tmp_path):
     values = [objective_value(problem, remounted(given, problem.design(m, problem.mount_decisions)))
               for m, _ in random_designs(problem, 300)]  # fmt: skip
     assert bound <= min(values) <= 3.0 * bound
+
+
+def test_multipliers_are_those_that_another_statement_of_the_program_finds():
+    """E33 as it is written, by cvxpy, beside the cones that are handed to the solver directly."""
+    generator = np.random.default_rng(0)
+    for size, count in ((2, 1), (6, 3), (13, 5)):
+        drawn = [(m := generator.normal(size=(size, size))) @ m.T for _ in range(count + 1)]
+        objective = Quadratic(drawn[0] / size, generator.normal(size=size), 0.0)
+        held = [Quadratic(m / size, generator.normal(size=size), -1.0) for m in drawn[1:]]
+        prices, level = cp.Variable(count, nonneg=True), cp.Variable()
+        bordered = [np.block([[q.matrix, q.vector[:, None]], [q.vector[None], np.array([[q.constant]])]])
+                    for q in (objective, *held)]  # fmt: skip
+        corner = np.diag([0.0] * size + [1.0])
+        curved = bordered[0] + sum(price * m for price, m in zip(prices, bordered[1:], strict=True)) - level * corner
+        cp.Problem(cp.Maximize(level), [curved >> 0]).solve(solver=cp.CLARABEL)
+        bound = objective
+        for quadratic, price in zip(held, best_prices(objective, held), strict=True):
+            bound = bound.plus(quadratic, max(float(price), 0.0))
+        assert bound.least == pytest.approx(float(level.value), rel=1e-6)
 
 
 def test_a_covering_matrix_covers():

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,12 +45,13 @@ def covering(matrices: Sequence[Array], felt: Array) -> Array:
     """A matrix not under any of these, with about the least trace of its product with `felt`, shape (n, n) (E32)."""
     unit = max(float(np.trace(matrix)) for matrix in matrices)
     size = len(matrices[0])
-    import cvxpy as cp
-
-    cover = cp.Variable((size, size), symmetric=True)
-    least = cp.Problem(cp.Minimize(cp.trace(felt @ cover)), [cover - matrix / unit >> 0 for matrix in matrices])
-    found = _quietly(least, cover)
-    found = np.zeros((size, size)) if found is None else unit * found
+    # of every entry of the upper triangle
+    rows, columns = np.triu_indices(size)
+    steps = np.zeros((len(rows), size, size))
+    steps[np.arange(len(rows)), rows, columns] = steps[np.arange(len(rows)), columns, rows] = 1.0
+    cost = np.einsum("kij,ij->k", steps, 0.5 * (felt + felt.T))
+    entries = _least(cost, [(-matrix / unit, steps) for matrix in matrices])
+    found = np.zeros((size, size)) if entries is None else unit * np.tensordot(entries, steps, 1)
     # whatever the solver returned, lifted until it covers
     lacking = max(float(np.linalg.eigvalsh(matrix - found)[-1]) for matrix in matrices)
     return np.asarray(found + (max(lacking, 0.0) + 1e-9 * unit) * np.eye(size))
@@ -62,30 +61,44 @@ def best_prices(objective: Quadratic, held: Sequence[Quadratic]) -> Array:
     """Multipliers with which the limits bound the objective best from below (E33); zeros where none do."""
     if not held:
         return np.zeros(0)
-    import cvxpy as cp
+
+    def bordered(of: Quadratic) -> Array:
+        return np.block([[of.matrix, of.vector[:, None]], [of.vector[None], np.array([[of.constant]])]])
 
     size = len(objective.vector)
-    prices, level = cp.Variable(len(held), nonneg=True), cp.Variable()
-
-    def summed(part: str) -> Any:
-        return getattr(objective, part) + sum(p * getattr(each, part) for p, each in zip(prices, held, strict=True))
-
-    column = cp.reshape(summed("vector"), (size, 1), order="C")
-    corner = cp.reshape(summed("constant") - level, (1, 1), order="C")
-    matrix = cp.bmat([[summed("matrix") - CONVEX_BY * np.eye(size), column], [column.T, corner]])
-    found = _quietly(cp.Problem(cp.Maximize(level), [matrix >> 0]), prices)
-    return np.zeros(len(held)) if found is None else found
+    level = np.zeros((size + 1, size + 1))
+    level[size, size] = -1.0
+    steps = np.array([*map(bordered, held), level])
+    cost = -np.eye(len(steps))[-1]
+    curved = bordered(objective) - CONVEX_BY * np.diag([1.0] * size + [0.0])
+    found = _least(cost, [(curved, steps)], len(held))
+    return np.zeros(len(held)) if found is None else found[:-1]
 
 
-def _quietly(problem: Any, wanted: Any) -> Array | None:
-    """The value of a variable at the optimum; None where the solver found none."""
-    import cvxpy as cp
+def _least(cost: Array, cones: Sequence[tuple[Array, Array]], held: int = 0) -> Array | None:
+    """The x of least cost' x with every C + sum x_k S_k semidefinite and its first numbers not under zero.
 
-    with warnings.catch_warnings():
-        # judged by what follows from it, not by a warning
-        warnings.simplefilter("ignore")
-        try:
-            problem.solve(solver=cp.CLARABEL, **_TIGHT)
-        except cp.error.SolverError:
-            return None
-    return None if wanted.value is None else np.asarray(wanted.value, dtype=float)
+    Nothing depends on how good it is: what follows from it is judged. None where it is no number.
+    Handed to the solver directly, for these programs are small and many.
+    """
+    import clarabel
+    from scipy.sparse import csc_array
+
+    slopes = [-np.eye(held, len(cost)), *(-_column(steps).T for _, steps in cones)]
+    right = np.concatenate([np.zeros(held), *(_column(constant) for constant, _ in cones)])
+    kinds = [clarabel.NonnegativeConeT(held), *(clarabel.PSDTriangleConeT(len(constant)) for constant, _ in cones)]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    for name, value in _TIGHT.items():
+        setattr(settings, name, value)
+    nothing = csc_array((len(cost), len(cost)))
+    found = clarabel.DefaultSolver(nothing, cost, csc_array(np.concatenate(slopes)), right, kinds, settings).solve()
+    x = np.array(found.x, dtype=float)
+    return x if np.all(np.isfinite(x)) else None
+
+
+def _column(matrices: Array) -> Array:
+    """The upper triangles column by column, so that lengths are kept, shape (..., n (n + 1) / 2)."""
+    size = matrices.shape[-1]
+    rows, columns = np.tril_indices(size)
+    return np.asarray(matrices[..., columns, rows] * np.where(rows == columns, 1.0, math.sqrt(2.0)))
