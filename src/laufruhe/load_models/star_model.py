@@ -108,7 +108,7 @@ class StarModel:
         self.phasing, self.space, self.geometry = phasing, space, geometry
         self.layout: Layout = phasing.layout(*geometry)
         self._origin = space.first if origin is None else origin
-        self.problem = _normalised(phasing.realise(phasing.star(self._origin, space.phases, geometry)))
+        self.problem = normalised(phasing.realise(phasing.star(self._origin, space.phases, geometry)))
         self._whole = AffineModel(self.problem, keep_all=True)
         self._still = self._motored(self._origin)
         self._moved = {
@@ -117,12 +117,16 @@ class StarModel:
             for p in range(space.phases)
             if p != self._origin[k]
         }
-        models = [self._whole, self._still, *self._moved.values()]
-        self.base = common_base([model.base for model in models])
-        for model in models:
+        self.base = common_base([model.base for model in self.models])
+        for model in self.models:
             model.base, model.lead = self.base, self._whole
         self.domains = self._whole.domains
         self._cache: dict[int, StarProblem] = {}
+
+    @property
+    def models(self) -> list[AffineModel]:
+        """Those of the stars that all others are made of."""
+        return [self._whole, self._still, *self._moved.values()]
 
     @property
     def samples(self) -> int:
@@ -132,7 +136,7 @@ class StarModel:
     def _motored(self, star: Sequence[int]) -> AffineModel:
         throws = star_throws(self.layout, star, self.space.phases)
         candidate = Candidate(throws, None, *self.geometry, without_gas=True)
-        return AffineModel(_normalised(self.phasing.realise(candidate)), keep_all=True)
+        return AffineModel(normalised(self.phasing.realise(candidate)), keep_all=True)
 
     def at(self, samples: int) -> StarProblem:
         """Rows of every star at `samples` steps over the period of the loads."""
@@ -165,11 +169,11 @@ class StarModel:
             norm = StarNorm(
                 all_of.norm, all_of.constant, moves, all_of.slope, None if alike else turns, all_of.grid
             )  # fmt: skip
-            out.append((weight, _compressed(norm) if norm.norm.is_euclidean else norm))
+            out.append((weight, compressed(norm) if norm.norm.is_euclidean else norm))
         return tuple(out)
 
 
-def _normalised(problem: Problem) -> Problem:
+def normalised(problem: Problem) -> Problem:
     """Unbalances that may take any angle, counted from upright and not from a throw.
 
     A disc looks the same from every angle, so that they act alike in every star.
@@ -192,7 +196,7 @@ def _upright(decision: Decision) -> Decision:
     return replace(decision, drives=drives, start=decision.start * turn)
 
 
-def _compressed(norm: StarNorm) -> StarNorm:
+def compressed(norm: StarNorm) -> StarNorm:
     """The same root mean square in as few rows as there are columns: Q of a QR keeps every length (S12)."""
     k, d = norm.constant.shape
     throws, steps = norm.moves.shape[:2]

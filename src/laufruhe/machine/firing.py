@@ -168,6 +168,23 @@ def _dead_centres(layout: Layout, throws: tuple[float, ...]) -> tuple[float, ...
     return tuple(float(layout.dead_centre(throws, k) % 1) for k in range(len(layout.positions)))
 
 
+def slot_steps(cycle: Cycle, slots: Sequence[int]) -> tuple[int, ...]:
+    """Steps of throws on the lattice whose cylinders, each alone on its own, fire in these of n equal slots (S6)."""
+    count = len(slots)
+    shared = math.gcd(cycle.turns, count)
+    return tuple(-slot * (cycle.turns // shared) % (count // shared) for slot in slots)
+
+
+def slot_order(slots: Sequence[int]) -> tuple[int, ...]:
+    """Firing order of cylinders that fire in these slots, each in its own."""
+    return tuple(1 + slots.index(slot) for slot in range(len(slots)))
+
+
+def order_slots(order: Sequence[int]) -> tuple[int, ...]:
+    """Slot in which each cylinder of a firing order fires."""
+    return tuple(order.index(number) for number in range(1, len(order) + 1))
+
+
 def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) -> tuple[float, ...]:
     """Turn of the crank at which each cylinder of the order fires, ascending from 0."""
     turns = _dead_centres(layout, tuple(throws))

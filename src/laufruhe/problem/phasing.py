@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle
-from laufruhe.machine.firing import even_orders, star_throws
+from laufruhe.machine.firing import even_orders, firing_lattice, slot_order, slot_steps, star_throws
 from laufruhe.machine.layouts import Layout, even_throws
 
 P = TypeVar("P")
@@ -236,6 +236,14 @@ class PhasingOf(Generic[P]):
         layout = self.layout(*geometry)
         order = self.firing_order or next(even_orders(self.cycle, layout, steps), None)
         return Candidate(star_throws(layout, steps, phases), order, *geometry, left_out)
+
+    def fired(
+        self, slots: Sequence[int], geometry: tuple[float | None, float | None], left_out: tuple[str, ...] = ()
+    ) -> Candidate:
+        """The design whose cylinders, each on a throw of its own, fire in these slots of the cycle (S6, V9)."""
+        steps = slot_steps(self.cycle, slots)
+        throws = star_throws(self.layout(*geometry), steps, firing_lattice(self.cycle, self.cylinders).steps)
+        return Candidate(throws, slot_order(slots), *geometry, left_out)
 
     @property
     def geometries(self) -> tuple[tuple[float | None, float | None], ...]:

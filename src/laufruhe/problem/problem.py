@@ -159,6 +159,11 @@ class Problem:
         return has_gas and (any(measure.feels_gas for measure in self.measures) or self.fidelity.is_uneven)
 
     @property
+    def feels_order(self) -> bool:
+        """Whether anything asked changes with the firing order of one star."""
+        return any(measure.feels_order for measure in self.measures)
+
+    @property
     def objective_name(self) -> str:
         """What is minimised, in words; empty where nothing is."""
         terms = self.objective

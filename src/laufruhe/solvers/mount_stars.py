@@ -16,7 +16,6 @@ from dataclasses import replace
 from typing import TypeAlias
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.star_model import StarModel
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import RMS
@@ -112,7 +111,7 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
 
 def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> tuple[list[tuple[float, Star]], int]:
     """Stars of one geometry with their least objective on the mounts as given (S15)."""
-    model = StarModel(phasing, family.space, family.geometry, family.fixed)
+    model = family.model(phasing)
     given = model.problem
     found = search_designs(
         model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, nothing_of(given)

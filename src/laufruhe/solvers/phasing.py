@@ -6,8 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from laufruhe.errors import SolverError
-from laufruhe.load_models.star_model import StarModel
+from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
@@ -39,6 +38,9 @@ def solve_phasing(problem: Problem) -> Result:
     phasing = problem.phasing
     if phasing is None:
         raise SolverError("nothing of the phasing is open")
+    if problem.feels_order and phasing.continuous:
+        rule = "the twist of the crankshaft is decided with even firing or with throws that are given"
+        raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out")
     started = time.perf_counter()
     if phasing.throws is not None:
         result = _of_fixed_throws(problem, phasing)
@@ -50,7 +52,8 @@ def solve_phasing(problem: Problem) -> Result:
 
 
 def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
-    families = families_of(phasing)[0] if phasing.intervals.holds([phasing.even_interval]) else ()
+    is_even = phasing.intervals.holds([phasing.even_interval])
+    families = families_of(phasing, problem.feels_order)[0] if is_even else ()
     if not families and not phasing.continuous:
         return no_star(problem, none_fires(phasing)[0])
     if not families:
@@ -120,7 +123,7 @@ def _share(problem: Problem) -> float:
 
 def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     """The best even design solved once more as a problem of its own, with what was proven of all designs (S17)."""
-    entries = [ranked_star(phasing, d.candidate, d.steps, d.value, d.bound, d.proven) for d in answer.designs]
+    entries = [d.ranked(phasing) for d in answer.designs]
     fired = [(design, entry) for design, entry in zip(answer.designs, entries, strict=True) if entry.firing_orders]
     if not fired:
         return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
@@ -134,7 +137,7 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in fired[1:])]
-    count = sum(family.size for family in families_of(phasing)[0])
+    count = sum(family.size for family in families_of(phasing, problem.feels_order)[0])
     details = ranking_result(phasing, candidate, ranking, count, answer.looked_at, answer.method)
     return with_star(problem, phasing, result, candidate, certificate, details)
 
@@ -144,7 +147,7 @@ def _needed(problem: Problem, phasing: Phasing, best: Decided) -> tuple[int, ...
     kept = best.built
     if not kept:
         return kept
-    model = StarModel(phasing, best.family.space, best.family.geometry, best.family.fixed)
+    model = best.family.model(phasing)
     owners = owners_of(model)
     nothing = nothing_of(problem)
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):

@@ -188,8 +188,13 @@ def ranked_orders(
 def told_orders(
     problem: Problem, phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None = None
 ) -> tuple[RankedOrder, ...]:
-    """Those of its firing orders that the loads tell apart: one, unless gas is felt and they are uneven (S8)."""
+    """Those of its firing orders that the loads tell apart: one, unless gas is felt and they are uneven (S8).
+
+    Each of them twists the crankshaft in a way of its own (V6).
+    """
     orders = ranked_orders(phasing, candidate, steps)
+    if problem.feels_order:
+        return orders
     return orders if problem.feels_gas and not all(order.is_even for order in orders) else orders[:1]
 
 

@@ -8,14 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
-from laufruhe.load_models.star_model import StarModel
+from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
+from laufruhe.solvers.firing_search import MOST_SLOTS, enumerate_orders
+from laufruhe.solvers.ranking import RankedStar, ranked_star
 from laufruhe.solvers.star_cuts import CutsFound, owners_of, search_designs, solve_design
-from laufruhe.solvers.star_families import Family
+from laufruhe.solvers.star_families import Family, FiringFamily
 from laufruhe.solvers.star_search import StarsFound, enumerate_stars, search_stars
 
 MOST_LISTED = 1_000_000
@@ -36,6 +39,11 @@ class Decided:
     bound: float
     proven: bool
 
+    def ranked(self, phasing: Phasing) -> RankedStar:
+        """Its entry of a ranking."""
+        told = self.family.told(phasing, self.candidate)
+        return ranked_star(told, self.candidate, self.steps, self.value, self.bound, self.proven)
+
 
 @dataclass(frozen=True, eq=False)
 class Answer:
@@ -51,6 +59,8 @@ class Answer:
 
 def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
     """The best designs of all even stars, by whatever suits objective and size (S18)."""
+    if any(isinstance(family, FiringFamily) for family in families):
+        return _by_orders(problem, phasing, families)
     simple = [(family, own) for family in families if (own := _amplitudes(phasing, family)) is not None]
     if len(simple) < len(families) or any(family.fixed for family in families):
         return _by_designs(problem, phasing, families)
@@ -67,6 +77,20 @@ def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> 
             found = search_stars(space, own, phasing.best, phasing.time_limit)
             answers.append(_stars_answer(phasing, family, found, "branch and bound over partial stars"))
     return _joined(answers, phasing.best)
+
+
+def _by_orders(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """Firing orders one by one where root mean squares alone are asked, else by cone programs."""
+    (family,) = families
+    model = family.model(phasing)
+    objective = PairObjective.of(model.at(model.samples))
+    if objective is None or phasing.shafts.optional or family.fixed or phasing.method is Method.PROGRAM:
+        return _by_designs(problem, phasing, families)
+    if phasing.cylinders > MOST_SLOTS:
+        raise ModelError(f"firing orders of more than {MOST_SLOTS} cylinders are too many to look at; give throws")
+    found = enumerate_orders(objective, phasing.cylinders, phasing.best, phasing.time_limit)
+    answer = _stars_answer(phasing, family, found, "every firing order looked at, pair by pair of throws")
+    return replace(answer, infeasible=0 if answer.designs else found.nodes)
 
 
 def _amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
@@ -99,7 +123,7 @@ def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
     answers = []
     for family in families:
-        model = StarModel(phasing, family.space, family.geometry, family.fixed)
+        model = family.model(phasing)
         found = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, nothing)
         designs = tuple(
             _decided(
@@ -133,7 +157,7 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     for family in families:
         simple = _amplitudes(phasing, family) is not None
         space = replace(family.space, mirror=simple, reflect=simple)
-        model = StarModel(phasing, space, family.geometry, family.fixed)
+        model = family.model(phasing, space)
         exact = all(term.measure.norm.is_euclidean for term in problem.objective) and not problem.limits
         samples = model.samples if exact else PROGRAM_SAMPLES
         owners = owners_of(model)

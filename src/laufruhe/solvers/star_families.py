@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.firing import even_patterns, firing_lattice, star_throws
+from laufruhe.load_models.firing_model import FiringModel, slot_space
+from laufruhe.load_models.star_model import StarModel
+from laufruhe.machine.firing import even_patterns, firing_lattice, order_slots
 from laufruhe.machine.layouts import Layout, even_throws
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
@@ -36,13 +38,18 @@ class Family:
         """One of the stars."""
         return self.space.first if self.fixed is None else self.fixed
 
-    def throws(self, steps: Sequence[int]) -> tuple[float, ...]:
-        """Angles of a star [rad] (C3)."""
-        return star_throws(self.layout, steps, self.space.phases)
-
     def candidate(self, phasing: Phasing, steps: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
         """The design of a star, with the first of its firing orders."""
         return phasing.star(steps, self.space.phases, self.geometry, left_out)
+
+    def told(self, phasing: Phasing, candidate: Candidate) -> Phasing:
+        """What is open of one of its stars: the firing order, where it is."""
+        del candidate
+        return phasing
+
+    def model(self, phasing: Phasing, space: StarSpace | None = None) -> StarModel:
+        """Rows of every star, of those of another space where one is given."""
+        return StarModel(phasing, space or self.space, self.geometry, self.fixed)
 
     @property
     def stars(self) -> Stars:
@@ -52,8 +59,30 @@ class Family:
         return np.concatenate(list(self.space.blocks()))
 
 
-def families_of(phasing: Phasing) -> tuple[tuple[Family, ...], str]:
-    """Stars that fire evenly for every geometry allowed; and why there are none."""
+class FiringFamily(Family):
+    """Firing orders of cylinders that have a throw each: a star for every one (V9)."""
+
+    def candidate(self, phasing: Phasing, steps: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
+        """The design of a firing order."""
+        return phasing.fired(steps, self.geometry, left_out)
+
+    def told(self, phasing: Phasing, candidate: Candidate) -> Phasing:
+        """Nothing: its firing order is the design's own."""
+        return replace(phasing, firing_order=candidate.firing_order)
+
+    def model(self, phasing: Phasing, space: StarSpace | None = None) -> StarModel:
+        """Rows of every firing order."""
+        return FiringModel(phasing, space or self.space, self.geometry, self.fixed)
+
+
+def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family, ...], str]:
+    """Stars that fire evenly for every geometry allowed; and why there are none.
+
+    Parameters
+    ----------
+    by_firing
+        Whether firing orders of one star are told apart, so that each of them is a design.
+    """
     found, reason = [], "no bank angle and split pin within the bounds let the firing be even"
     for geometry in phasing.geometries:
         layout = phasing.layout(*geometry)
@@ -76,8 +105,21 @@ def families_of(phasing: Phasing) -> tuple[tuple[Family, ...], str]:
                 + f"even firing stands on {steps}; leave phases out, or allow uneven intervals"
             )
             continue
-        found.append(Family(geometry, layout, StarSpace(steps, patterns, layout.throw_positions), fixed))
+        if by_firing:
+            found.append(_by_firing(phasing, geometry, layout))
+        else:
+            found.append(Family(geometry, layout, StarSpace(steps, patterns, layout.throw_positions), fixed))
     return tuple(found), reason
+
+
+def _by_firing(phasing: Phasing, geometry: tuple[float | None, float | None], layout: Layout) -> Family:
+    if len(layout.throw_positions) < phasing.cylinders:
+        raise ModelError(
+            "firing orders are decided against the twist of the crankshaft where each cylinder has its own throw; "
+            "give throws, and leave the firing order open"
+        )
+    fixed = None if phasing.firing_order is None else order_slots(phasing.firing_order)
+    return FiringFamily(geometry, layout, slot_space(phasing.cylinders, layout.throw_positions), fixed)
 
 
 def _of_order(phasing: Phasing, layout: Layout) -> tuple[int, ...] | None:

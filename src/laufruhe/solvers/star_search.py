@@ -52,7 +52,7 @@ class StarsFound:
 
 
 @dataclass
-class _Best:
+class BestStars:
     """The best stars so far, and the value that a new one has to beat."""
 
     count: int
@@ -65,9 +65,11 @@ class _Best:
 
     @property
     def cut(self) -> float:
+        """What a new one has to beat."""
         return float(self.values[-1]) if len(self.values) >= self.count else float("inf")
 
     def offer(self, stars: Stars, values: Array) -> None:
+        """Take those that are among the best, each star once."""
         if not len(values) or float(values.min()) > self.cut * (1.0 + SLACK):
             return
         near = np.argsort(values, kind="stable")[: 4 * self.count]
@@ -84,7 +86,7 @@ class _Best:
 def enumerate_stars(space: StarSpace, objective: AmplitudeObjective, count: int = 1) -> StarsFound:
     """The best stars by looking at every one, in blocks."""
     started = time.perf_counter()
-    best, seen = _Best(count, space.throws), 0
+    best, seen = BestStars(count, space.throws), 0
     for block in space.blocks():
         best.offer(block, objective.values(space, block))
         seen += len(block)
@@ -109,7 +111,7 @@ def search_stars(
         Seconds after which the search stops; what it has then is not complete.
     """
     started = time.perf_counter()
-    best, bounds = _Best(count, space.throws), _Bounds(space, objective)
+    best, bounds = BestStars(count, space.throws), _Bounds(space, objective)
     for start in _good_starts(space, objective):
         best.offer(space.canonical(start), objective.values(space, space.canonical(start)))
     looked_at = 0

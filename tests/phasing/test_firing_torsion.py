@@ -1,0 +1,226 @@
+"""Firing orders decided against the twist of the crankshaft, alone and together with the balance."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.errors import InputError, ModelError
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.load_models.firing_model import FiringModel
+from laufruhe.load_models.pair_tables import PairObjective
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers.firing_search import enumerate_orders
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.star_families import families_of
+from problem_files import PROBLEMS
+
+READY = PROBLEMS / "inline-five-torsion.toml"
+STEPS = {"fidelity": {"samples": 360}}
+
+
+def tables(**changes: Any) -> dict[str, Any]:
+    return {**tables_of(READY), **STEPS, **changes}
+
+
+def problem_of(whole: dict[str, Any]) -> Problem:
+    return load_tables(whole, Path("five.toml"))
+
+
+def fired(whole: dict[str, Any], order: tuple[int, ...]) -> Problem:
+    """With a firing order given, and the throws that it makes even."""
+    engine = {key: value for key, value in whole["engine"].items() if key not in ("throws", "cylinders")}
+    without = {key: value for key, value in whole.items() if key != "phasing"}
+    return problem_of({**without, "engine": {**engine, "firing_order": list(order)}})
+
+
+def orders_of(count: int) -> list[tuple[int, ...]]:
+    return [(1, *rest) for rest in itertools.permutations(range(2, count + 1))]
+
+
+def values_of(whole: dict[str, Any], count: int = 5) -> dict[tuple[int, ...], float]:
+    """Objective of every firing order by the exact model, each engine built anew."""
+    problems = {order: fired(whole, order) for order in orders_of(count)}
+    return {order: objective_value(problem, evaluate(problem)) for order, problem in problems.items()}
+
+
+def ranked(result: Result) -> dict[tuple[int, ...], float]:
+    assert result.phasing is not None
+    return {star.firing_orders[0].order: star.value for star in result.phasing.ranking}
+
+
+@pytest.fixture(scope="module")
+def every() -> dict[tuple[int, ...], float]:
+    return values_of(tables())
+
+
+def test_every_firing_order_is_ranked(every: dict[tuple[int, ...], float]) -> None:
+    """By pairs of throws as by the exact model, the best one proven."""
+    result = laufruhe.solve(problem_of(tables(phasing={"best": 24})))
+    assert result.status is Status.OPTIMAL
+    found = ranked(result)
+    # an order and its mirror in time are two designs
+    assert len(found) == 24
+    for order, value in found.items():
+        assert value == pytest.approx(every[order], rel=1e-9)
+    assert result.objective.value == pytest.approx(min(every.values()), rel=1e-12)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.lower_bound <= min(every.values())
+    assert result.certificate.lower_bound == pytest.approx(min(every.values()), rel=1e-9)
+
+
+def test_peaks_are_decided_by_cuts() -> None:
+    """No sum over pairs has a peak: programs of some firing orders, dual cuts for the others."""
+    # a peak between the angles of fewer steps would leave a gap
+    fine = {"samples": 1440}
+    whole = tables(objective={"minimise": "maximum shaft torque", "sections": ["throw 5 - flywheel"]}, fidelity=fine)
+    result = laufruhe.solve(problem_of({**whole, "phasing": {"best": 1}}))
+    every = values_of(whole)
+    assert result.objective.value == pytest.approx(min(every.values()), rel=1e-6)
+    assert result.certificate.lower_bound <= min(every.values()) * (1.0 + 1e-9)
+    assert result.status is Status.OPTIMAL
+
+
+def test_main_orders_leave_no_choice() -> None:
+    """Order 2.5 is the same for all: whatever is decided is proven, and nothing is gained."""
+    result = laufruhe.solve(problem_of(tables(objective={"minimise": "rms shaft stress", "orders": [2.5, 5]})))
+    assert np.ptp(list(ranked(result).values())) < 1e-9 * result.objective.value
+    assert result.objective.value == pytest.approx(result.objective.initial, rel=1e-9)
+
+
+def test_couples_and_torsion_together(every: dict[tuple[int, ...], float]) -> None:
+    """The least torsion among orders that keep a limit of the couple; a tighter limit never has less."""
+    couple = {"minimise": "rms rocking couple", "orders": [1, 2]}
+    couples = values_of(tables(objective=couple))
+    sizes = sorted({round(value, 6) for value in couples.values()})
+    before = 0.0
+    for allowed in sizes[::-1]:
+        limit = {"limit": "rms rocking couple", "orders": [1, 2], "max": f"{1.000001 * allowed} N m"}
+        result = laufruhe.solve(problem_of(tables(constraints=[limit])))
+        expected = min(every[order] for order, value in couples.items() if value <= 1.0000011 * allowed)
+        assert result.objective.value == pytest.approx(expected, rel=1e-9)
+        assert result.status is Status.OPTIMAL
+        assert result.objective.value >= before * (1.0 - 1e-12)
+        before = result.objective.value
+    limit = {"limit": "rms rocking couple", "orders": [1, 2], "max": f"{0.99 * sizes[0]} N m"}
+    assert laufruhe.solve(problem_of(tables(constraints=[limit]))).status is Status.INFEASIBLE
+
+
+def test_a_weighted_sum_of_both() -> None:
+    terms = [
+        {"quantity": "rms shaft torque", "weight": 2.0},
+        {"quantity": "rms rocking couple", "orders": [1, 2], "weight": 0.5},
+    ]
+    whole = tables(objective={"terms": terms})
+    result = laufruhe.solve(problem_of(whole))
+    assert result.objective.value == pytest.approx(min(values_of(whole).values()), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_firing_orders_with_counterweights_open() -> None:
+    """Torsion under a limit of the mount force that weights have to keep: each order solved by itself agrees."""
+    places = [["250 mm", "230 mm", "0 mm"], ["250 mm", "-230 mm", "0 mm"], ["-550 mm", "0 mm", "0 mm"]]
+    weights = [
+        {"name": name, "opposite_throw": throw, "unbalance": {"between": ["0 kg m", "0.05 kg m"]}}
+        for name, throw in (("front", 1), ("rear", 5))
+    ]
+    limit = {"name": "mounts", "limit": "rms mount force", "max": "600 N"}
+    whole = tables(
+        mounts={"positions": places}, counterweights=weights, constraints=[limit], phasing={"best": 24},
+        operating_points=[{"speed": "2600 rpm"}], fidelity={"samples": 96},
+    )  # fmt: skip
+    result = laufruhe.solve(problem_of(whole))
+    values = []
+    for order in orders_of(5):
+        alone = laufruhe.solve(fired(whole, order))
+        values.append(alone.objective.value if alone.status is not Status.INFEASIBLE else np.inf)
+    assert np.isfinite(values).any()
+    assert not np.isfinite(values).all()
+    assert result.objective.value == pytest.approx(min(values), rel=1e-4)
+    assert result.status is Status.OPTIMAL
+    assert result.limits[0].value <= 600.0 * (1.0 + 1e-6)
+
+
+def test_orders_of_one_star_are_told_apart() -> None:
+    """Six cylinders: pairs of cylinders share a step, and which of the two fires first is another order."""
+    six = tables(phasing={"best": 3}, objective={"minimise": "rms shaft twist"})
+    six["engine"] = {**six["engine"], "cylinders": 6}
+    result = laufruhe.solve(problem_of(six))
+    rng = np.random.default_rng(7)
+    some = [tuple(order) for order in rng.permutation(orders_of(6))[:12]]
+    some += [star.firing_orders[0].order for star in result.phasing.ranking]
+    for order in some:
+        problem = fired(six, tuple(int(n) for n in order))
+        value = objective_value(problem, evaluate(problem))
+        assert value >= result.objective.value * (1.0 - 1e-9)
+        for star in result.phasing.ranking:
+            if star.firing_orders[0].order == order:
+                assert value == pytest.approx(star.value, rel=1e-9)
+    given = {**six, "engine": {**six["engine"], "throws": [0, 120, 240, 240, 120, 0]}}
+    del given["engine"]["cylinders"]
+    one_star = laufruhe.solve(problem_of(given))
+    assert one_star.status is Status.OPTIMAL
+    # a star given is less freedom
+    assert one_star.objective.value >= result.objective.value * (1.0 - 1e-9)
+    assert one_star.phasing.ranking[0].order_count > 1
+
+
+def test_the_engine_seen_from_behind() -> None:
+    """Discs, shafts and cylinders in the reverse order: the optimum is the same, its order reversed."""
+    problem = problem_of(tables())
+    chain = problem.engine.torsion
+    assert chain is not None
+    assert problem.phasing is not None
+    names = [part.name for part in problem.engine.slider_cranks]
+    other = dict(zip(names, names[::-1], strict=True))
+    discs = tuple(replace(d, cylinders=tuple(other[c] for c in d.cylinders)) for d in chain.discs[::-1])
+    behind = replace(chain, discs=discs, sections=chain.sections[::-1], output="flywheel")
+    realise = problem.phasing.realise
+
+    def turned(candidate: Any) -> Problem:
+        found = realise(candidate)
+        return replace(found, engine=replace(found.engine, torsion=behind))
+
+    phasing = replace(problem.phasing, realise=turned)
+    again = laufruhe.solve(replace(turned_problem(problem, behind), phasing=phasing))
+    first = laufruhe.solve(problem)
+    assert again.objective.value == pytest.approx(first.objective.value, rel=1e-9)
+
+
+def turned_problem(problem: Problem, chain: Any) -> Problem:
+    return replace(problem, engine=replace(problem.engine, torsion=chain))
+
+
+def test_time_that_runs_out_proves_nothing() -> None:
+    phasing = problem_of(tables()).phasing
+    (family,), _ = families_of(phasing, by_firing=True)
+    model = FiringModel(phasing, family.space, family.geometry)
+    objective = PairObjective.of(model.at(model.samples))
+    cut = enumerate_orders(objective, 5, 1, time_limit=0.0)
+    assert not cut.complete
+    assert cut.lower_bound == 0.0
+    whole = enumerate_orders(objective, 5, 1)
+    assert whole.complete
+    assert whole.nodes == 24
+
+
+def test_what_is_not_decided_says_so() -> None:
+    uneven = tables(phasing={"intervals": {"largest_deviation": "10 deg"}})
+    with pytest.raises(ModelError, match=r"even firing or with throws that are given; leave phasing\.intervals"):
+        laufruhe.solve(problem_of(uneven))
+    bearings = [{"x": f"{x} mm"} for x in (250, 44, -250)]
+    both = tables(main_bearings=bearings, constraints=[{"limit": "maximum main-bearing force", "max": "1 MN"}])
+    with pytest.raises(ModelError, match="no method decides star together"):
+        laufruhe.solve(problem_of(both))
+    vee = tables_of(PROBLEMS / "vee-eight-open.toml") | {"torsion": tables()["torsion"]}
+    vee |= {"objective": {"minimise": "rms shaft stress"}}
+    with pytest.raises((ModelError, InputError), match="each cylinder has its own throw"):
+        laufruhe.solve(load_tables(vee, Path("vee.toml")))
