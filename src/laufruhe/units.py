@@ -103,6 +103,8 @@ _EXAMPLES = {
     "Pa": ("a pressure", "5.5 kp/cm^2"),
     "N": ("a force", "900 N"),
     "N m": ("a moment", "120 N m"),
+    "J": ("an energy", "432 J"),
+    "kg/m^3": ("a density", "7250 kg/m^3"),
     "N/m": ("a stiffness", "300 N/mm"),
     "N m/rad": ("a torsional stiffness", "1.2e6 N m/rad"),
     "N m s/rad": ("a torsional damping", "2 N m s/rad"),

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.problem.channels import CHANNELS, Needs
+from laufruhe.problem.channels import CHANNELS, Channel, Needs
 
 Document = dict[str, Any]
 Generator = np.random.Generator
@@ -210,6 +210,19 @@ def _loss(document: Document, rng: Generator) -> None:
     document["mounts.places"][0]["loss_factor"] = Open("a.loss_factor", 0.02, 0.3)
 
 
+RIM: Document = {
+    "mean_diameter": "300 mm", "width": "60 mm", "height": "40 mm",
+    "arms": {"count": 5, "at_rim": ["30 mm", "40 mm"], "at_hub": ["36 mm", "50 mm"], "hub_diameter": "80 mm"},
+}  # fmt: skip
+
+
+def _wheel(**keys: Any) -> LeaveOpen:
+    def leave_open(document: Document, rng: Generator) -> None:
+        document["flywheel"] = {**keys} if "inertia" in keys else {"rim": {**RIM, **keys}}
+
+    return leave_open
+
+
 SIZE = Open("s.unbalance", 0.0, 0.03, "kg m")
 WEB = {"radius": "60 mm", "mass": Open("web.mass", 0.0, 1.5, "kg")}
 TURN = {"angle": Open("web.angle", 0.0, 360.0, "deg")}
@@ -235,6 +248,10 @@ DECISIONS: Mapping[str, LeaveOpen] = {
     "firing order": _order_open,
     "bank angle": _angle_open("bank_angle", 50.0, 125.0),
     "split pin angle": _angle_open("split_pin_angle", 0.0, 65.0),
+    "flywheel inertia": _wheel(inertia=Open("flywheel.inertia", 0.2, 3.0, "kg m^2")),
+    "flywheel rim": _wheel(
+        width=Open("flywheel.width", 0.03, 0.12, "m"), height=Open("flywheel.height", 0.02, 0.06, "m")
+    ),
     "stiffness": _mount("stiffness", 2, STIFF),
     "loss factor": _loss,
     "damping": _mount("damping", 2, Open("a.damping.z", 10.0, 800.0, "N s/m")),
@@ -295,14 +312,21 @@ def document_of(cell: Cell) -> Document:
         document["main_bearings"] = [
             {"x": f"{x} mm", "diameter": "70 mm", "width": "30 mm", "friction": 0.01} for x in places
         ]
+    if _channel(cell.measure).needs in (Needs.FLYWHEEL, Needs.RIM, Needs.ARMS):
+        document.setdefault("flywheel", {"rim": RIM})
     document["objective"] = {"minimise": cell.measure, **_narrowed(cell.measure, document, rng)}
     if rng.random() < 0.4:
         _add_limit(document, rng)
     return document
 
 
+def _channel(measure: str) -> Channel:
+    """The channel of a measure's name."""
+    return next(channel for channel in CHANNELS.values() if measure.endswith(channel.name))
+
+
 def _add_mounts(document: Document, cell: Cell, rng: Generator) -> None:
-    needs = next(channel.needs for channel in CHANNELS.values() if cell.measure.endswith(channel.name))
+    needs = _channel(cell.measure).needs
     least = 1 if needs is Needs.MOUNTS else 0
     if needs is Needs.ELASTIC or cell.decision in OF_MOUNTS:
         least = 2
@@ -333,7 +357,7 @@ def _add_mounts(document: Document, cell: Cell, rng: Generator) -> None:
 
 
 def _narrowed(measure: str, document: Document, rng: Generator) -> Document:
-    channel = next(channel for channel in CHANNELS.values() if measure.endswith(channel.name))
+    channel = _channel(measure)
     keys: Document = {}
     if channel.name == "torque-roll residual":
         return {"frequency": "18 Hz"}
@@ -359,6 +383,8 @@ def _add_limit(document: Document, rng: Generator) -> None:
         usual += [("mean mount force", (100, 3000), "N", "max"), ("maximum mount force", (200, 8000), "N", "max")]
     if elastic:
         usual += [("static sag", (1e-3, 4e-3), "m", "max"), ("natural frequencies", (3, 9), "Hz", "min")]
+    if "flywheel" in document:
+        usual += [("degree of irregularity", (5e-3, 0.2), "", "max"), ("flywheel inertia", (0.3, 2), "kg m^2", "max")]
     if "balancer_shafts" in document:
         usual.append(("shaft distance", (0.03, 0.2), "m", "min"))
     name, (low, high), unit, side = usual[int(rng.integers(len(usual)))]

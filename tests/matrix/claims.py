@@ -280,7 +280,7 @@ def _acts(document: Document, problem: Problem) -> bool:
 
 
 def _differ(one: Evaluation, other: Evaluation) -> bool:
-    if one.engine.mounts != other.engine.mounts:
+    if one.engine.mounts != other.engine.mounts or one.engine.flywheel != other.engine.flywheel:
         return True
     if any(a.unbalance != b.unbalance for a, b in zip(one.engine.rotors, other.engine.rotors, strict=True)):
         return True

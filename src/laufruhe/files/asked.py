@@ -28,6 +28,9 @@ _NEEDS = {
     Needs.BEARINGS: ("needs main bearings", "list them in [[main_bearings]]"),
     Needs.TORSION: ("needs the discs and shafts of the crankshaft", "add [torsion]"),
     Needs.DIAMETERS: ("needs the diameter of a shaft", "give one in [torsion]"),
+    Needs.FLYWHEEL: ("needs a flywheel", "add [flywheel] with an inertia or a rim, or fidelity.crank_inertia"),
+    Needs.RIM: ("needs the rim of a flywheel", "add [flywheel.rim]"),
+    Needs.ARMS: ("needs the arms of a flywheel", "add [flywheel.rim.arms]"),
 }
 _PLACES = {
     "mounts": "mount",
@@ -114,7 +117,8 @@ class Scene:
 
     def _has(self, needs: Needs) -> bool:
         """Whether the engine has what a channel needs."""
-        engine, chain = self.engine, self.engine.torsion
+        engine, chain, wheel = self.engine, self.engine.torsion, self.engine.flywheel
+        rim = wheel.rim if wheel else None
         has = {
             Needs.NOTHING: True,
             Needs.MOUNTS: bool(engine.mounts),
@@ -122,6 +126,9 @@ class Scene:
             Needs.BEARINGS: bool(engine.bearings),
             Needs.TORSION: chain is not None,
             Needs.DIAMETERS: chain is not None and any(s.diameter is not None for s in chain.sections),
+            Needs.FLYWHEEL: wheel is not None,
+            Needs.RIM: rim is not None,
+            Needs.ARMS: rim is not None and rim.arms is not None,
         }
         return has[needs]
 
@@ -207,7 +214,7 @@ def objective_of(table: ObjectiveTable | None, scene: Scene) -> tuple[Term, ...]
         Term(_minimised(term.quantity, term, f"objective.terms[{k + 1}].quantity", scene), term.weight)
         for k, term in enumerate(table.terms)
     ]
-    return tuple(sorted(found, key=lambda term: term.measure.is_mounting))
+    return tuple(sorted(found, key=lambda term: term.measure.channel.is_number))
 
 
 def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Measure:

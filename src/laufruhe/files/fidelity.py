@@ -37,6 +37,10 @@ class FidelityTable(Table):
     )
     tolerance: f.Positive | None = f.told("Relative error of the objective, for auto.")
 
+    def own(self, key: str) -> Any:
+        """What stands at the key of a choice."""
+        return getattr(self, key)
+
 
 def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
     """The problem at the fidelity that a table describes."""

@@ -14,6 +14,7 @@ from laufruhe.files.bearings import MainBearingTable
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.fields import Table
+from laufruhe.files.flywheel import FlywheelTable
 from laufruhe.files.gas import GasTable
 from laufruhe.files.mounts import BlockTable, MountsTable
 from laufruhe.files.operating_points import OperatingPointTable
@@ -49,6 +50,7 @@ class ProblemFile(Table):
     block: BlockTable | None = None
     main_bearings: list[MainBearingTable] = Field(default_factory=list)
     torsion: TorsionTable | None = None
+    flywheel: FlywheelTable | None = None
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
     objective: ObjectiveTable | None = None

@@ -19,6 +19,7 @@ from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, complaints_of, key_path
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
+from laufruhe.files.flywheel import flywheel_of
 from laufruhe.files.gas import gas_of
 from laufruhe.files.mounts import mounts_of
 from laufruhe.files.operating_points import operating_points
@@ -151,10 +152,11 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     found = mounts_of(file.mounts, file.block)
     cycle = cycle_of(table)
     bearings = bearings_of(file.main_bearings, cylinders)
+    rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
     chain = torsion_of(file.torsion, cylinders, throws)
-    engine = Engine(file.title, cycle, cylinders, tuple(collected.rotors), found.mounts, found.block, bearings, chain)
+    engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel)
     points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke)
-    scene, decisions = Scene(engine, points), (*collected.decisions, *found.decisions)
+    scene, decisions = Scene(engine, points), (*collected.decisions, *found.decisions, *of_wheel)
     objective = objective_of(file.objective, scene)
     _check_decided(decisions)
     if decisions and not objective:

@@ -3,6 +3,7 @@
 from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
+from laufruhe.machine.flywheel import Arms, Flywheel, Rim
 from laufruhe.machine.gas import Charge, GasModel, PressureTrace, Seiliger, Wiebe
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
@@ -12,16 +13,19 @@ from laufruhe.machine.torsion import Absorber, Disc, Section, Torsion
 __all__ = [
     "CRANKSHAFT",
     "Absorber",
+    "Arms",
     "Bearing",
     "Block",
     "Charge",
     "Cycle",
     "Disc",
     "Engine",
+    "Flywheel",
     "GasModel",
     "Mount",
     "OperatingPoint",
     "PressureTrace",
+    "Rim",
     "Rod",
     "Role",
     "Rotor",

@@ -11,6 +11,7 @@ from fractions import Fraction
 from laufruhe.errors import ModelError
 from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block
+from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.gas import GasModel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
@@ -79,6 +80,8 @@ class Engine:
         Main bearings of its shafts; empty where nothing is asked of them.
     torsion
         Discs and shafts that its crankshaft twists between; None where nothing is asked of them.
+    flywheel
+        What turns with the crank; None where nothing is asked of it.
     """
 
     name: str
@@ -89,6 +92,7 @@ class Engine:
     block: Block | None = None
     bearings: tuple[Bearing, ...] = ()
     torsion: Torsion | None = None
+    flywheel: Flywheel | None = None
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "bearings"):

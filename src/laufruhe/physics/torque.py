@@ -1,10 +1,10 @@
 """Torque of the crankshaft over the cycle, the energy that a flywheel has to store, and how large it must be (T1-T4).
 
-    T = -A (p - p_crankcase) ds/dphi - (1/2) w^2 dJ/dphi                     (T1; textbook eqs. 18, 19)
+    T = -A (p - p_crankcase) ds/dphi - (1/2) w^2 dJ/dphi                     (T1; textbook eqs. 18 to 20)
 
 with J the inertia of pistons and rods reduced to the crank (F3): what they store, they take from the torque. The load
 takes its mean; the rest goes into the flywheel and comes back, and what has to be stored is the largest less the
-smallest of its integral (T2; textbook eq. 24, Roetscher eq. 303).
+smallest of its integral (T2; textbook 2.7, example 4).
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from laufruhe.machine import Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.irregularity import swing_of, turning_inertia
 from laufruhe.physics.mechanism import ComplexArray, Direction, Effect, resolved_orders
 from laufruhe.physics.shaking_loads import star_loads
-from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.physics.wrench import ROLL
 
 FINE = 8
@@ -44,7 +44,7 @@ class TorqueFacts:
     excursion
         Work that is stored and given back within the cycle [J] (T2).
     irregularity
-        Largest less smallest speed over the mean speed; None where the speed is taken as even (T3).
+        Largest less smallest speed over the mean speed (T3); None where no inertia of what turns is told.
     """
 
     mean: float
@@ -95,18 +95,13 @@ def work_stored(torque: Spectrum, samples: int) -> float:
 
 
 def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> TorqueFacts:
-    """Mean, ends and stored work of the torque, and the unevenness of the speed where that varies.
-
-    Raises
-    ------
-    ModelError
-        If the crank would stop within the cycle.
-    """
+    """Mean, ends and stored work of the torque, and how evenly the crank turns."""
     torque = crank_torque(engine, point, fidelity)
     # it bends where the gas does: its ends may stand there
     values = np.concatenate([torque.sample(FINE * fidelity.samples), torque.values(torque.bends)])
     mean = float(torque.coefficients[0].real)
-    uneven = crank_motion(engine, point, fidelity).unevenness if fidelity.is_uneven else None
+    inertia = turning_inertia(engine, fidelity)
+    uneven = None if inertia is None else swing_of(engine, point, fidelity).irregularity(inertia)
     return TorqueFacts(
         mean, mean * point.speed, float(values.min()), float(values.max()),
         work_stored(torque, FINE * fidelity.samples), uneven,
@@ -118,7 +113,7 @@ def least_inertia(
 ) -> float:
     """Least inertia of all that turns with the crank [kg m2] that keeps the speed as even as asked (T4).
 
-    The degree of irregularity falls as the inertia grows, so that halving an interval finds it; the
+    The degree of irregularity never rises with the inertia, so halving an interval finds it; the
     speed is the exact one (F2-F4), pistons and rods storing energy of their own.
 
     Parameters
@@ -134,12 +129,10 @@ def least_inertia(
     if not degree > 0.0:
         raise ModelError(f"a degree of irregularity of {degree:g} means no change of speed; give a positive one")
 
+    swing = swing_of(engine, point, replace(fidelity, crank_inertia=math.inf))
+
     def keeps(inertia: float) -> bool:
-        try:
-            return crank_motion(engine, point, replace(fidelity, crank_inertia=inertia)).unevenness <= degree
-        except ModelError:
-            # the crank would stop
-            return False
+        return swing.irregularity(inertia) <= degree
 
     stored = work_stored(crank_torque(engine, point, fidelity), FINE * fidelity.samples)
     high = max(stored / (degree * point.speed**2), 1e-12)

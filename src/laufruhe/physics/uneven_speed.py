@@ -89,14 +89,14 @@ def _steps(engine: Engine, fidelity: Fidelity) -> Array:
 
 def _turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
     # rotors and mounts do not move the crank; without them a motion is found once for all designs
-    return _found_turning(replace(engine, rotors=(), mounts=()), point, fidelity)
+    return _found_turning(replace(engine, rotors=(), mounts=(), flywheel=None), point, fidelity)
 
 
 @lru_cache(maxsize=32)
 def _found_turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
     phi, torque = _steps(engine, fidelity), _alternating_torque(engine, point, fidelity)
     work, (inertia, _) = torque.integral.sample(fidelity.samples), _inertia(engine, fidelity, phi)
-    start = _start_energy(work, inertia, point.speed)
+    start = start_energy(work, inertia, point.speed)
     pace = spectrum_of(point.speed / np.sqrt(2.0 * (start + work) / inertia), engine.cycle.base_order)
     return _Turning(engine, fidelity, torque, start, pace)
 
@@ -119,7 +119,7 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
 
     Its sums are taken at sampled times: what a star cancels is zero to rounding only.
     """
-    torque = _torque(engine, point, fidelity)
+    torque = gas_torque(engine, point, fidelity)
 
     def wrench(motion: CrankMotion) -> Array:
         total = _rotor_loads((*engine.pins, *engine.rotors), motion)
@@ -137,7 +137,7 @@ def uneven_rotor_loads(rotors: Sequence[Rotor], engine: Engine, point: Operating
     return _turning(engine, point, fidelity).loads(lambda motion: _rotor_loads(rotors, motion))
 
 
-def _torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     """Torque of the gas over the crank angle: its roll moment (L5)."""
     gas, cycle = fidelity.gas_of(point), engine.cycle
     if gas is None:
@@ -147,13 +147,22 @@ def _torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectr
 
 def _alternating_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     """Torque of the gas less that of the load, which takes the mean of it (F2)."""
-    torque = _torque(engine, point, fidelity)
+    torque = gas_torque(engine, point, fidelity)
     return replace(torque, coefficients=np.concatenate([[0.0], torque.coefficients[1:]]))
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:
     """Inertia reduced to the crank, and its derivative by the crank angle (F3), shape of `phi`."""
-    total, slope = np.full(len(phi), float(fidelity.crank_inertia)), np.zeros(len(phi))
+    total, slope = moving_inertia(engine, fidelity, phi)
+    total = total + fidelity.crank_inertia
+    if total.min() <= 0.0:
+        raise ModelError("the moving parts have no positive inertia; raise the crank inertia")
+    return total, slope
+
+
+def moving_inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:
+    """That of pistons and rods alone, reduced to the crank, and its derivative by the crank angle (F3)."""
+    total, slope = np.zeros(len(phi)), np.zeros(len(phi))
     for part in engine.slider_cranks:
         ratio, motion = part.shaft.ratio, part.motion(np, _alpha(part, phi))
         for mass, (_, velocity, acceleration) in motion.points:
@@ -162,12 +171,10 @@ def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Arr
         for inertia, (rate, swing) in motion.swings if fidelity.rod == "rigid" else ():
             total += inertia * ratio**2 * rate**2
             slope += 2.0 * inertia * ratio**3 * rate * swing
-    if total.min() <= 0.0:
-        raise ModelError("the moving parts have no positive inertia; raise the crank inertia")
     return total, slope
 
 
-def _start_energy(work: Array, inertia: Array, speed: float) -> float:
+def start_energy(work: Array, inertia: Array, speed: float) -> float:
     """Energy at the start of the cycle that gives the mean speed (F4), by safeguarded Newton.
 
     The mean of w0 / w falls with the energy and is convex, so Newton from the left of

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from laufruhe.machine import Engine
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.loads import PointLoads
 
 
@@ -42,3 +43,7 @@ class Answered(Protocol):
     @property
     def loads(self) -> tuple[PointLoads, ...]:
         """Per operating point."""
+
+    @property
+    def fidelity(self) -> Fidelity:
+        """What of the physics is kept."""

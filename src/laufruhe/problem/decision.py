@@ -38,6 +38,8 @@ class Kind(IntEnum):
     MOUNT = 4
     STAR = 5
     """Of the phasing: no number."""
+    FLYWHEEL = 6
+    """Nothing but the flywheel and how evenly the crank turns feels it."""
 
 
 @dataclass
@@ -52,11 +54,14 @@ class Numbers:
         Of the rotors by name: x, and y and z of their shafts [m] (C2).
     mounts
         Of every mount thirteen: stiffness, loss factor, damping, position, turned angles (E13).
+    flywheel
+        Inertia of the rest; mean diameter, width and height of the rim. Empty without a flywheel.
     """
 
     unbalances: dict[str, Any] = field(default_factory=dict)
     places: dict[str, list[Any]] = field(default_factory=dict)
     mounts: list[list[Any]] = field(default_factory=list)
+    flywheel: list[Any] = field(default_factory=list)
 
     @classmethod
     def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
@@ -64,7 +69,8 @@ class Numbers:
         rotors = {rotor.name: rotor for rotor in engine.rotors}
         unbalances = {name: rotor.unbalance for name, rotor in rotors.items()}
         places: dict[str, list[Any]] = {name: list(rotor.place) for name, rotor in rotors.items()}
-        return cls(unbalances, places, [list(row) for row in mounts])
+        flywheel = list(engine.flywheel.numbers) if engine.flywheel else []
+        return cls(unbalances, places, [list(row) for row in mounts], flywheel)
 
     def engine(self, given: Engine) -> Engine:
         """The engine with these numbers."""
@@ -75,7 +81,8 @@ class Numbers:
         mounts = given.mounts
         if self.mounts:
             mounts = tuple(mount_of(mount, row) for mount, row in zip(given.mounts, self.mounts, strict=True))
-        return replace(given, rotors=rotors, mounts=mounts)
+        flywheel = given.flywheel.moved(self.flywheel) if given.flywheel else None
+        return replace(given, rotors=rotors, mounts=mounts, flywheel=flywheel)
 
 
 class Drive(Protocol):
@@ -151,6 +158,19 @@ class MountDrive:
     def move(self, numbers: Numbers, change: Any) -> None:
         """Of the mount's number."""
         numbers.mounts[self.mount][self.number] += self.gain * change
+
+
+@dataclass(frozen=True)
+class FlywheelDrive:
+    """One number of the flywheel += change."""
+
+    number: int
+    kind: ClassVar[Kind] = Kind.FLYWHEEL
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the flywheel."""
+        numbers.flywheel[self.number] += change
 
 
 @dataclass(frozen=True)

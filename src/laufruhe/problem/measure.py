@@ -113,7 +113,7 @@ class Measure:
     @property
     def feels_gas(self) -> bool:
         """Whether gas loads it."""
-        return self.is_load and self.load.feels_gas
+        return (self.is_load and self.load.feels_gas) or self.channel.is_flywheel
 
     @property
     def feels_order(self) -> bool:

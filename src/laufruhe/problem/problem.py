@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.problem.decision import Decision, Numbers, moved_numbers
+from laufruhe.problem.decision import Decision, Kind, Numbers, moved_numbers
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.sets import Value
@@ -123,7 +123,7 @@ class Problem:
     @property
     def load_terms(self) -> tuple[Term, ...]:
         """Terms that are norms of loads or masses."""
-        return tuple(term for term in self.objective if not term.measure.is_mounting)
+        return tuple(term for term in self.objective if not term.measure.channel.is_number)
 
     @property
     def mount_terms(self) -> tuple[Term, ...]:
@@ -162,6 +162,11 @@ class Problem:
     def feels_order(self) -> bool:
         """Whether anything asked changes with the firing order of one star."""
         return any(measure.feels_order for measure in self.measures)
+
+    @property
+    def flywheel_decisions(self) -> tuple[Decision, ...]:
+        """Decisions about the flywheel."""
+        return tuple(decision for decision in self.decisions if decision.kind is Kind.FLYWHEEL)
 
     @property
     def objective_name(self) -> str:

@@ -15,6 +15,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
+from laufruhe.solvers.apart import solve_apart
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.places import solve_places
 from laufruhe.solvers.result import Result, Status
@@ -96,6 +97,20 @@ def _places(problem: Problem, say: Say) -> Result:
     return solve_within(problem, lambda at: solve_places(at, say))
 
 
+def _flywheel(problem: Problem, _: Say) -> Result:
+    from laufruhe.solvers.flywheel import solve_flywheel
+
+    return solve_flywheel(problem)
+
+
+def _apart(problem: Problem, say: Say) -> Result:
+    return solve_apart(problem, lambda part: _decided(part, say))
+
+
+def _asks_flywheel(problem: Problem) -> bool:
+    return all(measure.channel.is_flywheel for measure in problem.measures)
+
+
 def _asks_block(problem: Problem) -> bool:
     """Whether nothing is asked of loads inside the crankcase, and of the mounts nothing that depends on loads."""
     return _asks_loads(problem) and _nothing_inside(problem)
@@ -107,7 +122,7 @@ def _asks_stars(problem: Problem) -> bool:
 
 
 def _nothing_inside(problem: Problem) -> bool:
-    return not any(measure.is_inside for measure in problem.measures)
+    return not any(measure.is_inside or measure.channel.is_flywheel for measure in problem.measures)
 
 
 def _asks_loads(problem: Problem) -> bool:
@@ -115,9 +130,10 @@ def _asks_loads(problem: Problem) -> bool:
     return not any(measure.channel.of_loads for measure in problem.measures)
 
 
-_U, _P, _K, _M, _S = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR
+_U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
 METHODS: tuple[Method, ...] = (
     Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, lambda problem, _: state(problem)),
+    Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem, _: solve_within(problem, solve_unbalances)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_block, Reach.WHOLE, _places),
@@ -125,6 +141,8 @@ METHODS: tuple[Method, ...] = (
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), lambda _: True, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), lambda _: True, Reach.ASIDE, _smooth),
+    Method("flywheel and the rest apart", frozenset(Kind) - {_S}, lambda problem: bool(problem.flywheel_decisions),
+           Reach.ASIDE, _apart),
     Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _nothing_inside, Reach.ASIDE,
            _stars_on_mounts),
 )  # fmt: skip
@@ -193,6 +211,8 @@ def _decided(problem: Problem, say: Say) -> Result:
             return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
         return with_limits(_decided(problem.changed(limits=moved), say), problem.limits)
+    if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
+        raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
     moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)
     if problem.objective and kinds and not moving and problem.phasing is None:
         design = judged(problem, problem.start)

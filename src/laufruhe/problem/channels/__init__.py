@@ -27,6 +27,7 @@ from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.channels.flywheel import OF_FLYWHEEL
 from laufruhe.problem.channels.kinds import (
     AT_BEARINGS,
     AT_CYLINDERS,
@@ -158,6 +159,10 @@ CRANK_TORQUE = _inside(
     "crank torque", "N m", ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",),
     lambda moving, at: crank_torque(moving, at.point, at.fidelity).each(lambda values: values[:, None, None]),
 )  # fmt: skip
+STORED_WORK = _inside(
+    "stored work", "J", ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",),
+    lambda moving, at: crank_torque(moving, at.point, at.fidelity).integral.each(lambda values: values[:, None, None]),
+)  # fmt: skip
 CRANK_PIN_FORCE = _inside(
     "crank-pin force", "N", AT_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
     lambda moving, at: pin_forces(moving, at.point, at.fidelity),
@@ -214,7 +219,7 @@ CHANNELS: Mapping[str, Channel] = {
     for channel in (
         MOUNT_FORCE, MOUNT_TRAVEL, SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT,
         MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE, SIDE_FORCE,
-        FRICTION_POWER, CRANK_TORQUE, COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
+        FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
         TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
         SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *TORSIONAL,
     )

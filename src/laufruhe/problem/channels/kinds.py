@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
-from laufruhe.machine import Engine, Role
+from laufruhe.machine import Engine, Flywheel, Role
 from laufruhe.machine.clearances import Span
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
@@ -15,7 +15,10 @@ from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import PointLoads
 
+OfWheel: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
+OF_WHEEL = frozenset({Kind.FLYWHEEL})
+"""At an even speed no load feels the flywheel."""
 ON_BLOCK = ("operating_points", "orders")
 AT_SECTIONS = (*ON_BLOCK, "sections")
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
@@ -33,6 +36,9 @@ class Needs(StrEnum):
     BEARINGS = "main bearings"
     TORSION = "discs and shafts of the crankshaft"
     DIAMETERS = "a shaft with a diameter"
+    FLYWHEEL = "flywheel"
+    RIM = "rim"
+    ARMS = "arms"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +61,10 @@ class Channel:
         Whether it depends on what excites the block.
     size
         Of what cancels in it where it is zero; zero where loads, masses or nothing do.
+    rises
+        Whether it never falls where a number of the flywheel grows, if it is of that; else it never rises.
+    of_wheel
+        The value as a function of the flywheel of an engine, if it is of that.
     span
         Least and largest of its numbers while shafts stand between their places in two engines, if it is of these.
     """
@@ -67,6 +77,8 @@ class Channel:
     minimised: bool = True
     size: float = 0.0
     of_loads: bool = False
+    rises: bool = True
+    of_wheel: Callable[[Asked, Answered], OfWheel] | None = None
     span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
@@ -82,9 +94,14 @@ class Channel:
         """Names of those that it may be asked in; none where it is a number."""
         return ()
 
+    @property
+    def is_flywheel(self) -> bool:
+        """Whether it goes one way with every number of the flywheel."""
+        return self.of_wheel is not None
+
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Whether it may change with decisions of these kinds."""
-        return bool(kinds)
+        return bool(set(kinds) - OF_WHEEL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +145,8 @@ class LoadChannel(Channel):
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Mounts move what they transmit, and nothing of what the block feels."""
-        return bool(kinds if self.part is None and not self.is_inside else set(kinds) - OF_MOUNTS)
+        felt = set(kinds) - OF_WHEEL
+        return bool(felt if self.part is None and not self.is_inside else felt - OF_MOUNTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +199,7 @@ class MountChannel(NumberChannel):
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Mounts, and all that moves loads where these count."""
-        return bool(kinds) if self.of_loads else bool(set(kinds) & OF_MOUNTS)
+        return bool(set(kinds) - OF_WHEEL) if self.of_loads else bool(set(kinds) & OF_MOUNTS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from laufruhe.physics.irregularity import turning_inertia
 from laufruhe.physics.torque import TorqueFacts, torque_facts
 from laufruhe.present.numbers import DASH, number
 from laufruhe.report.grid import Grid
@@ -15,9 +16,10 @@ HEAD = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "store
 
 
 def tables(result: Result) -> list[Grid]:
-    """A row an operating point, where the speed varies or the inside of the crankcase is asked for."""
+    """A row an operating point, where a flywheel is told or the inside of the crankcase is asked for."""
     engine, problem = result.final.engine, result.problem
-    if not problem.fidelity.is_uneven and not any(measure.is_inside for measure in problem.measures):
+    asked = any(measure.is_inside for measure in problem.measures)
+    if turning_inertia(engine, problem.fidelity) is None and not asked:
         return []
     facts = ((point.name, torque_facts(engine, point, problem.fidelity)) for point in problem.points)
     return [Grid("Torque of the crankshaft", HEAD, tuple(_row(*pair) for pair in facts), note=NOTE)]

@@ -1,0 +1,139 @@
+"""The flywheel: what turns with the crank and stores work, as an inertia or as a rim on arms (T5-T8)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from laufruhe.errors import ModelError
+
+GRAVITY = 9.80665
+LATERAL = 0.3
+"""Poisson's ratio of the rim, of steel and of cast iron nearly."""
+
+
+@dataclass(frozen=True)
+class Arms:
+    """Oval arms between hub and rim, a full section each.
+
+    Attributes
+    ----------
+    count
+        Of them.
+    at_rim, at_hub
+        Width across the plane of rotation, and depth along the direction of motion [m].
+    hub_diameter
+        Where they begin [m].
+    """
+
+    count: int
+    at_rim: tuple[float, float]
+    at_hub: tuple[float, float]
+    hub_diameter: float
+
+
+@dataclass(frozen=True)
+class Rim:
+    """A ring of a rectangular section.
+
+    Attributes
+    ----------
+    mean_diameter, width, height
+        To the middle of the section; along the shaft; along a radius [m].
+    density
+        [kg/m3].
+    whole
+        Mass of the whole flywheel over that of its rim; what is within the rim is not counted as inertia.
+    arms
+        That carry it; of a disc there are none.
+    """
+
+    mean_diameter: float
+    width: float
+    height: float
+    density: float
+    whole: float = 1.0
+    arms: Arms | None = None
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Inside and outside [m]."""
+        return 0.5 * (self.mean_diameter - self.height), 0.5 * (self.mean_diameter + self.height)
+
+    @property
+    def mass(self) -> float:
+        """Of the ring alone [kg] (T5)."""
+        return math.pi * self.density * self.mean_diameter * self.width * self.height
+
+    @property
+    def inertia(self) -> float:
+        """About the shaft [kg m2] (T5)."""
+        inside, outside = self.radii
+        return 0.5 * self.mass * (inside**2 + outside**2)
+
+    def stress(self, speed: float) -> float:
+        """Largest in the ring, around its inside, as if nothing held it [Pa] (T6)."""
+        inside, outside = self.radii
+        return 0.25 * self.density * speed**2 * ((3.0 + LATERAL) * outside**2 + (1.0 - LATERAL) * inside**2)
+
+    def arm_stress(self, speed: float, torque: float) -> float:
+        """Largest in an arm that hangs down, the rim taking nothing of its own pull [Pa] (T7).
+
+        Parameters
+        ----------
+        torque
+            That the flywheel hands on [N m].
+        """
+        if self.arms is None:
+            raise ModelError("a flywheel without arms has no stress in them")
+        arms, radius = self.arms, 0.5 * self.mean_diameter
+        pull = self.mass * (speed**2 * radius / arms.count + 0.5 * GRAVITY)
+        (rim_width, rim_depth), (hub_width, hub_depth) = arms.at_rim, arms.at_hub
+        bending = 2.0 * abs(torque) / (radius * arms.count) * (radius - 0.5 * arms.hub_diameter)
+        at_rim = pull / (0.25 * math.pi * rim_width * rim_depth)
+        at_hub = pull / (0.25 * math.pi * hub_width * hub_depth) + bending / (math.pi / 32.0 * hub_width * hub_depth**2)
+        return max(at_rim, at_hub)
+
+
+@dataclass(frozen=True)
+class Flywheel:
+    """All that turns with the crank at its speed, pistons and rods left out.
+
+    Attributes
+    ----------
+    rest
+        Inertia of all but the rim, or of all where there is none [kg m2].
+    """
+
+    rest: float
+    rim: Rim | None = None
+
+    @property
+    def inertia(self) -> float:
+        """Of all of it [kg m2]."""
+        return self.rest + (self.rim.inertia if self.rim else 0.0)
+
+    @property
+    def ring(self) -> Rim:
+        """Its rim, which it must have."""
+        if self.rim is None:
+            raise ModelError("a flywheel that is given by its inertia has no mass and no stress; give its rim")
+        return self.rim
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """What decisions may move: inertia of the rest, and mean diameter, width and height of a rim."""
+        return (self.rest, *((self.rim.mean_diameter, self.rim.width, self.rim.height) if self.rim else ()))
+
+    def weighing(self, mass: float) -> Flywheel:
+        """With a rim as wide as makes it weigh so much [kg]."""
+        return replace(self, rim=replace(self.ring, width=self.ring.width * (mass / self.ring.mass)))
+
+    def moved(self, numbers: Any) -> Flywheel:
+        """With these numbers in place of its own."""
+        rest, *section = (float(number) for number in numbers)
+        if self.rim is None:
+            return Flywheel(rest)
+        diameter, width, height = section
+        return Flywheel(rest, replace(self.rim, mean_diameter=diameter, width=width, height=height))

@@ -1,0 +1,64 @@
+"""What is asked of the flywheel, and of how evenly it lets the crank turn (T2-T7)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+from laufruhe.machine import Flywheel
+from laufruhe.physics.irregularity import Swing, swing_of, turning_inertia
+from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.channels.kinds import Needs, NumberChannel, OfWheel
+from laufruhe.problem.decision import Kind
+
+
+@dataclass(frozen=True, eq=False)
+class FlywheelChannel(NumberChannel):
+    """A number that goes one way with every number of the flywheel.
+
+    Attributes
+    ----------
+    of_torque
+        Whether the torque is in it, which other decisions move too.
+    """
+
+    of_torque: bool = False
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """The flywheel, and all that moves the torque where that counts."""
+        return Kind.FLYWHEEL in kinds or (self.of_torque and Kind.STAR in kinds)
+
+
+def _found(
+    name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
+    needs: Needs = Needs.FLYWHEEL, rises: bool = True, of_torque: bool = False,
+) -> FlywheelChannel:  # fmt: skip
+    """The largest of a number of the flywheel over the operating points that count."""
+
+    def of_wheel(measure: Asked, evaluation: Answered) -> OfWheel:
+        counted = [at.point for at in evaluation.loads if measure.points is None or at.point.name in measure.points]
+        swings = [swing_of(evaluation.engine, point, evaluation.fidelity) for point in counted]
+        return lambda wheel: max(number(wheel, swing) for swing in swings)
+
+    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+        inertia, wheel = turning_inertia(evaluation.engine, evaluation.fidelity), evaluation.engine.flywheel
+        # an uneven speed is reckoned with an inertia alone
+        return () if inertia is None else (of_wheel(measure, evaluation)(wheel or Flywheel(inertia)),)
+
+    return FlywheelChannel(
+        name, unit, keys, needs, values=values, of_wheel=of_wheel, rises=rises, of_torque=of_torque
+    )  # fmt: skip
+
+
+AT = ("operating_points",)
+IRREGULARITY = _found(
+    "degree of irregularity", "", lambda wheel, swing: swing.irregularity(wheel.inertia), AT,
+    rises=False, of_torque=True,
+)  # fmt: skip
+FLYWHEEL_INERTIA = _found("flywheel inertia", "kg m^2", lambda wheel, _: wheel.inertia)
+FLYWHEEL_MASS = _found("flywheel mass", "kg", lambda wheel, _: wheel.ring.whole * wheel.ring.mass, needs=Needs.RIM)
+RIM_STRESS = _found("rim stress", "Pa", lambda wheel, swing: wheel.ring.stress(swing.speed), AT, Needs.RIM)
+ARM_STRESS = _found(
+    "arm stress", "Pa", lambda wheel, swing: wheel.ring.arm_stress(swing.speed, swing.torque), AT, Needs.ARMS
+)
+OF_FLYWHEEL = (IRREGULARITY, FLYWHEEL_INERTIA, FLYWHEEL_MASS, RIM_STRESS, ARM_STRESS)

@@ -1,0 +1,257 @@
+"""The flywheel that a degree of irregularity needs: proven by boxes, against brute force and by its properties."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.errors import InputError, ModelError
+from laufruhe.machine import Flywheel, Rim
+from laufruhe.physics.irregularity import irregularity
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import Status
+from problem_files import PROBLEMS, changed, loaded
+
+SINGLE = """
+title = "Single"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+bore = "100 mm"
+stroke = "120 mm"
+rod_ratio = 0.26
+reciprocating_mass = "1.25 kg"
+throws = [0]
+[[operating_points]]
+name = "rated"
+speed = "2500 rpm"
+[[operating_points]]
+name = "idle"
+speed = "900 rpm"
+imep = "5 bar"
+[gas]
+model = "seiliger"
+peak_pressure = "80 bar"
+imep = "9 bar"
+[fidelity]
+samples = 360
+"""
+INERTIA = """
+[flywheel]
+inertia = { between = ["0.05 kg m^2", "40 kg m^2"] }
+"""
+RIM = """
+[flywheel.rim]
+mean_diameter = { between = ["220 mm", "420 mm"] }
+width = { between = ["20 mm", "150 mm"] }
+height = { between = ["15 mm", "60 mm"] }
+"""
+LEAST = """
+[objective]
+minimise = "flywheel inertia"
+[[constraints]]
+limit = "degree of irregularity"
+max = "1/100"
+operating_points = ["rated"]
+"""
+
+
+@pytest.fixture(scope="module")
+def diesel() -> laufruhe.solvers.Result:
+    return laufruhe.solve(laufruhe.load(PROBLEMS / "diesel-70-hp-flywheel.toml"))
+
+
+def proven(problem: Problem) -> laufruhe.solvers.Result:
+    result = laufruhe.solve(problem)
+    assert result.status is Status.OPTIMAL
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.kkt_residual < 1e-2
+    return result
+
+
+def test_the_least_inertia_has_its_degree_and_is_shown_from_both_sides(tmp_path: Path) -> None:
+    problem = loaded(tmp_path, SINGLE + INERTIA + LEAST)
+    result = proven(problem)
+    assert result.objective is not None
+    assert result.certificate is not None
+    least, bound = result.objective.value, result.certificate.lower_bound
+    engine, point = problem.engine, problem.points[0]
+    assert bound <= least <= bound * (1.0 + 1e-6)
+    assert irregularity(engine, point, least, problem.fidelity) <= 0.01
+    assert irregularity(engine, point, bound * (1.0 - 1e-9), problem.fidelity) > 0.01
+    # the price is the slope of the inertia over the degree, told by solving twice more
+    ends = [
+        proven(loaded(tmp_path, SINGLE + INERTIA + changed(LEAST, "1/100", str(degree)))) for degree in (0.0099, 0.0101)
+    ]
+    slope = (ends[0].objective.value - ends[1].objective.value) / 0.0002
+    assert result.limits[0].shadow_price == pytest.approx(slope, rel=1e-3)
+
+
+def test_a_rim_is_the_best_of_a_grid(tmp_path: Path) -> None:
+    """Of 60 x 60 sections and diameters with the width that keeps the degree none is lighter."""
+    limits = '[[constraints]]\nlimit = "rim stress"\nmax = "18 N/mm^2"\n'
+    problem = loaded(tmp_path, SINGLE + RIM + changed(LEAST, "flywheel inertia", "flywheel mass") + limits)
+    result = proven(problem)
+    assert result.objective is not None
+    needed = laufruhe.solve(loaded(tmp_path, SINGLE + INERTIA + LEAST)).objective.value
+    fastest = problem.points[0].speed
+    best = np.inf
+    for diameter in np.linspace(0.22, 0.42, 60):
+        for height in np.linspace(0.015, 0.06, 60):
+            rim = Rim(diameter, 0.1, height, 7250.0)
+            width = 0.1 * needed / rim.inertia
+            if 0.02 <= width <= 0.15 and rim.stress(fastest) <= 18e6:
+                best = min(best, rim.mass * width / 0.1)
+    assert best < np.inf
+    assert result.certificate.lower_bound <= best
+    assert result.objective.value <= best
+    assert best <= 1.02 * result.objective.value
+
+
+def test_a_sum_of_inertia_and_degree_is_proven(tmp_path: Path) -> None:
+    """One rises and the other falls: brute force finds nothing under the bound, and no better design."""
+    degree = '{ quantity = "degree of irregularity", weight = 500 }'
+    terms = f'[objective]\nterms = [{degree}, {{ quantity = "flywheel inertia" }}]\n'
+    problem = loaded(tmp_path, SINGLE + INERTIA + terms)
+    result = proven(problem)
+    every = [
+        500.0 * max(irregularity(problem.engine, point, inertia, problem.fidelity) for point in problem.points)
+        + inertia
+        for inertia in np.geomspace(0.05, 40.0, 400)
+    ]
+    assert result.certificate.lower_bound <= min(every)
+    assert result.objective.value <= min(every) * (1.0 + 1e-4)
+
+
+def test_a_degree_is_minimised_at_the_largest_flywheel_allowed(tmp_path: Path) -> None:
+    least = '[objective]\nminimise = "degree of irregularity"\n[[constraints]]\nlimit = "flywheel inertia"\n'
+    result = proven(loaded(tmp_path, SINGLE + INERTIA + least + 'max = "2 kg m^2"\n'))
+    assert result.decisions[0].value == pytest.approx(2.0, rel=1e-6)
+    assert result.limits[0].shadow_price > 0.0
+
+
+def test_a_flywheel_that_cannot_reach_the_degree_is_told_in_one_line(tmp_path: Path) -> None:
+    small = changed(INERTIA, "40 kg", "1 kg")
+    result = laufruhe.solve(loaded(tmp_path, SINGLE + small + LEAST))
+    assert result.status is Status.INFEASIBLE
+    assert result.conflict == ("degree of irregularity at rated",)
+    assert "\n" not in result.message
+    stress = '[[constraints]]\nlimit = "rim stress"\nmax = "8 N/mm^2"\n'
+    text = SINGLE + RIM + changed(changed(LEAST, "flywheel inertia", "flywheel mass"), "1/100", "1/200") + stress
+    both = laufruhe.solve(loaded(tmp_path, text))
+    assert set(both.conflict) == {"degree of irregularity at rated", "rim stress"}
+
+
+def test_the_worked_diesel_gets_the_flywheel_that_it_was_given(diesel: laufruhe.solvers.Result) -> None:
+    """70 hp diesel, part E: 1:60, rim of 300 by 195 mm and 4850 kg under 3.5 m, 6330 kg in all, from a coefficient."""
+    assert diesel.certificate is not None
+    assert diesel.certificate.kind is Proof.GLOBAL
+    wheel = diesel.final.engine.flywheel
+    assert wheel is not None
+    rim = wheel.ring
+    assert diesel.objective.value == pytest.approx(6330.0, rel=0.06)
+    assert rim.mass == pytest.approx(4850.0, rel=0.06)
+    assert (rim.width, rim.height) == (pytest.approx(0.300, rel=0.05), pytest.approx(0.195, rel=0.05))
+    assert 2.0 * rim.radii[1] == pytest.approx(3.5, rel=0.01)
+    # every limit that holds it has a price, and together they balance
+    assert {limit.name for limit in diesel.limits if limit.active} == {"degree of irregularity", "rim stress"}
+    assert diesel.certificate.kkt_residual < 1e-6
+
+
+def test_more_room_is_never_worse(diesel: laufruhe.solvers.Result) -> None:
+    problem = diesel.problem
+    limits = tuple(
+        replace(limit, maximum=1.001 * limit.maximum) if limit.name == "rim stress" else limit
+        for limit in problem.limits
+    )
+    relaxed = laufruhe.solve(problem.changed(limits=limits))
+    fall = diesel.objective.value - relaxed.objective.value
+    price = next(limit.shadow_price for limit in diesel.limits if limit.name == "rim stress")
+    assert fall == pytest.approx(price * 0.006e6, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "rule"),
+    [
+        (INERTIA.replace("[flywheel]", '[flywheel]\nrim = { mean_diameter = "1 m", width = "1 mm", height = "1 mm" }'),
+         "flywheel.inertia", "given twice"),
+        ("[flywheel]\n", "flywheel.inertia", "missing"),
+        ('[flywheel]\ninertia = "0 kg m^2"\n', "flywheel.inertia", "more than"),
+        (INERTIA + 'crankshaft_inertia = "1 kg m^2"\n', "flywheel.crankshaft_inertia", "goes with a rim"),
+        (RIM.replace('"60 mm"', '"230 mm"'), "flywheel.rim.height", "leaves no hole"),
+        (RIM + 'arms = { count = 4, at_rim = ["9 mm", "9 mm"], at_hub = ["9 mm", "9 mm"], hub_diameter = "200 mm" }\n',
+         "hub_diameter", "does not fit"),
+        (RIM + 'whole = 0.9\n', "flywheel.rim.whole", "at least"),
+    ],
+)  # fmt: skip
+def test_bad_flywheels_are_refused(text: str, where: str, rule: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as refused:
+        loaded(tmp_path, SINGLE + text + LEAST)
+    assert where in str(refused.value)
+    assert rule in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_what_a_flywheel_is_asked_without_having_it(tmp_path: Path) -> None:
+    for name, text, rule in (
+        ("degree of irregularity", "", "needs a flywheel"),
+        ("flywheel mass", INERTIA, "needs the rim"),
+        ("arm stress", RIM, "needs the arms"),
+    ):
+        with pytest.raises(InputError, match=rule):
+            loaded(tmp_path, SINGLE + text + f'[objective]\nminimise = "{name}"\n')
+
+
+def test_an_inertia_is_told_once_and_serves_both(tmp_path: Path) -> None:
+    """With that of an uneven speed the degree is a quantity too; beside a flywheel it is refused."""
+    uneven = changed(SINGLE, "samples = 360", 'samples = 360\ncrank_inertia = "1 kg m^2"')
+    degree = '[[constraints]]\nlimit = "degree of irregularity"\nmax = "1/10"\noperating_points = ["rated"]\n'
+    problem = loaded(tmp_path, uneven + '[objective]\nminimise = "maximum shaking force"\n' + degree)
+    assert problem.engine.flywheel == Flywheel(1.0)
+    told = laufruhe.solve(problem).limits[0].value
+    assert told == pytest.approx(irregularity(problem.engine, problem.points[0], 1.0, problem.fidelity))
+    with pytest.raises(InputError, match="told by"):
+        loaded(tmp_path, uneven + INERTIA + LEAST)
+
+
+def test_a_flywheel_beside_counterweights_is_the_sum_of_both(tmp_path: Path) -> None:
+    """At an even speed neither feels the other: value, bound and prices are those of each alone."""
+    size = 'mass = { between = ["0 kg", "2 kg"] }'
+    web = f'[[counterweights]]\nname = "web"\nradius = "80 mm"\nopposite_throw = 1\n{size}\n'
+    mass = '[[constraints]]\nlimit = "counterweight mass"\nmax = "0.3 kg"\n'
+    force = '[objective]\nminimise = "mean shaking force"\n'
+    terms = (
+        '[objective]\nterms = [{ quantity = "flywheel inertia" }, { quantity = "mean shaking force", weight = 0.01 }]\n'
+    )
+    both = proven(
+        loaded(
+            tmp_path,
+            SINGLE + INERTIA + changed(LEAST, '[objective]\nminimise = "flywheel inertia"\n', terms) + web + mass,
+        )
+    )
+    alone = [proven(loaded(tmp_path, SINGLE + text)) for text in (INERTIA + LEAST, web + force + mass)]
+    assert both.objective.value == pytest.approx(alone[0].objective.value + 0.01 * alone[1].objective.value, rel=1e-6)
+    assert both.certificate.lower_bound == pytest.approx(
+        alone[0].certificate.lower_bound + 0.01 * alone[1].certificate.lower_bound, rel=1e-4
+    )
+    prices = {limit.name: limit.shadow_price for limit in both.limits}
+    assert prices["counterweight mass"] == pytest.approx(0.01 * alone[1].limits[0].shadow_price, rel=1e-3)
+    assert prices["degree of irregularity at rated"] == pytest.approx(alone[0].limits[0].shadow_price, rel=1e-6)
+    with pytest.raises(ModelError, match="nothing of it is minimised"):
+        laufruhe.solve(
+            loaded(tmp_path, SINGLE + INERTIA + web + changed(LEAST, "flywheel inertia", "mean shaking force"))
+        )
+    with pytest.raises(ModelError, match="nothing that is asked depends on it"):
+        laufruhe.solve(loaded(tmp_path, SINGLE + INERTIA + web + force))
+
+
+def test_what_no_method_decides_with_a_flywheel_is_refused_by_name(tmp_path: Path) -> None:
+    text = changed(SINGLE, "throws = [0]", 'cylinders = 3\ncylinder_spacing = "120 mm"\nthrows = "open"')
+    with pytest.raises(ModelError, match="degree of irregularity"):
+        laufruhe.solve(loaded(tmp_path, text + INERTIA + LEAST))
