@@ -182,6 +182,8 @@ _WRITTEN = {
     "N m/rad": f"(?:[kM]?Nm|{_FORCE}{_BY}{_LENGTH}){_OVER}(?:rad|deg)",
     "N m s/rad": f"(?:[kM]?Nm|{_FORCE}{_BY}{_LENGTH}){_BY}s{_OVER}(?:rad|deg)",
     "W": "[mkM]?W|PS|hp",
+    "J": f"[mkM]?J|[kM]?Nm|{_FORCE}{_BY}{_LENGTH}",
+    "kg/m^3": rf"{_MASS}{_OVER}{_LENGTH}(?:\^|\*\*)?3",
     "Hz": "[kM]?Hz",
     "rad": "m?rad|radians?|deg|degrees?|°|turns?",
     "rad/s": "rpm|(?:rad|deg|turns?|revolutions?) ?/ ?(?:s|min)",
