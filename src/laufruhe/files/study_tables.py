@@ -43,6 +43,15 @@ class SweepTable(Table):
     spacing: Literal["linear", "log"] | None = None
 
 
+class DrawnTable(Table):
+    """One quantity of the scene that is drawn at random, evenly between two ends."""
+
+    quantity: str = Field(description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
+    first: int | float | str = Field(alias="from")
+    last: int | float | str = Field(alias="to")
+    spacing: Literal["linear", "log"] = "linear"
+
+
 class CaseTable(Table):
     """One scene: a problem file, and what is changed of it."""
 
@@ -181,6 +190,41 @@ def axis_of(sweep: SweepTable) -> Axis:
     if len(set(told_apart)) < len(values):
         raise Refused(given, list(values), "names a value twice", "name each once")
     return Axis(sweep.quantity, values, unit, numbers)
+
+
+@dataclass(frozen=True)
+class Span:
+    """What a quantity is drawn from, in the unit of the study file."""
+
+    quantity: str
+    unit: str
+    low: float
+    high: float
+    is_log: bool
+    is_text: bool
+
+    def numbers(self, shares: Any) -> Any:
+        """From shares of the way, 0 to 1."""
+        return (
+            self.low * (self.high / self.low) ** shares if self.is_log else self.low + (self.high - self.low) * shares
+        )
+
+    def value(self, number: float) -> Value:
+        """A number as a problem file has it."""
+        if not self.is_text:
+            return float(number)
+        return f"{float(number)!r}" if self.unit == "1" else f"{float(number)!r} {self.unit}"
+
+
+def span_of(drawn: DrawnTable) -> Span:
+    """The ends between which a quantity is drawn; `Refused` where they do not fit."""
+    unit, (low, high) = _ends(drawn.quantity, drawn.first, drawn.last)
+    if low >= high:
+        raise Refused("from", drawn.first, "does not lie below to", "write the smaller end first")
+    if drawn.spacing == "log" and low <= 0.0:
+        raise Refused("from", drawn.first, "is not above zero, so it has no logarithm", 'leave spacing = "log" out')
+    is_text = isinstance(drawn.first, str) and (unit != "1" or _is_limit(drawn.quantity))
+    return Span(drawn.quantity, unit, low, high, drawn.spacing == "log", is_text)
 
 
 def _spaced(sweep: SweepTable) -> tuple[Value, ...]:

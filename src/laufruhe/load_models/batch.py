@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm
 from laufruhe.numerics.batch_norms import CACHE_BYTES, BatchNorm
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem.problem import Problem
@@ -24,15 +24,26 @@ class Designs:
     problem: Problem
     model: AffineModel
     terms: tuple[tuple[float, BatchNorm], ...]
+    limits: tuple[tuple[float, BatchNorm], ...] = ()
 
     def objective(self, values: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
         """Objective of every design from its decisions u, complex, shape (designs, decisions) (C4)."""
+        return self.of_columns(self._features(values), threads, cache_bytes)
+
+    def within(self, values: Array) -> NDArray[np.bool_]:
+        """Whether every design keeps the limits on loads and masses, to the excess that counts as none."""
+        features, kept = self._features(values), np.ones(len(values), dtype=bool)
+        for maximum, norm in self.limits:
+            kept &= norm.values(features) <= maximum + FEASIBLE * (maximum or 1.0)
+        return kept
+
+    def _features(self, values: Array) -> Array:
         columns = [
             (values[:, k] * direction.conjugate()).real
             for k, domain in enumerate(self.model.domains)
             for direction in domain.set.directions
         ]
-        return self.of_columns(np.stack([np.ones(len(values)), *columns], axis=1), threads, cache_bytes)
+        return np.stack([np.ones(len(values)), *columns], axis=1)
 
     def of_columns(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
         """Objective of 1 and the decision vector side by side, shape (designs, 1 + columns)."""
@@ -72,7 +83,8 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
         raise ModelError(f"many designs at once differ in unbalances alone; fix {', '.join(others)}")
     model = AffineModel(problem, whole_cycle=not prune)
     affine = model.at(model.full_samples if prune else problem.fidelity.samples)
-    return Designs(problem, model, tuple((weight, _batched(norm, prune)) for weight, norm in affine.terms))
+    terms, limits = (tuple((w, _batched(norm, prune)) for w, norm in of) for of in (affine.terms, affine.limits))
+    return Designs(problem, model, terms, limits)
 
 
 def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:

@@ -13,8 +13,8 @@ from laufruhe.errors import Complaint, InputError, SolverError
 P = ParamSpec("P")
 T = TypeVar("T")
 
-PATIENCE = 60.0
-"""Seconds in which the first worker has to come."""
+ANSWERS, PATIENCE = 10.0, 60.0
+"""Seconds in which a scheduler has to answer at first; and the first worker has to come, or a lost scheduler again."""
 
 
 class Cluster(Executor):
@@ -65,12 +65,16 @@ def cluster(address: str) -> Iterator[Executor]:
         rule, remedy = "needs Dask, which is not installed", "pip install 'laufruhe[cluster]'"
         raise InputError("laufruhe", (Complaint("--scheduler", address, rule, remedy),)) from None
     # what is lost and found again is told by who asked for it
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
-        client = Client(address, set_as_default=False, timeout=10)
+        Client(address, set_as_default=False, timeout=ANSWERS).close()
+        client = Client(address, set_as_default=False, timeout=PATIENCE)
     except (OSError, ValueError, TypeError) as error:
         why = str(error).partition(":")[0] or type(error).__name__
-        complaint = Complaint("--scheduler", address, f"does not answer ({why})", "start one: dask scheduler")
+        complaint = Complaint(
+            "--scheduler", address, f"does not answer ({why})", "name a running one, as dask scheduler says it"
+        )
         raise InputError("laufruhe", (complaint,)) from None
     try:
         with suppress(TimeoutError):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
 import xarray as xr
@@ -16,6 +17,32 @@ from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text
 
 Record: TypeAlias = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A number that every draw has."""
+
+    unit: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Template:
+    """How the numbers of many draws are laid out before any is known.
+
+    Attributes
+    ----------
+    draws, chunk
+        Of each case, and of one piece of work.
+    columns
+        By their names.
+    """
+
+    cases: tuple[str, ...]
+    draws: int
+    chunk: int
+    columns: Mapping[str, Column]
 
 
 class Part(Table):
@@ -53,6 +80,10 @@ class Part(Table):
         """What is asked of every point: all but words, cases, and what is swept."""
         return self.model_dump(exclude={"name", "title", "source", "cases", "readings", "sweep"})
 
+    def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:
+        """Tables that name quantities, by their keys, and what reads them: `Refused` where one does not fit."""
+        return []
+
     def size(self) -> int:
         """How many points it makes at least, counted before any is made."""
         return len(self.cases)
@@ -64,6 +95,10 @@ class Part(Table):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """One piece of work as JSON can hold it; it depends on the settings and the point alone."""
         raise NotImplementedError
+
+    def template(self, scenes: Scenes) -> Template | None:  # noqa: ARG002
+        """How records of points with a span are laid out; None where each point has a record of its own shape."""
+        return None
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Records, in the order of the points, as one labelled dataset."""

@@ -16,10 +16,9 @@ from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
 from laufruhe.files.problem_file import schema_text
 from laufruhe.files.reader import tables_of
-from laufruhe.files.study_tables import MOST_POINTS, axis_of, joined
+from laufruhe.files.study_tables import MOST_POINTS, joined
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.part import Part
-from laufruhe.studies.swept import SweptPart
 
 if TYPE_CHECKING:
     AnyPart: TypeAlias = Part
@@ -84,8 +83,7 @@ def load_study(path: Path) -> StudyFile:
         cases = [case.name for case in part.cases]
         if len(set(cases)) < len(cases):
             raise _refused(path, f"{where}.cases", "", "has two cases of one name", "give each its own")
-        if isinstance(part, SweptPart):
-            _check_sweeps(part, path, where)
+        _check_quantities(part, path, where)
         if part.size() > MOST_POINTS:
             raise _refused(path, where, "", f"makes {part.size()} points; a study takes {MOST_POINTS}", "ask for fewer")
     whole = sum(part.size() for part in parts)
@@ -95,13 +93,13 @@ def load_study(path: Path) -> StudyFile:
     return file.model_copy(update={"study": file.study.model_copy(update={"parts": parts})})
 
 
-def _check_sweeps(part: SweptPart, path: Path, where: str) -> None:
-    for k, sweep in enumerate(part.sweep):
+def _check_quantities(part: Part, path: Path, where: str) -> None:
+    for key, read in part.swept_or_drawn():
         try:
-            axis_of(sweep)
+            read()
         except Refused as refused:
             found = refused.complaint
-            at = f"{where}.sweep[{k + 1}].{found.where}"
+            at = f"{where}.{key}.{found.where}"
             raise _refused(path, at, found.value, found.rule, found.remedy) from None
 
 

@@ -5,20 +5,19 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
 
 import xarray as xr
 
 from laufruhe.errors import SolverError
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import TimeIsOver, WorkersGone, count_of, each, executor_for, given
-from laufruhe.studies.kept_points import KeptPoints
-from laufruhe.studies.part import Part, Record
+from laufruhe.studies.part import Record
 from laufruhe.studies.reader import StudyFile
-from laufruhe.studies.scenes import Point, Scenes, program
+from laufruhe.studies.scenes import Scenes, program
+from laufruhe.studies.stores import Records, Task, stores_of
 
 # a worker imports everything anew: two seconds, so it has to save more
 POOL_PAYS = 4.0
@@ -56,23 +55,23 @@ def run(
     marks = [scenes.fingerprint(point, part.settings()) for part, point in work]
     # a scene that stands in two parts of one kind is solved once
     wanted = dict(zip(marks, work, strict=True))
-    with KeptPoints(kept, wanted.keys()) as store:
-        todo = {mark: task for mark, task in wanted.items() if mark not in store.records}
+    with ExitStack() as stores:
+        store = {mark: own for own, marked in stores_of(study, scenes, kept, wanted, stores) for mark in marked}
+        todo = {mark: task for mark, task in wanted.items() if mark not in store[mark].seconds}
         names, whole = list(todo), len(wanted)
         say(whole - len(todo), whole)
         with closing(answers(list(todo.values()), scenes, jobs)) as found:
             for count, answer in enumerate(found, 1):
-                store.keep(names[answer.task], answer.seconds, answer.record)
+                mark = names[answer.task]
+                store[mark].keep(mark, answer.seconds, answer.record)
                 say(whole - len(todo) + count, whole)
-    datasets, seconds = {}, {}
-    for part in study.study.parts:
-        own = [(mark, point) for mark, (of, point) in zip(marks, work, strict=True) if of is part]
-        datasets[part.name] = part.dataset([point for _, point in own], [store.records[mark] for mark, _ in own])
-        seconds[part.name] = sum(store.seconds[mark] for mark in {mark for mark, _ in own})
+        datasets, seconds = {}, {}
+        for part in study.study.parts:
+            own = [(mark, point) for mark, (of, point) in zip(marks, work, strict=True) if of is part]
+            records = Records([mark for mark, _ in own], store)
+            datasets[part.name] = part.dataset([point for _, point in own], records)
+            seconds[part.name] = sum(store[mark].seconds[mark] for mark in {mark for mark, _ in own})
     return datasets, seconds
-
-
-Task: TypeAlias = tuple[Part, Point]
 
 
 @dataclass(frozen=True)

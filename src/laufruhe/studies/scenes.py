@@ -30,7 +30,7 @@ class Point:
     """One piece of work of a part: a scene, values put into it by their paths, a metric in place of its objective.
 
     Of balancer shafts those named are kept, all when None; it starts from `base` in place of
-    the tables of the case's problem file.
+    the tables of the case's problem file. A span is that of many draws, from one number to another.
     """
 
     case: CaseTable
@@ -38,6 +38,7 @@ class Point:
     metric: str | None = None
     shafts: tuple[str, ...] | None = None
     base: Mapping[str, Any] | None = None
+    span: tuple[int, int] | None = None
 
     def __str__(self) -> str:
         return ", ".join([self.case.name, *(f"{path} = {value}" for path, value in self.changes.items())])
@@ -123,7 +124,8 @@ class Scenes:
         """Of everything that a point hangs on: scene, files that it names, what is asked, and this package."""
         tables = self.tables(point)
         case = point.case.model_dump(exclude={"name", "sweep"})
-        about = [settings, case, point.shafts, tables, program()]
+        span = [point.case.name, *point.span] if point.span is not None else None
+        about = [settings, case, point.shafts, span, tables, program()]
         found = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
         gas = tables.get("gas")
         named = gas.get("file") if isinstance(gas, dict) else None

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -143,6 +144,10 @@ class SweptPart(Part):
 
     metric: QuantityName | None = Field(default=None, description="In place of the objective of the problem files.")
     sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
+
+    def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:
+        """Of every sweep."""
+        return [(f"sweep[{k + 1}]", partial(axis_of, sweep)) for k, sweep in enumerate(self.sweep)]
 
     def size(self) -> int:
         """Every case at every combination."""

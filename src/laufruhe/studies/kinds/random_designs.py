@@ -1,0 +1,144 @@
+"""Random designs of one problem, evaluated: what lies between the bounds, beside the optimum that is proven."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import xarray as xr
+
+from laufruhe.load_models.batch import Designs, prepare
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.conclusion import decision_values
+from laufruhe.studies import picture as p
+from laufruhe.studies.part import Column, Record, variable
+from laufruhe.studies.regions import VALUES
+from laufruhe.studies.sampled import Array, Sampled, in_unit, listed, share_below
+from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.swept import solved
+from laufruhe.studies.text import Rows, Text, number
+
+WITHIN = "within_limits"
+_PREPARED: dict[str, tuple[Problem, Designs, list[str]]] = {}
+
+
+class RandomDesigns(Sampled):
+    """Open unbalances drawn even between their bounds, each design evaluated by the exact model."""
+
+    kind: Literal["random designs"]
+    own_chunk: ClassVar[int] = 10_000
+
+    def points(self, scenes: Scenes) -> list[Point]:
+        """Of every case the proven optimum, and the pieces of its draws."""
+        for case in self.cases:
+            with scenes.blamed(Point(case), "decisions"):
+                problem = scenes.problem(Point(case))
+                prepare(problem)
+            if not problem.decisions:
+                raise scenes.refused(case, "decisions", "are missing, so there is nothing to draw", "open an unbalance")
+            unweighed = [limit.name for limit in problem.limits if limit not in problem.load_limits]
+            if unweighed:
+                rule = f"has '{unweighed[0]}', which is no limit on loads or masses"
+                raise scenes.refused(case, "constraints", rule, "leave it out")
+        self.check_objective(scenes)
+        return [Point(case, span=span) for case in self.cases for span in (None, *self.spans())]
+
+    def columns(self, scenes: Scenes) -> dict[str, Column]:
+        """Objective, limits and every open number."""
+        columns: dict[str, Column] = {}
+        for case in self.cases:
+            problem = scenes.problem(Point(case))
+            columns["objective"] = Column(problem.objective_unit or "", problem.objective_name)
+            columns[WITHIN] = Column("1", "1 where a design keeps all limits")
+            columns |= {name: Column(unit, name) for name, unit in _names(problem).items()}
+        return columns
+
+    def answer(self, point: Point, scenes: Scenes) -> Record:
+        """The proven optimum, or the values of a piece."""
+        with scenes.blamed(point):
+            if point.span is None:
+                return solved(scenes.problem(point))
+            problem, designs, names = self._prepared(point, scenes)
+        u = self.random(point.span, 2 * len(problem.unbalances))
+        sizes, angles = u[:, ::2].copy(), u[:, 1::2].copy()
+        for k, decision in enumerate(problem.unbalances):
+            low, high = decision.set.angles
+            sizes[:, k] = decision.lower + (decision.upper - decision.lower) * sizes[:, k]
+            angles[:, k] = low + (high - low) * angles[:, k]
+        values = sizes * np.exp(1j * angles)
+        found = np.full((len(u), len(names)), math.nan)
+        found[:, names.index("objective")] = designs.objective(values)
+        found[:, names.index(WITHIN)] = designs.within(values)
+        for k, decision in enumerate(problem.unbalances):
+            for told, drawn in zip(decision_values(decision, decision.start, None), (sizes, angles), strict=False):
+                found[:, names.index(told.name)] = drawn[:, k]
+        return {VALUES: found}
+
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+        """All draws, and of every case what is proven."""
+        best = [records[k] for k, point in enumerate(points) if point.span is None]
+        data = self.gathered(points, records)
+        about = data["objective"].attrs
+        for name, words in (("objective", "optimum"), ("lower_bound", "lower bound")):
+            told = variable("case", [one[name] for one in best], f"{about['long_name']}, {words}", about["units"])
+            data[words.replace(" ", "_")] = told
+        return data.assign_coords(proof=("case", [one["proof"] for one in best]))
+
+    def _prepared(self, point: Point, scenes: Scenes) -> tuple[Problem, Designs, list[str]]:
+        """What all pieces of a case share, once a process."""
+        mark = scenes.fingerprint(Point(point.case), self.settings())
+        if mark not in _PREPARED:
+            _PREPARED.clear()
+            problem = scenes.problem(Point(point.case))
+            _PREPARED[mark] = problem, prepare(problem), list(self.columns(scenes))
+        return _PREPARED[mark]
+
+    @staticmethod
+    def table(data: xr.Dataset) -> list[Text]:
+        """Of every case what random designs reach, beside what is proven."""
+        objective, unit = in_unit(data["objective"])
+        best, bound = (in_unit(data[name].assign_attrs(units=data["objective"].attrs["units"]))[0]
+                       for name in ("optimum", "lower_bound"))  # fmt: skip
+        head = ["case", "designs", "within limits", f"best of these [{unit}]", "median", "95 % below"]
+        head += [f"optimum [{unit}]", "lower bound", "proof", "designs below the bound"]
+        rows = []
+        for k, name in enumerate(data["case"].values):
+            kept = _kept(data, objective, k)
+            _, middle, most = listed(kept)
+            cells = [str(name), f"{objective.shape[1]:,}", f"{100.0 * len(kept) / objective.shape[1]:.3g} %"]
+            cells += [
+                number(float(kept.min(initial=math.inf)) if len(kept) else math.nan),
+                number(middle),
+                number(most),
+            ]
+            cells += [number(float(best[k])), number(float(bound[k])), str(data["proof"].values[k])]
+            rows.append([*cells, str(int((kept < bound[k] * (1.0 - 1e-9)).sum()))])
+        return [Rows(head, rows)]
+
+    @staticmethod
+    def picture(data: xr.Dataset) -> p.Picture:
+        """How many random designs stay below, and the optimum."""
+        objective, unit = in_unit(data["objective"])
+        best = in_unit(data["optimum"])[0]
+        marks: list[p.Mark] = []
+        for k, name in enumerate(data["case"].values):
+            colour = p.colour(k, data.sizes["case"])
+            marks.append(share_below(_kept(data, objective, k), colour, str(name)))
+            marks.append(p.Line([best[k]] * 2, [0.0, 100.0], colour, dash=p.DASHES[0], width=1.2))
+        marks.append(p.Line(colour="ink", dash=p.DASHES[0], width=1.2, label="optimum"))
+        x = p.Axis(f"{data['objective'].attrs['long_name']} [{unit}]")
+        panel = p.Panel(marks, x, p.Axis("designs below [%]", (0.0, 100.0)))
+        words = f"{data.sizes['draw']:,} designs a case, drawn even between the bounds; those within all limits."
+        return p.Picture(data.attrs["title"], words, [panel], p.credit(data, f"Seed {data.attrs['seed']}. "))
+
+
+def _names(problem: Problem) -> dict[str, str]:
+    """Open numbers with their units, as results name them."""
+    told = [one for decision in problem.unbalances for one in decision_values(decision, decision.start, None)]
+    return {one.name: one.unit for one in told}
+
+
+def _kept(data: xr.Dataset, objective: Array, k: int) -> Array:
+    return np.asarray(objective[k][data[WITHIN].values[k] > 0.0])

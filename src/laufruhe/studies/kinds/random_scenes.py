@@ -1,0 +1,134 @@
+"""Random scenes, each decided to its own optimum: what a proven design gains, whatever the engine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import xarray as xr
+from pydantic import Field
+
+from laufruhe.errors import InputError, ModelError
+from laufruhe.files.study_tables import DrawnTable, Span, span_of
+from laufruhe.solvers.conclusion import decision_values
+from laufruhe.studies import picture as p
+from laufruhe.studies.part import Column, Record
+from laufruhe.studies.regions import VALUES
+from laufruhe.studies.sampled import Sampled, in_unit, listed, share_below
+from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.swept import solved
+from laufruhe.studies.text import Rows, Text, number
+
+STATUSES = ("optimal", "feasible", "infeasible", "failed", "impossible")
+PROOFS = ("global", "global within gap", "local", "none", "as given")
+IMPOSSIBLE = {"status": "impossible", "proof": "none"}
+SIZES = ("objective_given", "objective", "lower_bound")
+_CODES = {"status": STATUSES, "proof": PROOFS}
+_WORDS = {"objective_given": "as given", "objective": "as decided", "lower_bound": "that no design falls below"}
+
+
+class RandomScenes(Sampled):
+    """Numbers of the problem file drawn at random; every scene decided as `solve` does."""
+
+    kind: Literal["random scenes"]
+    vary: list[DrawnTable] = Field(min_length=1, max_length=20, description="What is drawn, each evenly and by itself.")
+    own_chunk: ClassVar[int] = 1000
+
+    def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:
+        """Of everything that is drawn."""
+        return [(f"vary[{k + 1}]", partial(span_of, table)) for k, table in enumerate(self.vary)]
+
+    def drawn(self) -> list[Span]:
+        """What is drawn, and between which ends."""
+        return [span_of(table) for table in self.vary]
+
+    def points(self, scenes: Scenes) -> list[Point]:
+        """The pieces of every case, if its scene can be made at both ends of everything."""
+        for case in self.cases:
+            for span in self.drawn():
+                for end in (span.low, span.high):
+                    scenes.problem(Point(case, {span.quantity: span.value(end)}))
+        self.check_objective(scenes)
+        return [Point(case, span=span) for case in self.cases for span in self.spans()]
+
+    def columns(self, scenes: Scenes) -> dict[str, Column]:
+        """What was drawn, what became of it, and what was decided."""
+        spans = self.drawn()
+        found = {span.quantity: Column(span.unit, span.quantity) for span in spans}
+        for case in self.cases:
+            problem = scenes.problem(Point(case, {span.quantity: span.value(span.low) for span in spans}))
+            name, unit = problem.objective_name, problem.objective_unit or ""
+            found |= {key: Column(unit, f"{name} {words}") for key, words in _WORDS.items()}
+            found |= {key: Column("1", key) for key in _CODES}
+            told = [one for d in problem.decisions for one in decision_values(d, d.start, None)]
+            found |= {one.name: Column(one.unit, f"decided: {one.name}") for one in told}
+        return found
+
+    def answer(self, point: Point, scenes: Scenes) -> Record:
+        """A row a draw: each scene read, decided and judged by itself."""
+        assert point.span is not None
+        spans, names = self.drawn(), list(self.columns(scenes))
+        shares = self.random(point.span, len(spans))
+        drawn = np.stack([span.numbers(shares[:, k]) for k, span in enumerate(spans)], axis=1)
+        rows = []
+        for numbers in drawn:
+            changes = {span.quantity: span.value(x) for span, x in zip(spans, numbers, strict=True)}
+            try:
+                found = solved(scenes.problem(replace(point, changes=changes, span=None)))
+            except (InputError, ModelError):
+                # among so many some engine cannot be built: it is counted, and no reason to stop
+                found = IMPOSSIBLE
+            row = dict(zip((span.quantity for span in spans), map(float, numbers), strict=True))
+            row |= {key: float(codes.index(found[key])) for key, codes in _CODES.items()}
+            row |= {key: found.get(key, math.nan) for key in SIZES} | found.get("decided", {})
+            rows.append([row.get(name, math.nan) for name in names])
+        return {VALUES: np.array(rows)}
+
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+        """All draws, status and proof as small numbers with their meanings."""
+        data = self.gathered(points, records)
+        for name, codes in _CODES.items():
+            meanings = " ".join(code.replace(" ", "_") for code in codes)
+            about = {**data[name].attrs, "flag_values": np.arange(len(codes), dtype="int8"), "flag_meanings": meanings}
+            data[name] = data[name].astype("int8").assign_attrs(about)
+        return data
+
+    @staticmethod
+    def table(data: xr.Dataset) -> list[Text]:
+        """Of every case what became of its scenes, and what deciding gained."""
+        unit = in_unit(data["objective"])[1]
+        head = ["case", "scenes", "proven optimum", "proven within gap or local", "infeasible", "failed", "impossible"]
+        head += [f"as given: 5 % below [{unit}]", "median", "95 % below", f"decided: 5 % below [{unit}]", "median"]
+        head += ["95 % below", "largest gap of the proven"]
+        rows = []
+        for name in data["case"].values:
+            own = data.sel(case=name)
+            status, proof = own["status"].values, own["proof"].values
+            found = np.isin(status, (0, 1))
+            best = found & np.isin(proof, (0, 4))
+            given, decided = (in_unit(own[key])[0] for key in SIZES[:2])
+            cells = [str(name), f"{len(status):,}", f"{int(best.sum()):,}", f"{int((found & ~best).sum()):,}"]
+            cells += [f"{int((status == code).sum()):,}" for code in (2, 3, 4)]
+            cells += [number(x) for values in (given, decided) for x in listed(values)]
+            proven = own.isel(draw=np.flatnonzero(status == 0))
+            gap = (proven["objective"] - proven["lower_bound"]) / np.maximum(proven["objective"], 1e-300)
+            rows.append([*cells, f"{float(gap.max()):.1e}" if gap.notnull().any() else "–"])
+        return [Rows(head, rows)]
+
+    @staticmethod
+    def picture(data: xr.Dataset) -> p.Picture:
+        """How many scenes stay below, as given and as decided."""
+        marks: list[p.Mark] = []
+        for k, name in enumerate(data["case"].values):
+            own, colour = data.sel(case=name), p.colour(k, data.sizes["case"])
+            marks.append(share_below(in_unit(own["objective_given"])[0], colour, f"{name}, as given", p.DASHES[0]))
+            marks.append(share_below(in_unit(own["objective"])[0], colour, f"{name}, as decided"))
+        words = str(data["objective"].attrs["long_name"]).removesuffix(" as decided")
+        x = p.Axis(f"{words} [{in_unit(data['objective'])[1]}]")
+        panel = p.Panel(marks, x, p.Axis("scenes below [%]", (0.0, 100.0)))
+        told = f"{data.sizes['draw']:,} random scenes a case, each decided by itself."
+        return p.Picture(data.attrs["title"], told, [panel], p.credit(data, f"Seed {data.attrs['seed']}. "))

@@ -1,0 +1,119 @@
+"""Parts of many random draws, in pieces whose numbers depend on nothing but the seed and the draw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from pydantic import Field
+
+from laufruhe.studies import picture as p
+from laufruhe.studies.part import Column, Part, Template
+from laufruhe.studies.regions import COLUMNS, VALUES
+from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.units import readable
+
+Array = NDArray[np.float64]
+
+MOST_DRAWS = 1_000_000_000
+MOST_TABLED = 100_000
+"""Draws that are written as CSV too: more are no table any more."""
+LISTED = (5.0, 50.0, 95.0)
+CURVE = np.arange(1, 400) / 4.0
+_WORDS = 4
+"""Random numbers that one step of the generator makes."""
+
+
+class Sampled(Part):
+    """Cases with many draws each, all with the same random numbers."""
+
+    draws: Annotated[int, Field(ge=1, le=MOST_DRAWS)] = Field(description="Of each case.")
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1964
+    chunk: Annotated[int | None, Field(ge=1, le=1_000_000)] = Field(
+        default=None, description="Draws in one piece of work."
+    )
+    own_chunk: ClassVar[int] = 1000
+
+    def settings(self) -> dict[str, Any]:
+        """All that a piece hangs on; more draws keep those that are there."""
+        return {**super().settings(), "name": self.name, "draws": None, "chunk": self.piece}
+
+    @property
+    def piece(self) -> int:
+        """Draws in one piece of work."""
+        return self.chunk or self.own_chunk
+
+    def size(self) -> int:
+        """Pieces of all cases."""
+        return len(self.cases) * -(-self.draws // self.piece)
+
+    def check_objective(self, scenes: Scenes) -> None:
+        """Whether all cases have an objective, and one and the same (`InputError`)."""
+        names = [(case, scenes.problem(Point(case)).objective_name) for case in self.cases]
+        for case, name in names:
+            if not name:
+                raise scenes.refused(case, "objective", "is missing, so there is nothing to compare", "give one")
+            if name != names[0][1]:
+                rule = f"is {name} in '{case.name}' and {names[0][1]} in '{names[0][0].name}'"
+                raise scenes.refused(case, "objective", rule, "give each its own part")
+
+    def spans(self) -> list[tuple[int, int]]:
+        """Of every piece, the first draw and that after the last."""
+        return [(k, min(k + self.piece, self.draws)) for k in range(0, self.draws, self.piece)]
+
+    def random(self, span: tuple[int, int], width: int) -> Array:
+        """Numbers from 0 to 1 of some draws, shape (draws, width); the same whichever piece a draw is in."""
+        steps = -(-width // _WORDS)
+        generator = np.random.Philox(key=self.seed)
+        generator.advance(span[0] * steps)
+        return np.random.Generator(generator).random((span[1] - span[0], steps * _WORDS))[:, :width]
+
+    def gathered(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+        """All draws along case and draw, a variable for each column."""
+        first = next(k for k, point in enumerate(points) if point.span is not None)
+        columns, cases = records[first][COLUMNS], [case.name for case in self.cases]
+        values = np.empty((len(columns), len(cases), self.draws))
+        for k, point in enumerate(points):
+            if point.span is not None:
+                values[:, cases.index(point.case.name), slice(*point.span)] = records[k][VALUES].T
+        found = {
+            name: (("case", "draw"), own, {"units": column.unit, "long_name": column.words})
+            for own, (name, column) in zip(values, columns.items(), strict=True)
+        }
+        return xr.Dataset(found, {"case": cases}, self.about(seed=self.seed))
+
+    def columns(self, scenes: Scenes) -> dict[str, Column]:
+        """The numbers of a draw."""
+        raise NotImplementedError
+
+    def template(self, scenes: Scenes) -> Template | None:
+        """A row a draw."""
+        return Template(tuple(case.name for case in self.cases), self.draws, self.piece, self.columns(scenes))
+
+    @property
+    def ends(self) -> tuple[Literal["nc", "csv", "png"], ...]:
+        """A table beside, as long as it is one."""
+        return ("nc", "csv", "png") if len(self.cases) * self.draws <= MOST_TABLED else ("nc", "png")
+
+
+def in_unit(values: xr.DataArray) -> tuple[Array, str]:
+    """Numbers as a reader expects them, and their unit."""
+    unit, factor = readable(str(values.attrs["units"]))
+    return factor * np.asarray(values.values, dtype=float), unit
+
+
+def share_below(values: Array, colour: p.Colour, label: str, dash: Sequence[float] = ()) -> p.Line:
+    """How many of some numbers stay below, over the number."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return p.Line((), (), colour, label, dash=dash)
+    return p.Line(np.percentile(known, CURVE), CURVE, colour, label, dash=dash)
+
+
+def listed(values: Array) -> list[float]:
+    """Numbers that 5, 50 and 95 of 100 stay below; not a number where there is none."""
+    known = values[np.isfinite(values)]
+    return [float(one) for one in np.percentile(known, LISTED)] if len(known) else [float("nan")] * len(LISTED)

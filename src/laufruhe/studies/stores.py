@@ -1,0 +1,74 @@
+"""Where finished points of a study are kept, by their fingerprints.
+
+There are two stores, for two shapes of records. Points of most kinds are as different as their engines, each costs
+milliseconds to minutes, and a study that is changed keeps those that are not: a line for each, added to a file, needs
+nothing but the package. Draws are millions of rows of the same numbers: regions of one array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Protocol, TypeAlias
+
+from laufruhe.studies.kept_points import KeptPoints
+from laufruhe.studies.part import Part, Record
+from laufruhe.studies.reader import StudyFile
+from laufruhe.studies.regions import Region, Regions, kept_to_one
+from laufruhe.studies.scenes import Point, Scenes
+
+Task: TypeAlias = tuple[Part, Point]
+
+
+class Store(Protocol):
+    """What is kept of points, by their fingerprints: lines of a file for any records, regions for many draws."""
+
+    @property
+    def records(self) -> Mapping[str, Record]:
+        """As they were kept."""
+
+    @property
+    def seconds(self) -> Mapping[str, float]:
+        """What each took."""
+
+    def keep(self, mark: str, seconds: float, record: Record) -> None:
+        """Write a record; it has left the process when this returns."""
+
+
+def stores_of(
+    study: StudyFile, scenes: Scenes, kept: Path, wanted: Mapping[str, Task], stores: ExitStack
+) -> Iterator[tuple[Store, Collection[str]]]:
+    """Where points are kept, and which: spans of parts that know what their draws look like, and the others."""
+    rest, root = set(wanted), regions_in(kept.parent)
+    templates = [(part, template) for part in study.study.parts if (template := part.template(scenes)) is not None]
+    if templates:
+        stores.enter_context(kept_to_one(root))
+    for part, template in templates:
+        regions = {
+            mark: Region(template.cases.index(point.case.name), *point.span)
+            for mark, (of, point) in wanted.items()
+            if of is part and point.span is not None
+        }
+        yield Regions(root, part.name, template, regions), regions
+        rest -= set(regions)
+    yield stores.enter_context(KeptPoints(kept, rest)), rest
+
+
+def regions_in(folder: Path) -> Path:
+    """The store of many draws, beside the folder of the other results: it grows while these stand."""
+    return folder.with_name(f"{folder.name}.zarr")
+
+
+class Records(Sequence[Record]):
+    """Records in the order of points, read when they are asked for."""
+
+    def __init__(self, marks: Sequence[str], stores: Mapping[str, Store]) -> None:
+        self._marks, self._stores = marks, stores
+
+    def __getitem__(self, k: Any) -> Any:
+        mark = self._marks[k]
+        return self._stores[mark].records[mark]
+
+    def __len__(self) -> int:
+        return len(self._marks)

@@ -1,0 +1,68 @@
+"""A study on a Dask cluster has the numbers of one process, whatever is killed in between."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from studies import clusters
+
+pytest.importorskip("distributed", reason="Dask is not installed: pip install 'laufruhe[cluster]'")
+pytest.importorskip("zarr", reason="Zarr is not installed: pip install 'laufruhe[cluster]'")
+pytestmark = pytest.mark.slow
+SMALL = {"draws": 2000, "chunk": 500, "scenes": 20, "few": 2, "points": 3}
+KILLED_AT = 6
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One process, left alone."""
+    folder = clusters.prepared(tmp_path_factory.mktemp("serial"), **SMALL)
+    assert clusters.finished(folder, "--jobs", "1") == ""
+    return folder
+
+
+@pytest.fixture(scope="module")
+def workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[clusters.Cluster]:
+    with clusters.cluster(tmp_path_factory.mktemp("cluster"), 2) as own:
+        yield own
+
+
+def test_a_killed_worker_changes_no_bit(tmp_path: Path, serial: Path, workers: clusters.Cluster) -> None:
+    folder = clusters.prepared(tmp_path, **SMALL)
+    running = clusters.started(folder, "--scheduler", workers.address)
+    clusters.wait_until(lambda: clusters.pieces_done(folder) >= KILLED_AT)
+    workers.kill_worker(0)
+    said = running.communicate()[1]
+    assert (running.returncode, said) == (0, "")
+    assert clusters.same(serial, folder) == []
+
+
+def test_a_killed_client_and_a_killed_scheduler_change_no_bit(
+    tmp_path: Path, serial: Path, workers: clusters.Cluster
+) -> None:
+    folder = clusters.prepared(tmp_path, **SMALL)
+    first = clusters.started(folder, "--scheduler", workers.address)
+    clusters.wait_until(lambda: clusters.pieces_done(folder) >= KILLED_AT)
+    first.kill()
+    first.communicate()
+    kept = clusters.pieces_done(folder)
+    assert kept >= KILLED_AT
+    again = clusters.started(folder, "--scheduler", workers.address)
+    clusters.wait_until(lambda: clusters.pieces_done(folder) > kept or again.poll() is not None)
+    workers.kill()
+    workers.start(1)
+    said = again.communicate()[1]
+    assert (again.returncode, said) == (0, "")
+    assert clusters.same(serial, folder) == []
+    assert clusters.pieces_done(folder) == 4 + 10
+
+
+def test_an_address_where_nobody_answers_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = clusters.prepared(tmp_path, **SMALL)
+    said = clusters.finished(folder, "--scheduler", "nowhere")
+    assert said.startswith("2: laufruhe: --scheduler = nowhere: does not answer (missing port")
+    assert said.count("\n") == 1
+    assert not (folder / "out").exists()
