@@ -99,7 +99,7 @@ def main() -> None:
     running = commands.add_parser("run")
     running.add_argument("families", help="comma-separated, or all")
     running.add_argument("--from", dest="first", default="0,100000,200000", help="first seeds, comma-separated")
-    running.add_argument("--number", type=int, default=2000, help="of each family from each first seed")
+    running.add_argument("--number", type=int, default=2000, help="of each kind from each first seed")
     running.add_argument("--log", type=Path, default=PAGE.with_name("run.jsonl"))
     running.add_argument("--seconds", type=float, default=1e9)
     running.add_argument("--again", action="store_true", help="what the log has as wrong, once more")
