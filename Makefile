@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test test-fast test-long attack matrix bench pictures lint format clean distclean
+.PHONY: help solve study test test-fast test-long attack matrix faults bench pictures docs lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
@@ -22,6 +22,7 @@ help:
 	@echo "make faults     100,000 damaged files, which writes results/faults/; half an hour and more"
 	@echo "make bench      benchmarks, which write results/benchmarks/; an hour and more"
 	@echo "make pictures   the pictures of README.md again, under docs/pictures/"
+	@echo "make docs       the documentation site, docs/_build/index.html"
 	@echo "make clean      remove caches; make distclean removes $(VENV) as well"
 	@echo "TESTS='-k name' goes to pytest"
 
@@ -75,6 +76,10 @@ faults: $(STAMP)
 pictures: $(STAMP)
 	$(BIN)/python tests/benchmarks/make_pictures.py
 
+# A warning is an error; nothing is fetched.
+docs: $(STAMP)
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --builder html docs docs/_build
+
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -86,7 +91,7 @@ format: $(STAMP)
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf build dist docs/_build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find src tests -type d -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean

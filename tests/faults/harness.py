@@ -11,6 +11,7 @@ import re
 import resource
 import shutil
 import signal
+import sys
 import time
 import tomllib
 import traceback
@@ -77,8 +78,20 @@ def damaged(seed: int) -> tuple[str, bytes]:
     text = rng.choice(sources()[kind])
     if rng.random() < 0.25:
         return kind, damage.damaged_text(text, rng)
-    content = damage.as_toml(damage.damaged_tables(tomllib.loads(text), rng))
+    with _deep_tables():
+        content = damage.as_toml(damage.damaged_tables(tomllib.loads(text), rng))
     return kind, content.encode(errors="surrogatepass")
+
+
+@contextlib.contextmanager
+def _deep_tables() -> Iterator[None]:
+    """Room for tables nested several times over; commands run with what Python has."""
+    usual = sys.getrecursionlimit()
+    sys.setrecursionlimit(20 * usual)
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(usual)
 
 
 def prepared(folder: Path) -> None:

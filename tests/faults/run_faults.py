@@ -1,14 +1,17 @@
 """Damaged files by command, as many as asked for; writes results/faults/README.md with what was found.
 
-python tests/faults/run_faults.py [FILES] [JOBS]
+python tests/faults/run_faults.py [FILES] [JOBS] [LOG]
+
+What the log has is not run again.
 """
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
-import time
 from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -20,7 +23,8 @@ from faults import harness
 from laufruhe.numerics.cores import processors
 
 PAGE = Path(__file__).parents[2] / "results" / "faults" / "README.md"
-CHUNK = 4000
+LOG = PAGE.with_name("run.jsonl")
+CHUNK = 1000
 # of the files that `check` gets, `evaluate` and `explain` get one in so many of their own
 SAMPLE = 50
 
@@ -60,28 +64,35 @@ cylinders that did not end; an empty list of orders; a matplotlibrc of the worki
 def main() -> None:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
     jobs = int(sys.argv[2]) if len(sys.argv) > 2 else processors()
-    started = time.perf_counter()
-    found = {"check": run("check", 0, count, jobs)}
+    log = Path(sys.argv[3]) if len(sys.argv) > 3 else LOG
+    log.parent.mkdir(parents=True, exist_ok=True)
+    found = {"check": run("check", 0, count, jobs, log)}
     for k, verb in enumerate(("evaluate", "explain"), 1):
-        found[verb] = run(verb, k * 10**7, count // SAMPLE, jobs)
+        found[verb] = run(verb, k * 10**7, count // SAMPLE, jobs, log)
     PAGE.parent.mkdir(parents=True, exist_ok=True)
-    PAGE.write_text(page(found, (time.perf_counter() - started) / 60.0, jobs), encoding="utf-8")
+    PAGE.write_text(page(found), encoding="utf-8")
     wrong = [one for of in found.values() for one in of if one.wrong]
     print(f"{len(wrong)} finding(s): {PAGE}")
     sys.exit(bool(wrong))
 
 
-def run(verb: str, first: int, count: int, jobs: int) -> list[harness.Found]:
-    found: list[harness.Found] = []
-    with tempfile.TemporaryDirectory() as folder:
-        for at in range(first, first + count, CHUNK):
-            found += harness.run(range(at, min(at + CHUNK, first + count)), verb, Path(folder), jobs)
+def run(verb: str, first: int, count: int, jobs: int, log: Path) -> list[harness.Found]:
+    known = [harness.Found(**json.loads(line)) for line in log.read_text().splitlines()] if log.exists() else []
+    found = [one for one in known if one.verb == verb and first <= one.seed < first + count]
+    done = {one.seed for one in found}
+    todo = [seed for seed in range(first, first + count) if seed not in done]
+    with tempfile.TemporaryDirectory() as folder, log.open("a", encoding="utf-8") as out:
+        for at in range(0, len(todo), CHUNK):
+            new = harness.run(todo[at : at + CHUNK], verb, Path(folder), jobs)
+            out.writelines(f"{json.dumps(asdict(one))}\n" for one in new)
+            out.flush()
+            found += new
             wrong = sum(bool(one.wrong) for one in found)
             print(f"{verb}: {len(found)} of {count}, {wrong} finding(s)", flush=True)
-    return found
+    return sorted(found, key=lambda one: one.seed)
 
 
-def page(found: dict[str, list[harness.Found]], minutes: float, jobs: int) -> str:
+def page(found: dict[str, list[harness.Found]]) -> str:
     rows = ["| command | of a | files | read | refused | infeasible or failed | findings | slowest |",
             "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |"]  # fmt: skip
     for verb, all_of in found.items():
@@ -94,7 +105,8 @@ def page(found: dict[str, list[harness.Found]], minutes: float, jobs: int) -> st
             )
     whole = sum(map(len, found.values()))
     wrong_ones = [one for of in found.values() for one in of if one.wrong]
-    told = f"{whole} files in {minutes:.0f} minutes on {jobs} processes: {len(wrong_ones)} finding(s)."
+    minutes = sum(one.seconds for of in found.values() for one in of) / 60.0
+    told = f"{whole} files in {minutes:.0f} minutes of one processor: {len(wrong_ones)} finding(s)."
     listed = [f"- `{one.verb}`, seed {one.seed}: {one.wrong}" for one in wrong_ones[:50]]
     parts = [ABOUT, f"## Figures\n\n{told}", "\n".join(rows), "\n".join(listed), FOUND, BLIND]
     return "\n\n".join(part.strip() for part in parts if part) + "\n"

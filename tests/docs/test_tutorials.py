@@ -1,0 +1,72 @@
+"""Every command of a tutorial runs, and says what the page says."""
+
+from __future__ import annotations
+
+import doctest
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from laufruhe.cli import app
+
+PAGES = Path(__file__).parents[2] / "docs" / "tutorials"
+BLOCK = re.compile(r"^```(console|pycon)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+pytestmark = pytest.mark.slow
+
+
+def blocks(page: Path, kind: str) -> list[str]:
+    return [text for found, text in BLOCK.findall(page.read_text(encoding="utf-8")) if found == kind]
+
+
+def commands(text: str) -> list[tuple[list[str], list[str]]]:
+    """What is typed, and the lines that are shown of the answer."""
+    found: list[tuple[list[str], list[str]]] = []
+    for line in text.splitlines():
+        if line.startswith("$ laufruhe "):
+            found.append((line.split()[2:], []))
+        elif line.strip():
+            found[-1][1].append(" ".join(line.split()))
+    return found
+
+
+PAGE_NAMES = sorted(path.stem for path in PAGES.glob("*.md"))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder of a user who saved the files of the pages."""
+    for path in PAGES.glob("*.toml"):
+        shutil.copy(path, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", [name for name in PAGE_NAMES if blocks(PAGES / f"{name}.md", "console")])
+def test_commands_answer_as_the_page_says(name: str, folder: Path) -> None:
+    for text in blocks(PAGES / f"{name}.md", "console"):
+        for words, shown in commands(text):
+            more = ["--no-plots"] if words[0] in ("solve", "evaluate") else []
+            answer = CliRunner().invoke(app, [*words, *more])
+            assert answer.exit_code == 0, answer.output
+            said = [" ".join(line.split()) for line in answer.output.splitlines()]
+            for line in shown:
+                assert line in said, f"{name}: {line}\n{answer.output}"
+
+
+@pytest.mark.parametrize("name", [name for name in PAGE_NAMES if blocks(PAGES / f"{name}.md", "pycon")])
+def test_python_answers_as_the_page_says(name: str, folder: Path) -> None:
+    text = "\n".join(blocks(PAGES / f"{name}.md", "pycon"))
+    test = doctest.DocTestParser().get_doctest(text, {}, name, name, 0)
+    told: list[str] = []
+    assert doctest.DocTestRunner().run(test, out=told.append).failed == 0, "".join(told)
+
+
+def test_every_page_shows_an_answer() -> None:
+    assert PAGE_NAMES
+    for name in PAGE_NAMES:
+        assert blocks(PAGES / f"{name}.md", "console") or blocks(PAGES / f"{name}.md", "pycon"), name
