@@ -12,6 +12,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from laufruhe.cli import options as o
 from laufruhe.cli.screen import (
     DONE,
     FAILED,
@@ -22,56 +23,31 @@ from laufruhe.cli.screen import (
     handing_out,
     in_time,
     progress,
+    spoken,
 )
 from laufruhe.cli.supervised import supervised
 
 app = typer.Typer(
     name="laufruhe",
     help="Balance designer for piston engines: least mount force, with a proof of how good the design is.",
-    epilog="Exit status: 0 done, 1 infeasible or failed, 2 bad input, 130 interrupted.",
-    add_completion=False,
+    epilog="\b\nBegin with:  laufruhe init\nExit status: 0 done, 1 infeasible or failed, 2 bad input, 130 interrupted.",
+    context_settings={"help_option_names": ["-h", "--help"]},
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     # plain help needs no rich, and answers twice as fast
     rich_markup_mode=None,
 )
 
-ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help="Problem file (TOML).", show_default=False)]
-JSON = "Write the result as JSON to FILE; - prints it, and the text goes to stderr."
-JsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=JSON)]
-PARTS = "Write all parts as JSON to FILE; - prints them."
-StudyJsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=PARTS)]
-OUT = "Folder of the results.  [default: results/<name of the file>, of evaluate <name>-as-given]"
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT)]
-PAGES = "Folder of the pages.  [default: results/trade]"
-PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=PAGES)]
-NO_PLOTS = "Draw no pictures; those of an earlier result are removed."
-NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help=NO_PLOTS)]
-SERIES = "Put the loads over the cycle into the JSON as well."
-SeriesOption = Annotated[bool, typer.Option("--series", help=SERIES)]
-GAP = "Relative gap that counts as proven, in place of the file's."
-ToleranceOption = Annotated[float | None, typer.Option("--tolerance", metavar="X", help=GAP)]
-ERROR = "Relative error of the objective that is allowed."
-FidelityTolerance = Annotated[float, typer.Option("--tolerance", metavar="X", help=ERROR)]
-LIMIT = "Stop after so many seconds with the best design so far and its bound."
-LimitOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=LIMIT)]
-STOP = "Stop after so many seconds; what is finished is kept."
-StopOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=STOP)]
-JOBS = "Processes that may be used.  [default: one a core]"
-JobsOption = Annotated[int | None, typer.Option("--jobs", metavar="N", help=JOBS)]
-SCHEDULER = "Let the Dask workers of the scheduler at ADDRESS do the work."
-SchedulerOption = Annotated[str | None, typer.Option("--scheduler", metavar="ADDRESS", help=SCHEDULER)]
-StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TOML).", show_default=False)]
-FROM = "An engine of the catalogue, or a ready problem, to begin with."
-COPIED = "Ready problems to copy, with all files that they refer to."
-SHOWN = "Engines to show: published figures, source, and what is assumed."
-Problems = Annotated[list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False)]
+
+def _example(*lines: str) -> str:
+    """What can be typed as it stands, under the help of a command."""
+    return "\b\n" + "\n".join([f"Example{'s' * (len(lines) > 1)}:", *(f"  {line}" for line in lines)])
 
 
-@app.command()
+@app.command(epilog=_example("laufruhe init", "laufruhe init mine.toml --from vw-ea827-2-0"))
 def init(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Problem file to write.")] = Path("problem.toml"),
-    name: Annotated[str | None, typer.Option("--from", metavar="NAME", help=FROM)] = None,
+    file: o.FileArgument = Path("problem.toml"),
+    name: o.FromOption = None,
 ) -> None:
     """Write a problem file to begin with, commented, and the schema that editors check it by.
 
@@ -83,10 +59,10 @@ def init(
         typer.echo(begun(file, name), nl=False)
 
 
-@app.command()
+@app.command(epilog=_example("laufruhe examples", "laufruhe examples tractor-single tractor-sweeps --to mine"))
 def examples(
-    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME...]", help=COPIED, show_default=False)] = None,
-    to: Annotated[Path, typer.Option("--to", metavar="DIR", help="Folder of the copies.")] = Path(),
+    names: o.NamesArgument = None,
+    to: o.ToOption = Path(),
 ) -> None:
     """List the ready problems by what they are for, or copy some of them."""
     with exit_statuses(to):
@@ -95,9 +71,9 @@ def examples(
         typer.echo(copied(names, to) if names else listed(), nl=False)
 
 
-@app.command()
+@app.command(epilog=_example("laufruhe engines", "laufruhe engines bmw-b48"))
 def engines(
-    names: Annotated[list[str] | None, typer.Argument(metavar="[KEY...]", help=SHOWN, show_default=False)] = None,
+    names: o.KeysArgument = None,
 ) -> None:
     """List the engines of the catalogue, or show what is published of some of them."""
     with exit_statuses(Path("laufruhe")):
@@ -106,49 +82,57 @@ def engines(
         typer.echo(described(names) if names else catalogue(), nl=False)
 
 
-@app.command()
+@app.command(
+    epilog=_example("laufruhe solve problem.toml", "laufruhe solve problem.toml --time-limit 60 --json result.json")
+)
 def solve(
-    problem: ProblemArgument,
-    json: JsonOption = None,
-    out: OutOption = None,
-    no_plots: NoPlotsOption = False,
-    tolerance: ToleranceOption = None,
-    time_limit: LimitOption = None,
-    series: SeriesOption = False,
+    problem: o.ProblemArgument,
+    json: o.JsonOption = None,
+    out: o.OutOption = None,
+    no_plots: o.NoPlotsOption = False,
+    tolerance: o.ToleranceOption = None,
+    time_limit: o.LimitOption = None,
+    series: o.SeriesOption = False,
+    quiet: o.QuietOption = False,
+    verbose: o.VerboseOption = False,
 ) -> None:
     """Decide what the problem leaves open, and prove how good that is."""
-    with exit_statuses(problem), in_time(time_limit):
+    with exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit):
         from laufruhe.cli.solve import Request, run, solved
 
         run(Request("solve", problem, json, out, not no_plots, tolerance, series), solved)
 
 
-@app.command()
+@app.command(epilog=_example("laufruhe evaluate problem.toml --series --json -"))
 def evaluate(
-    problem: ProblemArgument,
-    json: JsonOption = None,
-    out: OutOption = None,
-    no_plots: NoPlotsOption = False,
-    series: SeriesOption = False,
+    problem: o.ProblemArgument,
+    json: o.JsonOption = None,
+    out: o.OutOption = None,
+    no_plots: o.NoPlotsOption = False,
+    series: o.SeriesOption = False,
+    quiet: o.QuietOption = False,
+    verbose: o.VerboseOption = False,
 ) -> None:
     """Evaluate the design as given.
 
     Mount forces and orders of the file's own numbers; nothing is decided.
     """
-    with exit_statuses(problem):
+    with exit_statuses(problem), spoken(quiet, verbose):
         from laufruhe.cli.solve import Request, run, stated
 
         run(Request("evaluate", problem, json, out, not no_plots, series=series), stated)
 
 
-@app.command()
+@app.command(epilog=_example("laufruhe study tractor-sweeps.toml --jobs 4"))
 def study(
-    problem: StudyArgument,
-    json: StudyJsonOption = None,
-    out: OutOption = None,
-    jobs: JobsOption = None,
-    scheduler: SchedulerOption = None,
-    time_limit: StopOption = None,
+    problem: o.StudyArgument,
+    json: o.StudyJsonOption = None,
+    out: o.OutOption = None,
+    jobs: o.JobsOption = None,
+    scheduler: o.SchedulerOption = None,
+    time_limit: o.StopOption = None,
+    quiet: o.QuietOption = False,
+    verbose: o.VerboseOption = False,
 ) -> None:
     """Run the sweeps and comparisons of a study file.
 
@@ -156,7 +140,8 @@ def study(
     """
     kept = "interrupted; finished points are kept, the same command goes on"
     with (
-        exit_statuses(problem, kept), in_time(time_limit), handing_out(json, problem) as hand_out, at_work(scheduler),
+        exit_statuses(problem, kept), spoken(quiet, verbose), in_time(time_limit),
+        handing_out(json, problem) as hand_out, at_work(scheduler),
     ):  # fmt: skip
         from laufruhe.cli.study import studied
 
@@ -165,13 +150,18 @@ def study(
         hand_out(*found)
 
 
-@app.command()
-def check(problem: ProblemArgument, json: JsonOption = None) -> None:
+@app.command(epilog=_example("laufruhe check problem.toml"))
+def check(
+    problem: o.ProblemArgument,
+    json: o.JsonOption = None,
+    quiet: o.QuietOption = False,
+    verbose: o.VerboseOption = False,
+) -> None:
     """Validate a problem or study file.
 
     Says what it leaves open, or how many points it has; nothing is solved, and no results folder is made.
     """
-    with exit_statuses(problem), handing_out(json, problem) as hand_out:
+    with exit_statuses(problem), spoken(quiet, verbose), handing_out(json, problem) as hand_out:
         from laufruhe.files.reader import is_study
 
         if is_study(problem):
@@ -181,22 +171,36 @@ def check(problem: ProblemArgument, json: JsonOption = None) -> None:
         hand_out(*checked(problem))
 
 
-@app.command()
-def explain(problem: ProblemArgument, json: JsonOption = None, tolerance: FidelityTolerance = 1e-3) -> None:
+@app.command(epilog=_example("laufruhe explain problem.toml --tolerance 1e-2"))
+def explain(
+    problem: o.ProblemArgument,
+    json: o.JsonOption = None,
+    tolerance: o.FidelityTolerance = 1e-3,
+    quiet: o.QuietOption = False,
+    verbose: o.VerboseOption = False,
+) -> None:
     """Say what of the physics this scene needs, what it does not, and why."""
-    with exit_statuses(problem), handing_out(json, problem) as hand_out:
+    with exit_statuses(problem), spoken(quiet, verbose), handing_out(json, problem) as hand_out:
         from laufruhe.cli.fidelity import explained
 
         hand_out(*explained(problem, above_zero("--tolerance", tolerance, "1e-3")))
 
 
-@app.command()
-def trade(problems: Problems, json: JsonOption = None, out: PagesOption = None, time_limit: StopOption = None) -> None:
+@app.command(epilog=_example("laufruhe trade problem.toml"))
+def trade(
+    problems: o.Problems,
+    json: o.JsonOption = None,
+    out: o.PagesOption = None,
+    time_limit: o.StopOption = None,
+    quiet: o.QuietOption = False,
+    verbose: o.VerboseOption = False,
+) -> None:
     """Measure speed against accuracy of every fidelity, on these problems."""
-    with exit_statuses(problems[0]), in_time(time_limit), handing_out(json, *problems) as hand_out, progress() as say:
+    with exit_statuses(problems[0]), spoken(quiet, verbose), in_time(time_limit):
         from laufruhe.cli.fidelity import traded
 
-        hand_out(*traded(problems, out or Path("results") / "trade", say))
+        with handing_out(json, *problems) as hand_out, progress() as say:
+            hand_out(*traded(problems, out or Path("results") / "trade", say))
 
 
 def _show_version(wanted: bool) -> None:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 import typer
 
 from laufruhe.errors import Complaint, InputError, ModelError, SolverError, printed
+from laufruhe.numerics.progress import Step
+
+QUIET, PLAIN, VERBOSE = -1, 0, 1
+_loudness: ContextVar[int] = ContextVar("loudness", default=PLAIN)
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -24,7 +30,8 @@ def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[str, st
         place = json_file(json, problems, places)
 
         def hand_out(text: str, data: str) -> None:
-            typer.echo(text, nl=False, err=json == "-")
+            if not is_quiet():
+                typer.echo(text, nl=False, err=json == "-")
             if json == "-":
                 typer.echo(data, nl=False)
             elif place is not None:
@@ -109,12 +116,73 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str], None]]:
-    """Says on a terminal what is going on; silent in a pipe."""
-    if not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    from rich.console import Console
+def spoken(quiet: bool, verbose: bool) -> Iterator[None]:
+    """What is typed as -q and -v: nothing but errors is said within, or every step."""
+    if quiet and verbose:
+        raise InputError("laufruhe", (Complaint("-q", "", "is given beside -v", "give one of them"),))
+    before = _loudness.set(QUIET if quiet else VERBOSE if verbose else PLAIN)
+    try:
+        yield
+    finally:
+        _loudness.reset(before)
 
-    with Console(stderr=True, markup=False).status("starting") as status:
-        yield lambda text: status.update(text)
+
+def is_quiet() -> bool:
+    """Whether nothing but errors is wanted, and data where they are asked for."""
+    return _loudness.get() == QUIET
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str], None]]:
+    """Says what is going on: in place on a terminal, line by line with -v; silent in a pipe, and with -q."""
+    if _loudness.get() == VERBOSE:
+        begun = time.monotonic()
+        yield lambda text: typer.echo(f"{time.monotonic() - begun:7.1f} s  {text}", err=True)
+    elif is_quiet() or not sys.stderr.isatty():
+        yield lambda _: None
+    else:
+        from rich.console import Console
+
+        with Console(stderr=True, markup=False).status("starting") as status:
+            yield lambda text: status.update(text)
+
+
+def pace() -> float:
+    """Seconds between two words of one search: in place more often than as lines."""
+    return 2.0 if _loudness.get() == VERBOSE else 0.1
+
+
+class Watched:
+    """Listens to searches: says how far they are, with the best value so far, its bound, and the gap.
+
+    Of searches within each other, the value is that of the outermost one that has one.
+    """
+
+    def __init__(self, say: Callable[[str], None], unit: str) -> None:
+        self._say, self._unit = say, unit
+        self._known: dict[int, Step] = {}
+        self._next = 0.0
+
+    def __call__(self, step: Step) -> None:
+        """One step; few of many are said."""
+        depth = len(step.within)
+        self._known = {at: known for at, known in self._known.items() if at < depth} | {depth: step}
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + pace()
+            valued = next((known for known in self._known.values() if math.isfinite(known.value)), step)
+            self._say(", ".join([*step.within, self._counted(step), *self._standing(valued)]))
+
+    def _counted(self, step: Step) -> str:
+        if step.whole:
+            return f"{step.what}: {step.done} of {step.whole}"
+        return f"{step.what}: {step.done}" if step.done else step.what
+
+    def _standing(self, step: Step) -> Iterator[str]:
+        from laufruhe.present.numbers import figure
+
+        if math.isfinite(step.value):
+            yield f"best {figure(step.value, self._unit)}"
+        if math.isfinite(step.bound):
+            yield f"bound {figure(step.bound, self._unit)}"
+        if math.isfinite(step.gap):
+            yield f"gap {100.0 * step.gap:.2g} %"

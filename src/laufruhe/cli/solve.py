@@ -12,9 +12,10 @@ from pathlib import Path
 
 import typer
 
-from laufruhe.cli.screen import DONE, FAILED, above_zero, complain, json_file, progress
+from laufruhe.cli.screen import DONE, FAILED, Watched, above_zero, complain, is_quiet, json_file, progress
 from laufruhe.errors import SolverError
 from laufruhe.files.reader import load
+from laufruhe.numerics.progress import Listener
 from laufruhe.problem.problem import Problem
 from laufruhe.report import files
 from laufruhe.report.json_result import as_json
@@ -24,7 +25,7 @@ from laufruhe.solvers.result import Result, Status
 # each has a folder of its own
 _SUFFIX = {"solve": "", "evaluate": "-as-given"}
 
-Answer = Callable[[Problem, Callable[[str], None]], Result]
+Answer = Callable[[Problem, Listener], Result]
 
 
 @dataclass(frozen=True)
@@ -54,19 +55,19 @@ def run(request: Request, answer: Answer) -> None:
     raise typer.Exit(DONE if result.status in (Status.OPTIMAL, Status.FEASIBLE) else FAILED)
 
 
-def stated(problem: Problem, _: Callable[[str], None]) -> Result:
+def stated(problem: Problem, _: Listener) -> Result:
     """The design as given."""
     from laufruhe.solvers import state
 
     return state(problem)
 
 
-def solved(problem: Problem, say: Callable[[str], None]) -> Result:
+def solved(problem: Problem, listener: Listener) -> Result:
     """The solver's result, or a result that says why there is none."""
     from laufruhe.solvers import solve, state
 
     try:
-        return solve(problem, say)
+        return solve(problem, listener)
     except SolverError as error:
         return replace(state(problem, to_start_from=True), status=Status.FAILED, message=str(error))
 
@@ -97,7 +98,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         open_numbers = len(problem.decisions)
         what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
         say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
-        result = answer(problem, say)
+        result = answer(problem, Watched(say, problem.objective_unit or ""))
         pictures: tuple[str, ...] = ()
         if request.pictures:
             from laufruhe.plots import draw
@@ -126,6 +127,7 @@ def _show(result: Result, text: str | None, folder: Path) -> None:
     if text is not None:
         sys.stdout.write(text)
         sys.stdout.flush()
-    show(result, sys.stdout if text is None else sys.stderr, folder)
+    if not is_quiet():
+        show(result, sys.stdout if text is None else sys.stderr, folder)
     if result.status in (Status.INFEASIBLE, Status.FAILED):
         complain(f"{result.problem.name}: {result.status}: {result.message}")

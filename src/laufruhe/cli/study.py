@@ -7,7 +7,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from laufruhe.cli.screen import pace
 from laufruhe.errors import Complaint, InputError
+from laufruhe.files.reader import shown_as
 from laufruhe.numerics.cores import processors
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
@@ -15,8 +17,6 @@ from laufruhe.report.study_report import as_json, file_names, write_study
 from laufruhe.studies import Scenes, run
 from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.reader import load_study
-
-SAID_EVERY = 0.2
 
 
 def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None]) -> tuple[str, str]:
@@ -26,7 +26,7 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
         raise InputError("laufruhe", (complaint,))
     started = time.perf_counter()
     study = load_study(path)
-    folder = out if out is not None else Path("results") / path.stem
+    folder = out if out is not None else Path("results") / shown_as(path).stem
     kept = folder / KEPT
     option, names = "--out" if out is not None else "results", file_names(study)
     with files.staged(files.Set(folder, option, "study", names, beside=[KEPT])) as stage:
@@ -60,7 +60,7 @@ class _Teller:
         now = time.perf_counter()
         if self._first is None:
             self._first = (now, done)
-        elif now - self._last < SAID_EVERY and done < whole:
+        elif now - self._last < pace() and done < whole:
             return
         self._last = now
         self._say(f"{done} of {whole} points{self._left(now, done, whole)}")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+import sys
 import tomllib
 from collections import deque
 from collections.abc import Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ from laufruhe.problem.problem import Problem, Search
 DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 10_000_000
 """Of a file: tables within tables, entries of one list or table, and bytes."""
 LARGEST = 2**63 - 1
+STDIN = Path("-")
 MOST_OPEN = 200
 # control characters but tab and line feed, and those that turn the direction of reading
 _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
@@ -49,7 +51,7 @@ def load(path: str | Path) -> Problem:
         With one line for everything wrong: file, key, value, rule, remedy.
     """
     path = Path(path)
-    return load_tables(tables_of(path), path)
+    return load_tables(tables_of(path), shown_as(path))
 
 
 def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
@@ -71,12 +73,18 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
         raise InputError(str(path), (Complaint.of(error, "engine"),)) from None
 
 
+def shown_as(path: Path) -> Path:
+    """By what name a file is spoken of: `-` is standard input."""
+    return Path("stdin") if path == STDIN else path
+
+
 def tables_of(path: Path) -> dict[str, Any]:
     """The tables of a TOML file, their keys not yet checked; `InputError` where it is none.
 
-    An engine of the catalogue is written out in them.
+    `-` is read from standard input. An engine of the catalogue is written out in the tables.
     """
-    tables = _tables(path)
+    content, path = (_typed(), shown_as(path)) if path == STDIN else (_content(path), path)
+    tables = _parsed(content, path)
     _check_shape(tables, path)
     try:
         return with_catalogue(tables)
@@ -103,25 +111,33 @@ def _check_shape(tables: dict[str, Any], path: Path) -> None:
         left.extend(((*at, key), entry) for key, entry in pairs)
 
 
-def _tables(path: Path) -> dict[str, Any]:
+@cache
+def _typed() -> bytes:
+    """What comes from standard input, read once."""
+    return sys.stdin.buffer.read(MOST_BYTES + 1)
+
+
+def _content(path: Path) -> bytes:
     try:
         with path.open("rb") as stream:
-            content = stream.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            raise _unreadable(path, f"is larger than {MOST_BYTES // 1_000_000} MB", "a problem takes a few kB")
-        return tomllib.loads(content.decode("utf-8-sig"))
+            return stream.read(MOST_BYTES + 1)
     except IsADirectoryError:
         raise _unreadable(path, "is a folder", "name a problem file in it") from None
     except FileNotFoundError:
         raise _unreadable(path, "does not exist", "check the path") from None
     except OSError as error:
         raise _unreadable(path, f"cannot be read ({error.strerror})", "check its permissions") from None
+
+
+def _parsed(content: bytes, path: Path) -> dict[str, Any]:
+    if len(content) > MOST_BYTES:
+        raise _unreadable(path, f"is larger than {MOST_BYTES // 1_000_000} MB", "a problem takes a few kB")
+    try:
+        return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise _unreadable(path, f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise _unreadable(path, f"is no TOML: {error}", "correct it there") from None
-    except InputError:
-        raise
     except ValueError:
         # the one that is no TOMLDecodeError
         raise _unreadable(path, "holds a whole number of thousands of digits", "write it shorter") from None

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import NORMS
+from laufruhe.numerics.progress import tell
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, motion_indices
@@ -91,6 +92,7 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
     heap = [(float(bounds[0]), 0, lower, upper, int(sides[0]))]
     seen = 1
     while heap and heap[0][0] < enough and seen < most and not passed():
+        tell("boxes of stiffness", seen, value=value, bound=heap[0][0])
         halves: list[tuple[Array, Array, float]] = []
         while heap and heap[0][0] < enough and len(halves) < search.at_once:
             known, _, low, high, side = heapq.heappop(heap)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.progress import Listener, listening
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -24,7 +25,6 @@ from laufruhe.solvers.unbalances import beyond_mounts, solve_unbalances
 __all__ = ["METHODS", "Result", "Status", "solve", "state"]
 
 CUT_SHORT = "stopped at the time limit"
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Method:
     decides: frozenset[Kind]
     suits: Callable[[Problem], bool]
     reach: Reach
-    solve: Callable[[Problem, Say], Result]
+    solve: Callable[[Problem], Result]
 
 
 def kinds_of(problem: Problem) -> frozenset[Kind]:
@@ -63,7 +63,7 @@ def _named(kinds: frozenset[Kind]) -> str:
     return " and ".join(kind.name.lower() for kind in sorted(kinds))
 
 
-def _convex_mounts(problem: Problem, _: Say) -> Result:
+def _convex_mounts(problem: Problem) -> Result:
     from laufruhe.solvers.mount_convex import solve_convex_mounts
 
     return solve_convex_mounts(problem)
@@ -75,36 +75,36 @@ def _is_convex(problem: Problem) -> bool:
     return is_convex(problem)
 
 
-def _smooth(problem: Problem, _: Say) -> Result:
+def _smooth(problem: Problem) -> Result:
     from laufruhe.solvers.mount_nonlinear import solve_joint
 
     return solve_joint(problem)
 
 
-def _stars(problem: Problem, _: Say) -> Result:
+def _stars(problem: Problem) -> Result:
     from laufruhe.solvers.phasing import solve_phasing
 
     return solve_within(problem, solve_phasing)
 
 
-def _stars_on_mounts(problem: Problem, say: Say) -> Result:
+def _stars_on_mounts(problem: Problem) -> Result:
     from laufruhe.solvers.mount_stars import solve_star_mounts
 
-    return solve_star_mounts(problem, say)
+    return solve_star_mounts(problem)
 
 
-def _places(problem: Problem, say: Say) -> Result:
-    return solve_within(problem, lambda at: solve_places(at, say))
+def _places(problem: Problem) -> Result:
+    return solve_within(problem, solve_places)
 
 
-def _flywheel(problem: Problem, _: Say) -> Result:
+def _flywheel(problem: Problem) -> Result:
     from laufruhe.solvers.flywheel import solve_flywheel
 
     return solve_flywheel(problem)
 
 
-def _apart(problem: Problem, say: Say) -> Result:
-    return solve_apart(problem, lambda part: _decided(part, say))
+def _apart(problem: Problem) -> Result:
+    return solve_apart(problem, _decided)
 
 
 def _asks_flywheel(problem: Problem) -> bool:
@@ -132,10 +132,10 @@ def _asks_loads(problem: Problem) -> bool:
 
 _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
 METHODS: tuple[Method, ...] = (
-    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, lambda problem, _: state(problem)),
+    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, state),
     Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
-           lambda problem, _: solve_within(problem, solve_unbalances)),
+           lambda problem: solve_within(problem, solve_unbalances)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_block, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
@@ -149,15 +149,15 @@ METHODS: tuple[Method, ...] = (
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
 
-def solve(problem: Problem, say: Say = lambda _: None, time_limit: float | None = None) -> Result:
+def solve(problem: Problem, listener: Listener | None = None, time_limit: float | None = None) -> Result:
     """Decide what a problem leaves open.
 
     Parameters
     ----------
     problem
         What is open, wanted and forbidden.
-    say
-        Told what is being decided, where that takes long.
+    listener
+        Told how far searches are.
     time_limit
         Seconds after which searches end with the best that they have, and with its bound.
 
@@ -168,9 +168,9 @@ def solve(problem: Problem, say: Say = lambda _: None, time_limit: float | None 
     ModelError
         If the engine as given cannot be evaluated, or nothing decides what is open.
     """
-    with limited(time_limit):
+    with limited(time_limit), listening(listener):
         try:
-            found = _decided(problem, say)
+            found = _decided(problem)
         except SolverError:
             if not passed():
                 raise
@@ -196,7 +196,7 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
     return replace(found, certificate=replace(own, method=f"{own.method}; {CUT_SHORT}"))
 
 
-def _decided(problem: Problem, say: Say) -> Result:
+def _decided(problem: Problem) -> Result:
     """By the first method that suits."""
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
@@ -210,7 +210,7 @@ def _decided(problem: Problem, say: Say) -> Result:
         if broken:
             return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
-        return with_limits(_decided(problem.changed(limits=moved), say), problem.limits)
+        return with_limits(_decided(problem.changed(limits=moved)), problem.limits)
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
         raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
     moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)
@@ -228,4 +228,4 @@ def _decided(problem: Problem, say: Say) -> Result:
     conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and Kind.STAR not in kinds else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})
-    return method.solve(problem, say)
+    return method.solve(problem)

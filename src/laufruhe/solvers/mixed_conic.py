@@ -21,6 +21,7 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.star_model import StarNorm, StarProblem
 from laufruhe.numerics.budget import left
 from laufruhe.numerics.norms import Cones
+from laufruhe.numerics.progress import tell
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import ShaftChoice
@@ -112,6 +113,7 @@ def _answer(program: Any, steps: Any, built: Any, unit: float, choosing: bool, t
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         seconds = min(time_limit, max(left(), 1.0))
+        tell(f"mixed-integer program, for {seconds:.0f} s at most" if seconds < 1e6 else "mixed-integer program")
         try:
             program.solve(solver=cp.SCIP, scip_params={"limits/time": seconds, "limits/gap": 1e-7})
         except cp.error.SolverError:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import in_time, passed
+from laufruhe.numerics.progress import tell
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
@@ -157,7 +158,9 @@ class MountSearch:
     def _take(self, optima: Sequence[LocalOptimum]) -> None:
         """Judge where starts ended; whatever the solver says of an end, the exact model tells."""
         self.optima += tuple(optima)
-        for optimum in optima:
+        for k, optimum in enumerate(optima):
+            kept = self.best is not None and self.best.design.excess <= SLACK
+            tell("ends judged", k, len(optima), self.best.design.value if self.best is not None and kept else np.inf)
             design = self._judged(optimum, self.joint)
             if design is not None:
                 found = Found(design, self.joint, optimum)

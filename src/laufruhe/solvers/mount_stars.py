@@ -10,8 +10,8 @@ best of these stars, as further variables of the same smooth program (E36).
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -19,6 +19,7 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import RMS
+from laufruhe.numerics.progress import tell, within
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Measure, Term
@@ -36,8 +37,6 @@ from laufruhe.solvers.star_design import StarDesign
 from laufruhe.solvers.star_families import Family, families_of
 from laufruhe.solvers.uneven_starts import firing_intervals, none_fires, starts_of
 
-Say: TypeAlias = Callable[[str], None]
-
 MOST_SEARCHED = 3
 FEWER_STARTS = 4
 SHORTEST_SEARCH = 4
@@ -53,15 +52,18 @@ def _rank(design: StarDesign) -> tuple[bool, float]:
     return not met, design.value
 
 
-def solve_star_mounts(problem: Problem, say: Say = lambda _: None) -> Result:
+def _least(found: list[StarDesign]) -> float:
+    """Objective of the best design that keeps the limits; infinite where there is none."""
+    return min((value for broken, value in map(_rank, found) if not broken), default=math.inf)
+
+
+def solve_star_mounts(problem: Problem) -> Result:
     """The best of the stars, each with mounts and balance decided together (E35).
 
     Parameters
     ----------
     problem
         On elastic mounts, with throws, firing order or optional shafts open.
-    say
-        Told what is being decided.
 
     Raises
     ------
@@ -79,10 +81,10 @@ def solve_star_mounts(problem: Problem, say: Say = lambda _: None) -> Result:
              for order in told_orders(problem, phasing, star, steps)]  # fmt: skip
     designs = count - len(ranking) + len(stars)
     ranked = time.perf_counter()
-    found = _solved_shortly(problem, phasing, stars, say)
-    found = _solved_fully(problem, found, say)
+    found = _solved_shortly(problem, phasing, stars)
+    found = _solved_fully(problem, found)
     if phasing.continuous:
-        found = sorted([*found, *_moved(problem, phasing, found, say)], key=_rank)
+        found = sorted([*found, *_moved(problem, phasing, found)], key=_rank)
     timing = {"rank": ranked - started, "solve": time.perf_counter() - ranked}
     return replace(_result(problem, phasing, found, designs), timing=timing)
 
@@ -136,7 +138,7 @@ def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts
     return replace(own, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=search)
 
 
-def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star], say: Say) -> list[StarDesign]:
+def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> list[StarDesign]:
     """Every star and firing order with a quarter of the starts, the best first."""
     starts = problem.search.starts
     few = starts if len(stars) == 1 else min(starts, max(SHORTEST_SEARCH, starts // FEWER_STARTS))
@@ -144,14 +146,15 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star], say: 
     for k, (candidate, steps) in enumerate(stars):
         if found and (passed() or time.perf_counter() - began > phasing.time_limit):
             break
-        say(f"mounts of star {k + 1} of {len(stars)}")
+        tell("stars on their mounts", k, len(stars), value=_least(found))
         # a process of its own costs more than so few starts
         own = _problem_of(problem, phasing, candidate, few)
-        found.append(StarDesign(candidate, solve_mounts(own, 1 if len(stars) > 1 else None), steps))
+        with within(f"star {k + 1} of {len(stars)}"):
+            found.append(StarDesign(candidate, solve_mounts(own, 1 if len(stars) > 1 else None), steps))
     return sorted(found, key=_rank)
 
 
-def _solved_fully(problem: Problem, found: list[StarDesign], say: Say) -> list[StarDesign]:
+def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]:
     """The best few again with all starts; the better of both answers is kept."""
     out = list(found)
     starts = problem.search.starts
@@ -160,22 +163,24 @@ def _solved_fully(problem: Problem, found: list[StarDesign], say: Say) -> list[S
         # what is proven to be no better than the best needs no more starts
         if own.search.starts >= starts or each.bound >= found[0].value * (1.0 - problem.tolerance):
             continue
-        say(f"mounts of the best stars, {k + 1} of {min(len(found), MOST_SEARCHED)}")
+        whole = min(len(found), MOST_SEARCHED)
+        tell("best stars once more", k, whole, value=_least(out))
         more = replace(own, search=replace(own.search, starts=starts))
-        again = replace(each, result=solve_mounts(more))
+        with within(f"best star {k + 1} of {whole}"):
+            again = replace(each, result=solve_mounts(more))
         out[k] = min(again, each, key=_rank)
     return sorted(out, key=_rank)
 
 
-def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign], say: Say) -> list[StarDesign]:
+def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[StarDesign]:
     """Designs whose throws have left the best stars, or the middle of their own bounds (E36)."""
     starts: list[tuple[Candidate, Result | None]] = [
         (each.candidate, each.result) for each in found[:MOST_SEARCHED] if not _rank(each)[0]
     ]
     starts = starts or [(start, None) for start in starts_of(phasing, None)[:MOST_SEARCHED]]
-    out = []
+    out: list[StarDesign] = []
     for k, (candidate, even) in enumerate(() if found and passed() else starts):
-        say(f"throws that leave star {k + 1} of {len(starts)}")
+        tell("throws that leave their star", k, len(starts), value=_least([*found, *out]))
         own = _problem_of(problem, phasing, candidate, problem.search.starts)
         moves = ThrowMoves(phasing, phasing.layout_of(candidate), candidate, phasing.intervals)
         result, moved = solve_moved(own, moves, even)

@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.budget import in_time, left, passed
+from laufruhe.numerics.progress import telling
 from laufruhe.numerics.workers import count_of, each, executor_for
 
 Array = NDArray[np.float64]
@@ -282,7 +283,7 @@ def _run(share: tuple[_Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]
     solver = ca.nlpsol("solver", "ipopt", oracle, options)
     # derivatives of the judge's own making, not the solver's
     slopes = oracle.factory("slopes", ["x", "p"], ["f", "g", "grad:f:x", "jac:g:x"])
-    return [_from_start(task, solver, slopes, k, point) for k, point in in_time(points)]
+    return [_from_start(task, solver, slopes, k, point) for k, point in in_time(telling("starts", points))]
 
 
 def _from_start(task: _Task, solver: Any, slopes: Any, k: int, point: Array) -> LocalOptimum:

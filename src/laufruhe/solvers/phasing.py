@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.progress import tell
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
@@ -108,7 +110,8 @@ def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) ->
     """Those designs with the rest at its optimum, and whether time was enough for all."""
     started = time.perf_counter()
     found: list[StarDesign] = []
-    for candidate in designs:
+    for k, candidate in enumerate(designs):
+        tell("firing orders and sets of shafts", k, len(designs), min((one.value for one in found), default=math.inf))
         if found and (passed() or time.perf_counter() - started > phasing.time_limit):
             return found, False
         result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem)))

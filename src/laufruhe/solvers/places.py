@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice, product
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.progress import tell
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
@@ -73,7 +74,7 @@ class _Found:
         return np.inf if self.design.rank[0] else self.design.value
 
 
-def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Result:
+def solve_places(problem: Problem) -> Result:
     """Places and unbalances, proven as far as dividing the boxes of places goes.
 
     Parameters
@@ -83,7 +84,7 @@ def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) 
     """
     started = time.perf_counter()
     search, initial = _Search(problem), evaluate(problem)
-    best, bound, boxes = _divided(search, nothing_of(problem), say)
+    best, bound, boxes = _divided(search, nothing_of(problem))
     timing = {"solve": time.perf_counter() - started}
     if best is None:
         return none_within(problem, initial, search.conflict, timing)
@@ -98,7 +99,7 @@ def solve_places(problem: Problem, say: Callable[[str], None] = lambda _: None) 
     return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
 
 
-def _divided(search: _Search, nothing: float, say: Callable[[str], None]) -> tuple[_Found | None, float, int]:
+def _divided(search: _Search, nothing: float) -> tuple[_Found | None, float, int]:
     """Divide the boxes until their least bound meets the best design, or as often as is worth it.
 
     Returns
@@ -122,7 +123,7 @@ def _divided(search: _Search, nothing: float, say: Callable[[str], None]) -> tup
             if half is not None and half.bound < best.value:
                 heapq.heappush(heap, (half.bound, next(number), half))
                 best = search.better(best, half.middle)
-        say(f"{seen} boxes of places")
+        tell("boxes of places", seen, value=best.value, bound=heap[0][0] if heap else -np.inf)
     return (best, heap[0][0], seen) if heap else (None if best.design.rank[0] else best, np.inf, seen)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.load_models.star_model import StarModel, StarProblem
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.progress import tell
 from laufruhe.physics.crank_stars import Array, Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
@@ -141,9 +142,10 @@ def search_designs(
         if time.perf_counter() - started > time_limit or (passed() and search.tried):
             complete = False
             break
+        tell("stars and sets of shafts", len(search.solved) + search.infeasible, search.bounds.size, *search.standing)
         search.solve(*place)
     solved = sorted(search.solved, key=lambda s: (s.value, s.star, s.built))
-    least = min([search.beyond, *(s.bound for s in solved)])
+    _, least = search.standing
     seconds = time.perf_counter() - started
     size = search.bounds.size
     return CutsFound(tuple(solved), least, search.beyond, complete, size, search.infeasible, seconds)
@@ -170,6 +172,12 @@ class _Search:
     def beyond(self) -> float:
         """Least bound of what was not solved."""
         return float(np.where(self._open, self.bounds, np.inf).min(initial=np.inf))
+
+    @property
+    def standing(self) -> tuple[float, float]:
+        """Objective of the best design so far, and what none goes under."""
+        best = min((one.value for one in self.solved), default=float("inf"))
+        return best, min([self.beyond, *(one.bound for one in self.solved)])
 
     def nearest(self, count: int) -> tuple[int, int] | None:
         """The star and set of the least bound; None where it cannot be among the best `count`."""

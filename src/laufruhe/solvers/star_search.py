@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.progress import tell
 from laufruhe.physics.crank_stars import Array, Stars, phase_waves
 from laufruhe.physics.star_space import Partial, StarSpace
 
@@ -116,27 +117,26 @@ def search_stars(
         best.offer(space.canonical(start), objective.values(space, space.canonical(start)))
     looked_at = 0
     ended = False
+    root = bounds.root()
 
     def prune(partial: Partial) -> NDArray[np.bool_]:
         nonlocal looked_at, ended
         looked_at += len(partial.stars)
+        tell("partial stars", looked_at, value=float(best.values.min(initial=np.inf)), bound=root)
         ended = ended or passed() or time.perf_counter() - started > time_limit
         if ended:
             return np.ones(len(partial.stars), dtype=bool)
-        limit = best.cut
+        if not np.isfinite(best.cut):
+            return np.zeros(len(partial.stars), dtype=bool)
         # stars equal to the last one wanted are kept out: any of them will do
-        return (
-            bounds.beyond(partial, limit * (1.0 - SLACK))
-            if np.isfinite(limit)
-            else np.zeros(len(partial.stars), dtype=bool)
-        )
+        return bounds.beyond(partial, best.cut * (1.0 - SLACK))
 
     for block in space.blocks(prune):
         if not ended:
             best.offer(block, objective.values(space, block))
             looked_at += len(block)
     least = float(best.values[0]) if len(best.values) else float("inf")
-    bound = least if not ended else bounds.root()
+    bound = least if not ended else root
     return StarsFound(best.stars, best.values, min(bound, least), not ended, looked_at, time.perf_counter() - started)
 
 

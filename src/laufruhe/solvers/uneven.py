@@ -18,6 +18,7 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import in_time
+from laufruhe.numerics.progress import tell
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side, Term
 from laufruhe.problem.nothing import nothing_of
@@ -67,7 +68,8 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     steps = TRADE_STEPS if even is not None and phasing.intervals.most < math.inf else (1.0,)
     found: list[StarDesign] = []
     trade = []
-    for share in in_time(steps):
+    for k, share in enumerate(in_time(steps)):
+        tell("shares of the deviation allowed", k, len(steps), found[0].value if found else math.inf)
         allowed = _narrowed(phasing, share)
         # what is best with less freedom is a start, so that more of it is never worse
         own = [design.candidate for design in found[:1]] + starts[: STARTS if share == 1.0 else TRADE_STARTS]

@@ -1,0 +1,73 @@
+"""What may be typed beside a command: arguments and options, each with its words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def _completed(kinds: str) -> Callable[[str], list[str]]:
+    """Names that a shell may complete: of engines, of ready problems, or both."""
+
+    def names(incomplete: str) -> list[str]:
+        from laufruhe.files.catalogue import engines
+        from laufruhe.files.ready import ready
+
+        both = {"engines": engines, "problems": ready}
+        return [name for kind in kinds.split() for name in both[kind]() if name.startswith(incomplete)]
+
+    return names
+
+
+FILE = "Problem file (TOML); - reads standard input."
+ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help=FILE, show_default=False)]
+JSON = "Write the result as JSON to FILE; - prints it, and the text goes to stderr."
+JsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=JSON)]
+PARTS = "Write all parts as JSON to FILE; - prints them."
+StudyJsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=PARTS)]
+OUT = "Folder of the results.  [default: results/<name of the file>, of evaluate <name>-as-given]"
+OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT)]
+PAGES = "Folder of the pages.  [default: results/trade]"
+PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=PAGES)]
+NO_PLOTS = "Draw no pictures; those of an earlier result are removed."
+NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help=NO_PLOTS)]
+SERIES = "Put the loads over the cycle into the JSON as well."
+SeriesOption = Annotated[bool, typer.Option("--series", help=SERIES)]
+GAP = "Relative gap that counts as proven, in place of the file's."
+ToleranceOption = Annotated[float | None, typer.Option("--tolerance", metavar="X", help=GAP)]
+ERROR = "Relative error of the objective that is allowed."
+FidelityTolerance = Annotated[float, typer.Option("--tolerance", metavar="X", help=ERROR)]
+LIMIT = "Stop after so many seconds with the best design so far and its bound."
+LimitOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=LIMIT)]
+STOP = "Stop after so many seconds; what is finished is kept."
+StopOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=STOP)]
+JOBS = "Processes that may be used.  [default: one a core]"
+JobsOption = Annotated[int | None, typer.Option("--jobs", metavar="N", help=JOBS)]
+SCHEDULER = "Let the Dask workers of the scheduler at ADDRESS do the work."
+SchedulerOption = Annotated[str | None, typer.Option("--scheduler", metavar="ADDRESS", help=SCHEDULER)]
+STUDY = "Study file (TOML); - reads standard input."
+StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help=STUDY, show_default=False)]
+FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Problem file to write.")]
+FROM = "An engine of the catalogue, or a ready problem, to begin with."
+COPIED = "Ready problems to copy, with all files that they refer to."
+SHOWN = "Engines to show: published figures, source, and what is assumed."
+FromOption = Annotated[
+    str | None, typer.Option("--from", metavar="NAME", help=FROM, autocompletion=_completed("engines problems"))
+]
+NamesArgument = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[NAME...]", help=COPIED, show_default=False, autocompletion=_completed("problems")),
+]
+ToOption = Annotated[Path, typer.Option("--to", metavar="DIR", help="Folder of the copies.")]
+KeysArgument = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[KEY...]", help=SHOWN, show_default=False, autocompletion=_completed("engines")),
+]
+QUIET = "Say nothing but what is wrong."
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help=QUIET)]
+VERBOSE = "Say every step on stderr, a line each, in a pipe too."
+VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help=VERBOSE)]
+Problems = Annotated[list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False)]

@@ -1,0 +1,157 @@
+"""What users expect of any command line: help, quiet and verbose, standard input, completion, progress."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from laufruhe.cli import app
+from laufruhe.cli.screen import Watched, spoken
+from laufruhe.files import reader
+from laufruhe.numerics.progress import Step, listening, tell, within
+from laufruhe.solvers import solve
+from problem_files import PROBLEMS, loaded
+
+run = CliRunner()
+COMMANDS = ("init", "examples", "engines", "solve", "evaluate", "study", "check", "explain", "trade")
+SINGLE = PROBLEMS / "tractor-single.toml"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_every_command_has_an_example(command: str) -> None:
+    short, long = (run.invoke(app, [command, flag]) for flag in ("-h", "--help"))
+    assert short.exit_code == 0
+    assert short.output == long.output
+    assert f"  laufruhe {command}" in short.output.partition("Example")[2]
+
+
+def test_every_command_is_documented() -> None:
+    page = (PROBLEMS.parent / "docs" / "command-line.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^  (\w+) ", run.invoke(app, ["-h"]).output.partition("Commands:")[2], re.MULTILINE)
+    assert set(COMMANDS) <= set(listed)
+    assert all(f"| `{name} " in page for name in COMMANDS)
+    for status in ("0", "1", "2", "130"):
+        assert f"| {status} |" in page
+
+
+def test_quiet_says_nothing_and_writes_all(here: Path) -> None:
+    found = run.invoke(app, ["evaluate", str(SINGLE), "-q", "--no-plots"])
+    assert (found.exit_code, found.output) == (0, "")
+    assert (here / "results" / "tractor-single-as-given" / "result.json").is_file()
+    assert run.invoke(app, ["check", str(SINGLE), "-q"]).output == ""
+    assert "does not exist" in run.invoke(app, ["check", "none.toml", "-q"]).output
+
+
+def test_verbose_says_every_step_in_a_line(here: Path) -> None:
+    found = run.invoke(app, ["evaluate", str(SINGLE), "-v", "--no-plots"])
+    assert re.search(r"^ +\d+\.\d s  reading the problem$", found.stderr, re.MULTILINE)
+    assert "reading" not in found.stdout
+
+
+def test_quiet_and_verbose_contradict_each_other(here: Path) -> None:
+    found = run.invoke(app, ["check", str(SINGLE), "-q", "-v"])
+    assert found.exit_code == 2
+    assert "-q: is given beside -v" in found.output
+
+
+@pytest.mark.parametrize("command", ["check", "evaluate"])
+def test_a_problem_may_come_from_standard_input(here: Path, command: str) -> None:
+    reader._typed.cache_clear()
+    found = run.invoke(app, [command, "-"], input=SINGLE.read_bytes())
+    assert found.exit_code == 0, found.output
+    assert (here / "results" / "stdin-as-given").is_dir() == (command == "evaluate")
+    reader._typed.cache_clear()
+    found = run.invoke(app, [command, "-"], input=b"title = 5")
+    assert found.exit_code == 2
+    assert "stdin: title = 5" in found.output
+    reader._typed.cache_clear()
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_complete_commands_and_engines(shell: str, here: Path) -> None:
+    told = {"bash": {"COMP_WORDS": "laufruhe init --from bmw-s8", "COMP_CWORD": "3"}}.get(
+        shell, {"_TYPER_COMPLETE_ARGS": "laufruhe init --from bmw-s8", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
+    )
+    environment = {**os.environ, **told, "_LAUFRUHE_COMPLETE": f"complete_{shell}"}
+    words = "import sys; sys.argv = ['laufruhe']; from laufruhe.cli import main; main()"
+    found = subprocess.run([sys.executable, "-c", words], env=environment, capture_output=True, text=True, timeout=60)
+    assert "bmw-s85" in found.stdout
+    assert "buick" not in found.stdout
+
+
+def test_progress_shows_value_bound_and_gap_of_the_outermost_search() -> None:
+    said: list[str] = []
+    with spoken(quiet=False, verbose=False):
+        watched = Watched(said.append, "N")
+        for step in (
+            Step((), "stars", 2, 24, 227.4, 220.0),
+            Step(("star 3 of 24",), "starts", 1, 4),
+            Step(("star 3 of 24",), "boxes", 7, 0, 300.0, 100.0),
+            Step((), "ends", 1, 3),
+        ):
+            watched._next = 0.0
+            watched(step)
+    assert said == [
+        "stars: 2 of 24, best 227.4 N, bound 220.0 N, gap 3.3 %",
+        "star 3 of 24, starts: 1 of 4, best 227.4 N, bound 220.0 N, gap 3.3 %",
+        "star 3 of 24, boxes: 7, best 227.4 N, bound 220.0 N, gap 3.3 %",
+        "ends: 1 of 3",
+    ]
+
+
+def test_searches_tell_who_listens_and_no_one_else() -> None:
+    heard: list[Step] = []
+    with listening(heard.append), within("outer"):
+        tell("inner", 1, 2, 3.0, 2.0)
+    tell("nobody listens")
+    assert [(step.within, step.what, step.gap) for step in heard] == [(("outer",), "inner", pytest.approx(1 / 3))]
+    assert math.isnan(Step((), "x").gap)
+
+
+OPEN_FOUR = """
+title = "Two-stroke four"
+[engine]
+layout = "inline"
+cycle = "two-stroke"
+cylinders = 4
+stroke = "120 mm"
+rod_ratio = 0.26
+reciprocating_mass = "1.25 kg"
+cylinder_spacing = "125 mm"
+throws = "open"
+[[operating_points]]
+speed = "2000 rpm"
+[[counterweights]]
+name = "front"
+x = "187.5 mm"
+unbalance = { between = ["0 kg m", "0.3 kg m"] }
+angle = { between = [0, 360] }
+[objective]
+minimise = "rms mount force"
+[mounts]
+positions = [["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"], ["-300 mm", "0 mm", "0 mm"]]
+"""
+
+
+def test_a_star_search_tells_value_and_bound_that_enclose_the_answer(tmp_path: Path) -> None:
+    heard: list[Step] = []
+    result = solve(loaded(tmp_path, OPEN_FOUR), heard.append)
+    assert result.objective is not None
+    valued = [step for step in heard if math.isfinite(step.value) and math.isfinite(step.bound)]
+    assert valued
+    for step in valued:
+        assert step.bound <= result.objective.value * (1.0 + 1e-4)
+        assert step.value >= result.objective.value * (1.0 - 1e-4)
