@@ -198,7 +198,7 @@ class TestBound:
 
         coarse, fine = at(samples), at(2 * samples)
         x = random_point(rng, coarse)
-        bound = best_bound(fine, coarse, x, random_multipliers(rng, coarse, x))
+        bound = best_bound(fine, x, random_multipliers(rng, coarse, x))
         for _ in range(20):
             assert bound.value <= fine.objective(random_point(rng, fine)) * (1.0 + 1e-12)
 

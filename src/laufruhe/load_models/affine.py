@@ -87,7 +87,7 @@ class AffineProblem:
     domains
         Of the decisions.
     samples
-        Steps over the period of the load rows.
+        Steps over the common period of the load rows.
     """
 
     terms: tuple[tuple[float, AffineNorm], ...]
@@ -168,6 +168,8 @@ class AffineModel:
         self.problem = problem
         # components that are zero are dropped, unless models are to be added up
         self._keep_all = keep_all
+        # rows that repeat within the common period are needed once, unless they are to be added up
+        self._once = not keep_all and not whole_cycle
         self.domains = domains_of(problem.unbalances)
         bare = evaluate(problem, problem.design([0.0] * len(problem.unbalances), problem.unbalances))
         if problem.fidelity.mounts == "time" and problem.engine.block is not None:
@@ -193,15 +195,20 @@ class AffineModel:
         cycle = self.problem.engine.cycle
         return max(int(self.problem.fidelity.samples * float(cycle.base_order / self.base)), 24)
 
-    def at(self, samples: int, averaged: bool = False) -> AffineProblem:
+    def at(self, samples: int, averaged: bool = False, finer: bool = False) -> AffineProblem:
         """The problem with its load rows at `samples` steps over their common period.
 
         Rows of means may be averaged about their angles: what bounds these, bounds the
-        whole cycle (P7).
+        whole cycle (P7). Rows of peaks may be as much finer as results are measured (M6).
         """
+
+        def norm(measure: Measure) -> AffineNorm:
+            times = measure.norm.refinement if finer and measure.is_load else 1
+            return self.norm(measure, times * samples, averaged)
+
         problem = self.problem
-        terms = tuple((term.weight, self.norm(term.measure, samples, averaged)) for term in problem.objective)
-        limits = tuple((limit.maximum, self.norm(limit.measure, samples, averaged)) for limit in problem.load_limits)
+        terms = tuple((term.weight, norm(term.measure)) for term in problem.objective)
+        limits = tuple((limit.maximum, norm(limit.measure)) for limit in problem.load_limits)
         return AffineProblem(terms, limits, self.domains, samples)
 
     def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
@@ -223,23 +230,31 @@ class AffineModel:
             slopes = [mass_rows(measure, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]
             return _stacked(bare, slopes, self._keep_all)
         averaged = averaged and measure.norm.averages
+        known = self.bare.signals(channel)
+        alone = [[channel.signal(by[k]) for by in self._slopes] for k in range(len(self._changes))]
+        base = self._own_base([*known, *(signal for by in alone for signal in by)], samples)
+        samples = int(samples * self.base / base)
         # what is open does not bend, but has to be known at the same angles
-        lead = [signal.over(self.base) for signal in (self.lead or self).bare.signals(channel)]
+        lead = [signal.over(base) for signal in (known if self.lead is None else self.lead.bare.signals(channel))]
         bends = bends_of(measure, lead, self.problem.engine)
-        bare = self._rows(measure, self.bare.signals(channel), samples, averaged, bends)
+        bare = self._rows(measure, known, base, samples, averaged, bends)
         if bare.vectors.size * len(self._changes) > MOST_NUMBERS:
             size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"
             raise ModelError(f"{size} are needed; give fewer operating points, open numbers or samples", "problem")
-        slopes = [
-            self._rows(measure, [channel.signal(by[k]) for by in self._slopes], samples, averaged, bends).vectors
-            for k in range(len(self._changes))
-        ]
+        slopes = [self._rows(measure, by, base, samples, averaged, bends).vectors for by in alone]
         return _stacked(bare, slopes, self._keep_all)
 
+    def _own_base(self, signals: Sequence[Spectrum], samples: int) -> Fraction:
+        """Lowest order of one load; that of all where its period holds no whole number of their steps."""
+        own = common_base([signal.reduced().base for signal in signals]) if self._once else self.base
+        whole = all((steps * self.base / own).denominator == 1 for steps in (samples, self.full_samples))
+        return own if whole else self.base
+
     def _rows(
-        self, measure: Measure, signals: Sequence[Spectrum], samples: int, averaged: bool, bends: Sequence[Array]
-    ) -> Rows:
-        period = [signal.over(self.base) for signal in signals]
+        self, measure: Measure, signals: Sequence[Spectrum], base: Fraction, samples: int, averaged: bool,
+        bends: Sequence[Array],
+    ) -> Rows:  # fmt: skip
+        period = [signal.over(base) for signal in signals]
         if averaged:
             period = [signal.averaged(signal.period / samples) for signal in period]
         return load_rows(measure, self.problem.points, period, self.problem.engine, samples, bends)
@@ -274,9 +289,8 @@ def _loads(alone: Engine, point: OperatingPoint, problem: Problem, mounting: Mou
 
 
 def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
-    slope = np.stack(slopes, axis=-1) if slopes else np.zeros((*bare.vectors.shape, 0))
-    used = np.any(bare.vectors != 0.0, axis=0) | np.any(slope != 0.0, axis=(0, 2))
-    if keep_all or not used.any():
-        used[:] = keep_all
-        used[:1] = True
-    return AffineNorm(bare.norm, bare.vectors[:, used], np.ascontiguousarray(slope[:, used]), bare.grid)
+    used = np.any([keep_all | np.any(rows != 0.0, axis=0) for rows in (bare.vectors, *slopes)], axis=0)
+    used[:1] |= not used.any()
+    constant = bare.vectors[:, used]
+    slope = np.stack([rows[:, used] for rows in slopes], axis=-1) if slopes else np.zeros((*constant.shape, 0))
+    return AffineNorm(bare.norm, constant, slope, bare.grid)

@@ -23,13 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank, kinematics
+from laufruhe.machine import Bearing, Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank, kinematics
 from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
 from laufruhe.numerics.turns import as_turn, cis, star_sum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import pressure_at, pressure_breaks
 from laufruhe.physics.mechanism import resolved_orders
-from laufruhe.physics.shaking_loads import order_index, rotor_loads, spread
+from laufruhe.physics.shaking_loads import order_index, rotor_loads, rotor_wrench, spread
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -73,10 +73,13 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
 
 def _of_parts(of: OfPart, engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     """The load of every slider-crank side by side."""
+    _check_even(fidelity)
+    return _side_by_side(of, engine.cycle, engine.slider_cranks, point.speed, fidelity.gas_of(point), fidelity)
+
+
+def _check_even(fidelity: Fidelity) -> None:
     if fidelity.is_uneven:
         raise ModelError("bearing loads are modelled at even crank speed; leave crank_inertia out")
-    gas, parts = fidelity.gas_of(point), engine.slider_cranks
-    return _side_by_side([of(engine.cycle, part, point.speed, gas, fidelity) for part in parts], engine.cycle)
 
 
 def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -91,20 +94,47 @@ def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelit
     ModelError
         As `pin_forces`; if a shaft that is loaded has fewer than two bearings.
     """
-    bearings, cycle = engine.bearings, engine.cycle
-    pins = pin_forces(engine, point, fidelity)
-    total = Spectrum(cycle.base_order, np.zeros((1, len(bearings), 3), dtype=complex))
+    _check_even(fidelity)
+    gas, parts = fidelity.gas_of(point), engine.slider_cranks
+    of_rods = _of_rods(engine.cycle, parts, engine.bearings, point.speed, gas, fidelity)
+    return of_rods + _of_rotors(engine, point.speed, fidelity)
+
+
+@lru_cache(maxsize=64)
+def _of_rods(
+    cycle: Cycle, parts: tuple[SliderCrank, ...], bearings: tuple[Bearing, ...], speed: float, gas: GasModel | None,
+    fidelity: Fidelity,
+) -> Spectrum:  # fmt: skip
+    """What the rods bring to every main bearing: the same whatever is balanced."""
+    pins = _side_by_side(_of_rod, cycle, parts, speed, gas, fidelity)
+    shares = shares_of(bearings, tuple((part.shaft, part.x) for part in parts), fidelity.crankshaft)
+    return pins.each(partial(np.einsum, "bp,npd->nbd", shares))
+
+
+def _of_rotors(engine: Engine, speed: float, fidelity: Fidelity) -> Spectrum:
+    """What webs, weights and throws add to every main bearing, each of the one order that its shaft turns with."""
+    bearings = engine.bearings
+    shafts = {bearing.shaft for bearing in bearings}
+    rotors = [rotor for rotor in engine.rotors if rotor.shaft in shafts]
+    shares = shares_of(bearings, tuple((rotor.shaft, rotor.x) for rotor in rotors), fidelity.crankshaft)
+    indices = [order_index(engine.cycle, abs(rotor.shaft.ratio)) for rotor in rotors]
+    out = np.zeros((max(indices, default=0) + 1, len(bearings), 3), dtype=complex)
+    for rotor, index, share in zip(rotors, indices, shares.T, strict=True):
+        out[index] += share[:, None] * rotor_wrench(rotor, speed)[:3]
+    return Spectrum(engine.cycle.base_order, out)
+
+
+@lru_cache(maxsize=256)
+def shares_of(bearings: tuple[Bearing, ...], places: tuple[tuple[Shaft, float], ...], crankshaft: str) -> Array:
+    """Share of a load at each place of a shaft that each bearing carries, shape (bearings, places) (B4, B6)."""
+    shares = np.zeros((len(bearings), len(places)))
     for shaft in dict.fromkeys(bearing.shaft for bearing in bearings):
-        carried = [k for k, part in enumerate(engine.slider_cranks) if part.shaft == shaft]
-        own = [rotor for rotor in engine.rotors if rotor.shaft == shaft]
-        at_pins = pins.each(partial(np.take, indices=carried, axis=1))
-        rotors = _side_by_side([_of_rotor(rotor, point.speed, cycle) for rotor in own], cycle)
-        for places, forces in (([engine.slider_cranks[k].x for k in carried], at_pins), ([r.x for r in own], rotors)):
-            shares = np.zeros((len(bearings), len(places)))
-            rows = [k for k, bearing in enumerate(bearings) if bearing.shaft == shaft]
-            shares[rows] = SHARES[fidelity.crankshaft]([bearings[k].x for k in rows], places)
-            total = total + forces.each(partial(np.einsum, "bp,npd->nbd", shares))
-    return total
+        rows = [k for k, bearing in enumerate(bearings) if bearing.shaft == shaft]
+        columns = [k for k, (on, _) in enumerate(places) if on == shaft]
+        found = SHARES[crankshaft]([bearings[k].x for k in rows], [places[k][1] for k in columns])
+        shares[np.ix_(rows, columns)] = found
+    shares.setflags(write=False)
+    return shares
 
 
 def lever_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
@@ -246,10 +276,15 @@ def _tangent(part: SliderCrank, alpha: Array) -> Array:
     return np.asarray(kinematics.sin_psi(np, alpha, part.rod_ratio, part.offset_ratio) / _cosine(part, alpha))
 
 
-def _side_by_side(loads: list[Spectrum], cycle: Cycle) -> Spectrum:
-    """Forces (n, d) each as one signal (n, places, d)."""
+@lru_cache(maxsize=64)
+def _side_by_side(
+    of: OfPart, cycle: Cycle, parts: tuple[SliderCrank, ...], speed: float, gas: GasModel | None, fidelity: Fidelity
+) -> Spectrum:
+    """A load (n, d) of every slider-crank as one signal (n, cylinders, d)."""
+    loads = [of(cycle, part, speed, gas, fidelity) for part in parts]
     width = loads[0].coefficients.shape[-1] if loads else 3
     total = Spectrum(cycle.base_order, np.zeros((1, len(loads), width), dtype=complex))
     for one, load in zip(np.eye(len(loads)), loads, strict=True):
         total = total + load.each(partial(np.einsum, "k,nd->nkd", one))
+    total.coefficients.setflags(write=False)
     return total

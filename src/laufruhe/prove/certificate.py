@@ -159,15 +159,15 @@ def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:
     return proof.value > ROUNDING * whole
 
 
-def best_bound(fine: AffineProblem, coarse: AffineProblem, x: Array, found: Multipliers) -> Bound:
+def best_bound(fine: AffineProblem, x: Array, found: Multipliers) -> Bound:
     """The best of the bounds that a solution on a coarser grid suggests (P6).
 
     One takes the solver's dual rows between the coarse angles; one takes the direction
     of every row of the design itself, and the solver's only where a row vanishes.
     """
     spread = Multipliers(
-        tuple(_spread(norm, coarse.samples, z) for (_, norm), z in zip(fine.terms, found.terms, strict=True)),
-        tuple(_spread(norm, coarse.samples, z) for (_, norm), z in zip(fine.limits, found.limits, strict=True)),
+        tuple(_spread(norm, z) for (_, norm), z in zip(fine.terms, found.terms, strict=True)),
+        tuple(_spread(norm, z) for (_, norm), z in zip(fine.limits, found.limits, strict=True)),
     )
     direct = Multipliers(
         tuple(
@@ -210,8 +210,8 @@ def _inside(problem: AffineProblem, x: Array) -> Array:
     return np.concatenate(columns, axis=1)
 
 
-def _spread(fine: AffineNorm, samples: int, z: Array) -> Array:
-    """Dual rows at `samples` angles on a finer grid; masses have no angles and stay."""
+def _spread(fine: AffineNorm, z: Array) -> Array:
+    """Dual rows of a coarser grid on a finer one; masses have no angles and stay."""
     signals, bends = len(fine.grid.weights) // fine.grid.steps, fine.grid.bends
     times, rest = divmod(len(fine.grid.weights) - signals * bends, max(len(z) - signals * bends, 1))
     if rest:
@@ -222,7 +222,7 @@ def _spread(fine: AffineNorm, samples: int, z: Array) -> Array:
     # rows where the signals bend stay
     own = z.reshape(signals, -1, z.shape[-1])
     steps, kept = own[:, : own.shape[1] - bends], own[:, own.shape[1] - bends :]
-    spread = fine.norm.spread(steps.reshape(-1, z.shape[-1]), samples, times).reshape(signals, -1, z.shape[-1])
+    spread = fine.norm.spread(steps.reshape(-1, z.shape[-1]), steps.shape[1], times).reshape(signals, -1, z.shape[-1])
     return np.concatenate([spread, kept], axis=1).reshape(-1, z.shape[-1])
 
 

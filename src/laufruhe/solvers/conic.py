@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem, reach
 from laufruhe.numerics.budget import left
-from laufruhe.numerics.norms import MEAN, Cones, Grid
+from laufruhe.numerics.norms import Cones, Grid, lengths
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers, excludes
 
@@ -33,6 +33,8 @@ ATTEMPTS: tuple[Mapping[str, Any], ...] = (
     {"tol_gap_abs": 1e-6, "tol_gap_rel": 1e-6, "tol_feas": 1e-7, "max_iter": 500, "max_step_fraction": 0.9},
 )
 """Settings of the solver, in the order in which they are tried."""
+FEW_ROWS, ROUNDS, NEAR_LIMIT = 500, 6, 0.95
+"""Rows of a peak that are all taken, how often rows are added, and the share of a limit from which they are."""
 SHORTEST = 0.05
 """Seconds that one attempt has where time is over."""
 
@@ -131,12 +133,51 @@ def solve_cones(problem: AffineProblem, held: tuple[Array, Array] | None = None)
     fewer = replace(
         problem, terms=tuple(problem.terms[k] for k in acting), limits=tuple(problem.limits[k] for k in binding)
     )
-    found = _solved(fewer, held)
+    found = _by_few_rows(fewer, held)
     terms, limits = ([np.zeros_like(norm.constant) for _, norm in of] for of in (problem.terms, problem.limits))
     for kept, rows, own in ((acting, terms, found.multipliers.terms), (binding, limits, found.multipliers.limits)):
         for k, z in zip(kept, own, strict=False):
             rows[k] = z
     return replace(found, multipliers=Multipliers(tuple(terms), tuple(limits)))
+
+
+def _by_few_rows(problem: AffineProblem, held: tuple[Array, Array] | None) -> ConicSolution:
+    """With those rows of limited peaks alone that come near their limit, more of them as long as others break it.
+
+    A peak is a few angles of a thousand, and the rows left out have no price: what is proven holds for all.
+    """
+    peaks = [norm.norm.is_largest and len(norm.grid.weights) > FEW_ROWS for _, norm in problem.limits]
+    kept = [
+        np.union1d(0, _near(most, norm, problem.start, NEAR_LIMIT)) if peak else np.arange(len(norm.grid.weights))
+        for peak, (most, norm) in zip(peaks, problem.limits, strict=True)
+    ]
+    for _ in range(ROUNDS if any(peaks) else 0):
+        limits = [(maximum, _rows_of(norm, rows)) for (maximum, norm), rows in zip(problem.limits, kept, strict=True)]
+        found = _solved(replace(problem, limits=tuple(limits)), held)
+        whole = [np.zeros_like(norm.constant) for _, norm in problem.limits]
+        for z, rows, own in zip(whole, kept, found.multipliers.limits, strict=False):
+            z[rows] = own
+        found = replace(found, multipliers=replace(found.multipliers, limits=tuple(whole)))
+        if found.x is None:
+            return found
+        broken = [_near(maximum, norm, found.x, 1.0 + FEASIBLE) for maximum, norm in problem.limits]
+        if all(np.isin(over, rows).all() for over, rows in zip(broken, kept, strict=True)):
+            return found
+        near = [_near(maximum, norm, found.x, NEAR_LIMIT) for maximum, norm in problem.limits]
+        kept = [np.union1d(rows, more) if peak else rows for peak, rows, more in zip(peaks, kept, near, strict=True)]
+    return _solved(problem, held)
+
+
+def _near(maximum: float, norm: AffineNorm, x: Array, share: float) -> NDArray[np.intp]:
+    """Rows that are longer than a share of a limit."""
+    return np.flatnonzero(lengths(norm.rows(x)) > share * maximum)
+
+
+def _rows_of(norm: AffineNorm, rows: NDArray[np.intp]) -> AffineNorm:
+    """Some of its rows."""
+    return replace(
+        norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=Grid(norm.grid.weights[rows], len(rows))
+    )
 
 
 def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
@@ -161,7 +202,7 @@ def _solved(problem: AffineProblem, held: tuple[Array, Array] | None) -> ConicSo
             return answer
         stopped.append(replace(answer, x=None) if "Infeasible" in status else answer)
     points = [answer for answer in stopped if answer.x is not None]
-    points.append(replace(stopped[0], x=_projected(problem, problem.start)))
+    points.append(replace(stopped[0], x=projected(problem, problem.start)))
     best = min(points, key=lambda answer: _rank(problem, answer.x))
     contradiction = len(points) <= len(stopped) and _rank(problem, best.x)[0] > 0.0
     return replace(best, x=None) if contradiction else best
@@ -223,7 +264,7 @@ def _told(rows: _Rows, cost: Array, told: Mapping[str, Any]) -> Any:
 
 def _answer(problem: AffineProblem, blocks: list[_Block], starts: list[int], found: Any) -> ConicSolution:
     """Decisions in their sets, and dual rows; zero where the solver has lost its numbers."""
-    x = _projected(problem, _numbers(found.x)[: problem.size] * problem.units)
+    x = projected(problem, _numbers(found.x)[: problem.size] * problem.units)
     duals = _numbers(found.z)
     unit = blocks[0].unit if problem.terms else 1.0
     rows = [_dual_rows(block, duals, start, unit) for block, start in zip(blocks, starts, strict=True)]
@@ -236,7 +277,7 @@ def _numbers(values: Sequence[float]) -> Array:
     return np.asarray(np.nan_to_num(np.asarray(values, dtype=float), posinf=0.0, neginf=0.0))
 
 
-def _projected(problem: AffineProblem, x: Array) -> Array:
+def projected(problem: AffineProblem, x: Array) -> Array:
     """Every decision in its set."""
     for domain in problem.domains:
         x[domain.columns] = domain.project(x)
@@ -296,48 +337,3 @@ def _dual_rows(block: _Block, duals: Array, start: int, objective_unit: float) -
     else:
         z = -duals[start : start + k * (d + 1)].reshape(k, d + 1)[:, 1:]
     return np.asarray(z * block.cones.factors[:, None] * (objective_unit / block.unit))
-
-
-def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[float]) -> Array:
-    """Among x + still z, the decisions of least weighted size that stay in their sets and under mass limits.
-
-    Parameters
-    ----------
-    problem
-        Domains and limits.
-    x
-        An optimal decision vector.
-    still
-        Shape (n, m): directions that no load can tell apart.
-    weights
-        Of every decision's size.
-    """
-    sizes = [float(np.hypot.reduce(x[domain.columns])) for domain in problem.domains]
-    total = sum(w * size for w, size in zip(weights, sizes, strict=True))
-    if total == 0.0:
-        return x
-    # nothing lighter is larger than all of this together, whatever the bounds
-    domains = tuple(
-        replace(d, decision=replace(d.decision, set=d.set.within(total / w if w else size)))
-        for d, w, size in zip(problem.domains, weights, sizes, strict=True)
-    )
-    limits = tuple((max(most, norm.value(x)), norm) for most, norm in problem.limits if norm.norm.sums_lengths)
-    limits = tuple((most, norm) for most, norm in limits if np.any(np.einsum("kdn,nm->kdm", norm.slope, still)))
-    terms = tuple((w, _size(d, problem.size)) for w, d in zip(weights, domains, strict=True) if w)
-    scales = np.concatenate([np.full(d.width, d.scale) for d in domains])
-    # across the directions, in units of the sizes, nothing moves
-    base, values, _ = np.linalg.svd(still / scales[:, None], full_matrices=True)
-    across = base[:, len(values) :].T / scales
-    found = solve_cones(AffineProblem(terms, limits, domains, problem.samples), (across, across @ x))
-    if found.x is None:
-        return x
-    steps, *_ = np.linalg.lstsq(still / scales[:, None], (found.x - x) / scales)
-    lighter = x + still @ steps
-    return _projected(problem, lighter)
-
-
-def _size(domain: Domain, columns: int) -> AffineNorm:
-    """Of one decision."""
-    slope = np.zeros((1, domain.width, columns))
-    slope[0, :, domain.columns] = np.eye(domain.width)
-    return AffineNorm(MEAN, np.zeros((1, domain.width)), slope, Grid(np.ones(1), 1))

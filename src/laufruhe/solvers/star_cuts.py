@@ -242,7 +242,7 @@ def solve_design(
         solution = solve_cones(coarse)
         if solution.x is None:
             return None
-        bound = best_bound(judged, coarse, solution.x, solution.multipliers)
+        bound = best_bound(judged, solution.x, solution.multipliers)
         value = judged.objective(solution.x)
         met = judged.excess(solution.x) <= FEASIBLE
         found = Solved(star, built, value, bound.value, _spread(solution.x, whole, kept))

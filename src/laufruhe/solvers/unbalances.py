@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.budget import in_time
 from laufruhe.problem.channels import OF_MOUNTS
-from laufruhe.problem.evaluation import BETWEEN, evaluate
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.nothing import ROUNDING, nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
-from laufruhe.solvers.conic import lightest, solve_cones
+from laufruhe.solvers.conic import solve_cones
+from laufruhe.solvers.lightest import SAME_LOAD, lightest
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -28,7 +29,6 @@ MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
 MOST_ROWS = 60_000
 NEGLIGIBLE = 1e-6
-SAME_LOAD = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +141,8 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float,
     if solution.x is None:
         return None
     x = _settled(problem, fine, solution.x)
-    bound = best_bound(model.at(fine.samples, averaged=True), coarse, x, solution.multipliers)
-    # peaks where the result will be measured
-    judge = model.at(BETWEEN * fine.samples) if _has_peaks(problem) else fine
+    bound = best_bound(model.at(fine.samples, averaged=True), x, solution.multipliers)
+    judge = model.at(fine.samples, finer=True) if _has_peaks(problem) else fine
     value = judge.objective(x)
     return _Optimum(x, bound, fine, judge, gap_of(value, bound.value, nothing), judge.excess(x), samples, nothing)
 

@@ -29,6 +29,7 @@ class Maximum(Norm):
 
     name = "maximum"
     refinement = 8
+    is_largest = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """max_k |v_k|."""

@@ -102,6 +102,8 @@ class Norm(ABC):
         Whether nothing but the sum of weighted squares of all rows matters (S12).
     sums_lengths
         Whether the norm is linear in the lengths of the rows.
+    is_largest
+        Whether it is the length of the longest row, so that under a limit each row keeps it by itself.
     of_row_lengths
         Whether nothing but the lengths of the rows matters, wherever they stand.
     """
@@ -111,6 +113,7 @@ class Norm(ABC):
     averages: ClassVar[bool] = False
     is_euclidean: ClassVar[bool] = False
     sums_lengths: ClassVar[bool] = False
+    is_largest: ClassVar[bool] = False
     of_row_lengths: ClassVar[bool] = True
 
     def __repr__(self) -> str:
