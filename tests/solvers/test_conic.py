@@ -14,10 +14,10 @@ import pytest
 
 import laufruhe
 from laufruhe import load
-from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
+from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.norms import NORMS, Norm
 from laufruhe.problem import channels
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, lower_bound
 from laufruhe.solvers import Status, conic, solve
@@ -97,6 +97,33 @@ def test_limits_and_their_prices() -> None:
     assert affine.objective(solution.x) == pytest.approx(stated(affine), rel=1e-6)
     less, more = (stated(AffineModel(limited(at)).at(96)) for at in (0.499, 0.501))
     assert solution.multipliers.shadow_prices(affine)[0] == pytest.approx((less - more) / 0.002, rel=1e-3)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7, 1.0])
+def test_a_peak_is_limited_at_few_angles_as_at_all(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same optimum and price of the limit, and a bound that holds on every angle."""
+    problem = load(PROBLEMS / "tractor-four-lanchester.toml")
+    peak = replace(problem.objective[0].measure, norm=NORMS["maximum"])
+    free = AffineModel(problem).at(480)
+    loose = AffineModel(replace(problem, limits=(Limit("peak", peak, 1e9),))).at(480)
+    least = solve_cones(AffineModel(replace(problem, objective=(Term(peak),))).at(480)).x
+    at_mean, at_peak = (loose.limits[0][1].value(x) for x in (solve_cones(free).x, least))
+    maximum = at_peak + share * (at_mean - at_peak) + 1e-3 * at_peak
+    limited_so = replace(loose, limits=((maximum, loose.limits[0][1]),))
+    rows = []
+    monkeypatch.setattr(conic, "_told", lambda own, *rest, told=conic._told: rows.append(own.count) or told(own, *rest))
+    few = solve_cones(limited_so)
+    monkeypatch.setattr(conic, "FEW_ROWS", 10**9)
+    whole = solve_cones(limited_so)
+    assert max(rows[:-1]) < 0.9 * rows[-1]
+    assert few.x is not None
+    assert limited_so.excess(few.x) <= FEASIBLE
+    assert limited_so.objective(few.x) == pytest.approx(limited_so.objective(whole.x), rel=1e-7)
+    bounds = [lower_bound(limited_so, found.multipliers).value for found in (few, whole)]
+    assert bounds[0] == pytest.approx(bounds[1], rel=1e-6)
+    assert few.multipliers.shadow_prices(limited_so) == pytest.approx(
+        whole.multipliers.shadow_prices(limited_so), rel=1e-3, abs=1e-6
+    )
 
 
 def contradicted() -> AffineProblem:
