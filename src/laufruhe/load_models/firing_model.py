@@ -1,24 +1,28 @@
-"""A problem as norms of rows that are affine in its firing order and its decisions (V9).
+"""A problem as norms of rows that are affine in its firing order and its decisions (V9, B8).
 
 Where every cylinder has a throw of its own, a firing order is an assignment of cylinders to the slots of
-the cycle, and it fixes the star. What twists the crankshaft adds up over the cylinders as forces add up over the
-throws: the rows of one cylinder, later by its slot.
+the cycle, and it fixes the star. What loads bearings and twists the crankshaft adds up over the cylinders as
+forces add up over the throws: the rows of one cylinder, later by its slot.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from laufruhe.load_models.star_model import StarModel, StarNorm, StarProblem, compressed, normalised
-from laufruhe.machine.firing import even_patterns, firing_lattice, slot_steps
+from laufruhe.load_models.star_model import StarModel, StarNorm, StarProblem, normalised
+from laufruhe.machine.firing import even_patterns, firing_lattice, slot_order, slot_steps
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Measure, load_rows
+from laufruhe.problem.measure import Measure, bends_of, load_rows
 from laufruhe.problem.problem import Phasing, Problem
 
 
@@ -30,7 +34,8 @@ def slot_space(cylinders: int, places: tuple[float, ...]) -> StarSpace:
 class FiringModel(StarModel):
     """As `StarModel`, its steps the slots of the cycle.
 
-    What does not feel the firing order is that of the star alone. What does is that of one cylinder after another.
+    What does not feel the firing order is that of the star alone. To what does, the gas of each cylinder is
+    added, later by its slot; what twists the crankshaft is that of one cylinder after another.
     """
 
     def __init__(
@@ -43,7 +48,9 @@ class FiringModel(StarModel):
         layout, slots = phasing.layout(*geometry), space.first if origin is None else origin
         steps = firing_lattice(phasing.cycle, phasing.cylinders).steps
         cranks = StarSpace(steps, even_patterns(phasing.cycle, layout), layout.throw_positions)
-        rest = replace(phasing, realise=lambda candidate: _without_order(phasing.realise(candidate)))
+        rest = replace(
+            phasing, realise=lambda candidate: _of_star(phasing.realise(candidate)), firing_order=slot_order(slots)
+        )
         super().__init__(rest, cranks, geometry, slot_steps(phasing.cycle, slots))
         # what feels the order repeats no sooner than the cycle
         self.base = phasing.cycle.base_order
@@ -52,64 +59,79 @@ class FiringModel(StarModel):
         self.phasing, self.space = phasing, space
         self.problem = normalised(phasing.realise(phasing.fired(slots, geometry)))
         self._slots, self._fired = slots, evaluate(self.problem)
-        self._fired_at: dict[int, StarProblem] = {}
 
-    def at(self, samples: int) -> StarProblem:
+    def _rows(self, samples: int) -> StarProblem:
         """Rows of every firing order at `samples` steps over the cycle."""
-        if samples not in self._fired_at:
-            stars = super().at(samples)
-            by_star = np.array(slot_steps(self.phasing.cycle, range(self.space.throws)))
-            terms, limits = (
-                iter([(weight, _by_slot(norm, by_star)) for weight, norm in each])
-                for each in (stars.terms, stars.limits)
-            )
-            self._fired_at[samples] = StarProblem(
-                tuple(
-                    (term.weight, self._norm(term.measure, samples)) if term.measure.feels_order else next(terms)
-                    for term in self.problem.objective
-                ),
-                tuple(
-                    (limit.maximum, self._norm(limit.measure, samples)) if limit.measure.feels_order else next(limits)
-                    for limit in self.problem.load_limits
-                ),
-                self.domains,
-                samples,
-            )
-        return self._fired_at[samples]
+        stars, problem = super()._rows(samples), self.problem
+        by_star = np.array(slot_steps(self.phasing.cycle, range(self.space.throws)))
+        terms, limits = (iter([_by_slot(norm, by_star) for _, norm in each]) for each in (stars.terms, stars.limits))
+        return StarProblem(
+            tuple((term.weight, self._norm(term.measure, samples, terms)) for term in problem.objective),
+            tuple((limit.maximum, self._norm(limit.measure, samples, limits)) for limit in problem.load_limits),
+            self.domains,
+            samples,
+        )
 
-    def _norm(self, measure: Measure, samples: int) -> StarNorm:
-        """Rows of a measure that feels the order: of the whole engine, and of every cylinder in every slot."""
-        whole = load_rows(measure, self.problem.points, self._fired.signals(measure.load), self.problem.engine, samples)
-        count = self.space.throws
+    def _norm(self, measure: Measure, samples: int, of_stars: Iterator[StarNorm]) -> StarNorm:
+        """Rows of a measure: of its star, and what the slot of every cylinder adds."""
+        if not measure.feels_order:
+            return next(of_stars)
+        signals = [signal.over(self.base) for signal in self._fired.signals(measure.load)]
+        whole = load_rows(measure, self.problem.points, signals, self.problem.engine, samples)
+        bends, count = bends_of(measure, signals, self.problem.engine), self.space.throws
         moves = np.zeros((count, count, *whole.vectors.shape))
         for k in range(1, count):
-            first = self._alone(measure, k)
+            first = self._alone(measure.load, k)
             for slot in range(count):
                 later = [signal.later(Fraction(slot, count), slot * signal.period / count) for signal in first]
-                rows = load_rows(measure, self.problem.points, later, self.problem.engine, samples)
-                moves[k, slot] = rows.vectors
+                moves[k, slot] = load_rows(
+                    measure, self.problem.points, later, self.problem.engine, samples, bends
+                ).vectors
             moves[k] -= moves[k, self._slots[k]].copy()
+        if measure.load.feels_unbalances:
+            star = next(of_stars)
+            return replace(star, moves=star.moves + moves)
         slope = np.zeros((*whole.vectors.shape, sum(domain.width for domain in self.domains)))
-        norm = StarNorm(measure.norm, whole.vectors, moves, slope, None, whole.grid)
-        return compressed(norm) if measure.norm.is_euclidean else norm
+        return StarNorm(measure.norm, whole.vectors, moves, slope, None, whole.grid)
 
-    def _alone(self, measure: Measure, k: int) -> list[Spectrum]:
-        """What one cylinder that fires in the first slot makes, at every operating point."""
+    def _alone(self, load: LoadChannel, k: int) -> list[Spectrum]:
+        """What one cylinder that fires in the first slot makes, at every operating point: all, or its gas alone."""
         engine = self.problem.engine
         part = engine.slider_cranks[k]
         first = replace(part, throw=part.throw + part.shaft.ratio * part.firing_angle, firing_angle=0.0)
         alone = replace(engine, slider_cranks=(first,), rotors=())
-        return [measure.load.signal(PointLoads(at.point, at.wrench, None, None, alone, at.fidelity))
-                for at in self._fired.loads]  # fmt: skip
+        own, names = load.places(alone), load.places(engine)
+        found = []
+        for at in self._fired.loads:
+            signal = load.signal(replace(at, moving=alone))
+            if load.feels_unbalances:
+                motored = load.signal(
+                    replace(at, moving=alone, fidelity=replace(at.fidelity, gas=False, gas_orders=None))
+                )
+                signal = signal + motored.each(np.negative)
+            placed = signal if own == names else signal.each(partial(_among, names, own))
+            found.append(placed.over(self.base))
+        return found
 
 
-def _by_slot(norm: StarNorm, steps: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> StarNorm:
+def _among(names: Sequence[str], own: Sequence[str], values: NDArray[Any]) -> NDArray[Any]:
+    """Values at some places, shape (n, own, d), among zeros at all others."""
+    out = np.zeros((len(values), len(names), values.shape[-1]), dtype=values.dtype)
+    out[:, [names.index(name) for name in own]] = values
+    return out
+
+
+def _by_slot(norm: StarNorm, steps: NDArray[np.int64]) -> StarNorm:
     """Rows by the slot of each throw's cylinder in place of its step."""
     turns = None if norm.turns is None else norm.turns[:, steps]
     return replace(norm, moves=norm.moves[:, steps], turns=turns)
 
 
-def _without_order(problem: Problem) -> Problem:
-    """The problem without what changes with the firing order of one star."""
-    objective = tuple(term for term in problem.objective if not term.measure.feels_order)
-    return replace(problem, objective=objective, limits=tuple(x for x in problem.limits if not x.measure.feels_order))
+def _of_star(problem: Problem) -> Problem:
+    """The problem without what is of cylinders one after another, and not of the star."""
+    objective = tuple(term for term in problem.objective if _adds_up(term.measure))
+    return replace(problem, objective=objective, limits=tuple(x for x in problem.limits if _adds_up(x.measure)))
+
+
+def _adds_up(measure: Measure) -> bool:
+    return not measure.feels_order or measure.load.feels_unbalances

@@ -76,6 +76,15 @@ class StarProblem:
     domains: tuple[Domain, ...]
     samples: int
 
+    @property
+    def compressed(self) -> StarProblem:
+        """The same with root mean squares in few rows (S12)."""
+        terms, limits = (
+            tuple((number, compressed(norm) if norm.norm.is_euclidean else norm) for number, norm in each)
+            for each in (self.terms, self.limits)
+        )
+        return replace(self, terms=terms, limits=limits)
+
     def at(self, star: Sequence[int]) -> AffineProblem:
         """The problem of one star."""
         terms = tuple((weight, norm.at(star)) for weight, norm in self.terms)
@@ -141,15 +150,18 @@ class StarModel:
     def at(self, samples: int) -> StarProblem:
         """Rows of every star at `samples` steps over the period of the loads."""
         if samples not in self._cache:
-            whole, still = self._whole.at(samples), self._still.at(samples)
-            moved = {key: model.at(samples) for key, model in self._moved.items()}
-            self._cache[samples] = StarProblem(
-                self._norms(whole.terms, still.terms, {key: a.terms for key, a in moved.items()}),
-                self._norms(whole.limits, still.limits, {key: a.limits for key, a in moved.items()}),
-                self.domains,
-                samples,
-            )
+            self._cache[samples] = self._rows(samples).compressed
         return self._cache[samples]
+
+    def _rows(self, samples: int) -> StarProblem:
+        whole, still = self._whole.at(samples), self._still.at(samples)
+        moved = {key: model.at(samples) for key, model in self._moved.items()}
+        return StarProblem(
+            self._norms(whole.terms, still.terms, {key: a.terms for key, a in moved.items()}),
+            self._norms(whole.limits, still.limits, {key: a.limits for key, a in moved.items()}),
+            self.domains,
+            samples,
+        )
 
     def _norms(
         self,
@@ -166,10 +178,8 @@ class StarModel:
                 moves[k, p] = norms[number][1].constant - rest.constant
                 turns[k, p] = norms[number][1].slope - rest.slope
             alike = np.abs(turns).max(initial=0.0) <= _SAME_SLOPE * np.abs(rest.slope).max(initial=0.0)
-            norm = StarNorm(
-                all_of.norm, all_of.constant, moves, all_of.slope, None if alike else turns, all_of.grid
-            )  # fmt: skip
-            out.append((weight, compressed(norm) if norm.norm.is_euclidean else norm))
+            turned = None if alike else turns
+            out.append((weight, StarNorm(all_of.norm, all_of.constant, moves, all_of.slope, turned, all_of.grid)))
         return tuple(out)
 
 

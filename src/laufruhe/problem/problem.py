@@ -153,15 +153,20 @@ class Problem:
         )
 
     @property
+    def has_gas(self) -> bool:
+        """Whether gas acts at any operating point."""
+        return any(self.fidelity.gas_of(point) is not None for point in self.points)
+
+    @property
     def feels_gas(self) -> bool:
         """Whether gas loads what is minimised or limited: its roll moment alone, and all where it drives the speed."""
-        has_gas = any(self.fidelity.gas_of(point) is not None for point in self.points)
-        return has_gas and (any(measure.feels_gas for measure in self.measures) or self.fidelity.is_uneven)
+        return self.has_gas and (any(measure.feels_gas for measure in self.measures) or self.fidelity.is_uneven)
 
     @property
     def feels_order(self) -> bool:
-        """Whether anything asked changes with the firing order of one star."""
-        return any(measure.feels_order for measure in self.measures)
+        """Whether anything asked changes with the firing order of one star: twist, and all inside with gas."""
+        felt = [measure.load for measure in self.measures if measure.feels_order]
+        return (self.has_gas and bool(felt)) or not all(load.feels_unbalances for load in felt)
 
     @property
     def flywheel_decisions(self) -> tuple[Decision, ...]:

@@ -116,11 +116,6 @@ def _asks_block(problem: Problem) -> bool:
     return _asks_loads(problem) and _nothing_inside(problem)
 
 
-def _asks_stars(problem: Problem) -> bool:
-    """As `_asks_block`, the twist of the crankshaft allowed."""
-    return _asks_loads(problem) and all(measure.feels_order or not measure.is_inside for measure in problem.measures)
-
-
 def _nothing_inside(problem: Problem) -> bool:
     return not any(measure.is_inside or measure.channel.is_flywheel for measure in problem.measures)
 
@@ -137,7 +132,7 @@ METHODS: tuple[Method, ...] = (
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_unbalances)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_block, Reach.WHOLE, _places),
-    Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
+    Method("stars, each with cones", frozenset({_S, _U}), _asks_loads, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), lambda _: True, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), lambda _: True, Reach.ASIDE, _smooth),

@@ -40,8 +40,8 @@ def solve_phasing(problem: Problem) -> Result:
     phasing = problem.phasing
     if phasing is None:
         raise SolverError("nothing of the phasing is open")
-    if problem.feels_order and phasing.continuous:
-        rule = "the twist of the crankshaft is decided with even firing or with throws that are given"
+    if phasing.continuous and any(measure.is_inside for measure in problem.measures):
+        rule = "loads inside the crankcase are decided with even firing or with throws that are given"
         raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out")
     started = time.perf_counter()
     if phasing.throws is not None:

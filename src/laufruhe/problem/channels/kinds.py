@@ -135,8 +135,13 @@ class LoadChannel(Channel):
     is_inside: bool = False
     adds_up: bool = False
     is_load: ClassVar[bool] = True
-    feels_order: ClassVar[bool] = False
-    """Whether it changes with the firing order of one star."""
+    feels_unbalances: ClassVar[bool] = True
+    """Whether rotors load it, and the loads of each throw add up; else it is of cylinders and what they twist."""
+
+    @property
+    def feels_order(self) -> bool:
+        """Whether it changes with the firing order of one star, where gas acts: cylinders are felt one by one."""
+        return self.is_inside
 
     @property
     def norms(self) -> Collection[str]:
@@ -156,7 +161,7 @@ class TwistChannel(LoadChannel):
     keys: tuple[str, ...] = AT_SECTIONS
     needs: Needs = Needs.TORSION
     is_inside: bool = True
-    feels_order: ClassVar[bool] = True
+    feels_unbalances: ClassVar[bool] = False
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Throws and firing order."""
