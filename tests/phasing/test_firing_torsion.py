@@ -28,7 +28,7 @@ STEPS = {"fidelity": {"samples": 360}}
 
 
 def tables(**changes: Any) -> dict[str, Any]:
-    return {**tables_of(READY), **STEPS, **changes}
+    return {**tables_of(READY), "constraints": [], **STEPS, **changes}
 
 
 def problem_of(whole: dict[str, Any]) -> Problem:

@@ -80,6 +80,7 @@ class TorsionTable(Table):
     cylinder_damping: f.TorsionalDampings = f.told("Of every throw, against the block.", [0.0])
     loss_factor: f.LossFactor = f.told("Of every shaft that has none of its own.", 0.0)
     shear_modulus: f.PositivePressure = STEEL
+    speeds: f.Pair[f.Speed] | None = f.told("Range over which the response is shown and speeds are barred.")
     output: str | None = f.told("Disc where the load takes its torque; the last one where left out.")
     crank: CrankTable | None = None
     discs: list[DiscTable] = Field(default_factory=list)
@@ -108,9 +109,12 @@ def torsion_of(table: TorsionTable | None, parts: Sequence[SliderCrank], throws:
     names = [disc.name for disc in discs]
     if table.output is not None and table.output not in names:
         raise Refused("torsion.output", table.output, "is no disc", nearest(table.output, names))
+    if table.speeds is not None and not table.speeds[0] < table.speeds[1]:
+        raise Refused("torsion.speeds", None, "is no range", "write the smaller one first")
     absorbers = [_absorber(a, names, f"torsion.absorbers[{k + 1}]") for k, a in enumerate(table.absorbers)]
     with blamed_on("torsion"):
-        return Torsion(discs, tuple(named), tuple(absorbers), table.output or "")
+        speeds = None if table.speeds is None else (table.speeds[0], table.speeds[1])
+        return Torsion(discs, tuple(named), tuple(absorbers), table.output or "", speeds)
 
 
 def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> list[Disc]:

@@ -139,12 +139,15 @@ class Torsion:
         On any of the discs.
     output
         Name of the disc where the load takes its torque.
+    speeds
+        Least and largest crank speed that it is looked at [rad/s]; about the operating points where none are given.
     """
 
     discs: tuple[Disc, ...]
     sections: tuple[Section, ...]
     absorbers: tuple[Absorber, ...] = ()
     output: str = ""
+    speeds: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         names = [disc.name for disc in self.discs] + [absorber.name for absorber in self.absorbers]
@@ -182,7 +185,7 @@ class Torsion:
             replace(a, inertia=a.inertia * inertia, stiffness=a.stiffness * stiffness, damping=a.damping * damping)
             for a in self.absorbers
         )
-        return Torsion(tuple(discs), tuple(sections), tuple(absorbers), self.output)
+        return replace(self, discs=tuple(discs), sections=tuple(sections), absorbers=tuple(absorbers))
 
 
 def stiffness_of(pieces: Sequence[tuple[float, float, float]], shear_modulus: float = STEEL) -> float:

@@ -20,6 +20,10 @@ class CycleMeasures:
     max: float
     rms: float
 
+    def times(self, factor: float) -> CycleMeasures:
+        """In another unit."""
+        return CycleMeasures(factor * self.mean, factor * self.max, factor * self.rms)
+
 
 def cycle_measures(samples: Array) -> CycleMeasures:
     """Of |F(phi)| from samples (n, components) at equal steps (M4; Hasselgruber, Figs. 10-28)."""

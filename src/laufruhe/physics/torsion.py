@@ -183,7 +183,9 @@ def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
     taken = (chain.driven <= sections)[:, None]
     stiff = np.array([section.stiffness for section in chain.sections])
     out[still] = (through * 1.0 - taken) / stiff[:, None]
-    angles = _receptances(chain, orders[~still], speed)[:, :count, :count]
+    size = count + len(chain.absorbers)
+    drives = np.tile(np.eye(size, dtype=complex), (int(np.sum(~still)), 1, 1))
+    angles = _solved(chain, orders[~still], speed, drives)[:, :count, :count]
     out[~still] = angles[:, :-1] - angles[:, 1:]
     return out
 
@@ -198,9 +200,10 @@ def section_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArr
 
 def twist(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Angle of each section's front end before its rear end, shape (n, sections) [rad] (V5); its mean under way."""
-    torques = throw_torques(engine, point, fidelity)
-    flexible = receptances(chain_of(engine), torques.orders, point.speed)
-    return Spectrum(torques.base, np.einsum("hsd,hd->hs", flexible, torques.coefficients))
+    torques, chain = throw_torques(engine, point, fidelity), chain_of(engine)
+    angles = _angles(chain, torques, point.speed)[:, : len(chain.discs)]
+    still = receptances(chain, torques.orders[:1], point.speed)[0] @ torques.coefficients[0]
+    return Spectrum(torques.base, np.concatenate([still[None], angles[:, :-1] - angles[:, 1:]]))
 
 
 def shaft_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -221,9 +224,8 @@ def shaft_stress(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Array:
     """Power that each absorber turns to heat, shape (absorbers,) [W] (V12)."""
     chain, torques = chain_of(engine), throw_torques(engine, point, fidelity)
-    orders, series = torques.orders[1:], torques.coefficients[1:]
-    count = len(chain.discs)
-    angles = np.einsum("hrd,hd->hr", _receptances(chain, orders, point.speed)[:, :, :count], series)
+    orders, count = torques.orders[1:], len(chain.discs)
+    angles = _angles(chain, torques, point.speed)
     heat = []
     for k, absorber in enumerate(chain.absorbers):
         swing = np.abs(angles[:, count + k] - angles[:, chain.index(absorber.on)]) ** 2
@@ -233,17 +235,24 @@ def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     return np.array(heat)
 
 
-def _receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
-    """Inverse of the dynamic stiffness of every order but zero, shape (orders, discs and rings twice)."""
+def _angles(chain: Torsion, torques: Spectrum, speed: float) -> ComplexArray:
+    """Angles of discs and rings in every order but zero, shape (orders, discs and rings) (V5)."""
+    drives = np.zeros((len(torques.coefficients) - 1, len(chain.discs) + len(chain.absorbers), 1), dtype=complex)
+    drives[:, : len(chain.discs), 0] = torques.coefficients[1:]
+    return _solved(chain, torques.orders[1:], speed, drives)[:, :, 0]
+
+
+def _solved(chain: Torsion, orders: Array, speed: float, drives: ComplexArray) -> ComplexArray:
+    """Angles under torques of every order but zero on discs and rings, shapes (orders, discs and rings, columns)."""
     rate = (orders * speed)[:, None, None]
     dynamic = _stiffness(chain, speed) + 1j * rate * _damping(chain, speed) - rate**2 * np.diag(_inertias(chain))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        try:
-            found = np.linalg.inv(dynamic)
-        except np.linalg.LinAlgError:
-            found = np.full_like(dynamic, np.inf)
+    try:
+        found = np.linalg.solve(dynamic, drives)
+    except np.linalg.LinAlgError:
+        found = np.full_like(drives, np.inf)
+    # what answers with that much more than its stiffness allows has nothing but rounding to damp it
     size = np.abs(found).max(axis=(1, 2)) * np.abs(dynamic).max(axis=(1, 2))
-    undamped = np.flatnonzero(~(size * _SINGULAR < 1.0))
+    undamped = np.flatnonzero(~(size * _SINGULAR <= np.abs(drives).max(axis=(1, 2))))
     if len(undamped):
         raise ModelError(
             f"order {orders[undamped[0]]:g} meets a natural frequency of the crankshaft at "

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
+from laufruhe.physics.torsion import has_torsion
 from laufruhe.problem.channels import CRANK_PIN_FORCE, FRICTION_POWER, MAIN_BEARING_FORCE, MOUNT_FORCE, LoadChannel
+from laufruhe.problem.channels.torsional import SHAFT_STRESS, SHAFT_TORQUE
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
@@ -42,6 +44,8 @@ MOUNTS = Places("mounts", MOUNT_FORCE, "Mount forces", "mount")
 BEARINGS = Places("main_bearings", MAIN_BEARING_FORCE, "Main-bearing forces", "bearing")
 PINS = Places("crank_pins", CRANK_PIN_FORCE, "Crank-pin forces", "pin of")
 FRICTION = Places("friction", FRICTION_POWER, "Friction power of main bearings", "bearing")
+SHAFTS = Places("shaft_torque", SHAFT_TORQUE, "Torque in the crankshaft", "section")
+STRESSES = Places("shaft_stress", SHAFT_STRESS, "Shear stress of the crankshaft", "section")
 
 
 def places_of(result: Result) -> list[Places]:
@@ -51,7 +55,10 @@ def places_of(result: Result) -> list[Places]:
     shown = [MOUNTS] if engine.mounts else []
     rubs = all(bearing.friction is not None for bearing in engine.bearings)
     given = {BEARINGS: bool(engine.bearings), PINS: bool(engine.bearings), FRICTION: bool(engine.bearings) and rubs}
-    return shown + [places for places, known in given.items() if inside and (known or places.channel in asked)]
+    shown += [places for places, known in given.items() if inside and (known or places.channel in asked)]
+    if not has_torsion(engine, problem.fidelity):
+        return shown
+    return [*shown, SHAFTS, *([STRESSES] if STRESSES.channel.places(engine) else [])]
 
 
 def hardest_point(result: Result) -> int:

@@ -7,6 +7,8 @@ PICTURES = {
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
     "bearings": "Force on each main bearing over a cycle, as block and crankshaft feel it, and where they wear.",
+    "twist_modes": "How the crankshaft swings in its natural modes, and the speeds at which orders meet them.",
+    "twist_response": "Torque in the crankshaft over crank speed, with the speeds at which a limit bars it.",
     "spectrum": "What orders of crank speed the loads are made of.",
     "transmissibility": "Force on the elastic mounts over that on the same mounts if they gave no way.",
     "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",

@@ -11,9 +11,12 @@ import numpy as np
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.torque import torque_facts
+from laufruhe.physics.torsion import absorber_heat, chain_of
 from laufruhe.physics.wrench import WRENCH
 from laufruhe.present.measures import Array, is_met, limits_of, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range
+from laufruhe.present.torsion import facts_of as torsion_of
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import Evaluation, measured, over, samples_of
 from laufruhe.prove.certificate import Proof
@@ -59,6 +62,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         "shaking": _largest([point["shaking"] for point in points]),
         "points": [{key: point[key] for key in own} for point in points],
         **({"modes": _modes(result.final)} if is_elastic(result) else {}),
+        **({"torsion": _torsion(result)} if is_twisted(result) else {}),
         "firing_intervals": list(result.final.engine.firing_intervals),
         **_phasing(result),
         "fidelity": {
@@ -201,6 +205,27 @@ def _modes(design: Evaluation) -> Record:
         "shapes": facts.modes.shapes.T.tolist(),
         **_of(facts, "main_orders=orders static_sag=sag mount_sag mean_torque_travel=torque_travel"),
         **_of(facts, "torque_roll_axis torque_roll_coupling"),
+    }
+
+
+def _torsion(result: Result) -> Record:
+    """Of the crankshaft as decided; speeds of the crank in rad/s."""
+    design, problem = result.final, result.problem
+    chain, reach = chain_of(design.engine), speed_range(result)
+    facts = torsion_of(design, *reach)
+    heat = [absorber_heat(design.engine, point, problem.fidelity) for point in problem.points]
+    return {
+        "discs": [_of(disc, "name inertia") for disc in chain.discs],
+        "sections": [_of(section, "name stiffness") for section in chain.sections],
+        "frequencies": _plain(facts.modes.frequencies),
+        "shapes": facts.modes.shapes.T.tolist(),
+        **_of(facts, "orders vector_sums=sums main_orders=main"),
+        "speeds": list(reach),
+        "critical_speeds": [_of(each, "speed order mode vector_sum main=is_main torque") for each in facts.criticals],
+        "barred": [_of(each, "limit lowest highest") for each in barred_ranges(result, design)],
+        "absorbers": [
+            {"name": each.name, "heat": [float(at[k]) for at in heat]} for k, each in enumerate(chain.absorbers)
+        ],
     }
 
 

@@ -9,6 +9,7 @@ from laufruhe.problem.evaluation import measured
 from laufruhe.problem.measure import Measure
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
 ONE, TWO = ("mean", "max", "rms"), ("mean before", "mean after", "change", "max before", "max after")
 
@@ -26,15 +27,16 @@ def _table(result: Result, places: Places) -> Grid:
         for k, point in enumerate(points)
         for name, *each in zip(names, *(measured(design, k, places.channel) for design in designs), strict=True)
     ]
-    scale = max((each[0].max for _, each in found), default=0.0)
-    rows = tuple((*lead, *_cells(each, scale)) for lead, each in found)
+    unit, factor = readable(places.channel.unit)
+    scale = factor * max((each[0].max for _, each in found), default=0.0)
+    rows = tuple((*lead, *_cells([one.times(factor) for one in each], scale)) for lead, each in found)
     at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
     note = f"The design as given has none: {result.initial.resonance}." if result.initial.resonance else ""
     if places.channel.adds_up:
         sums = [number(design.value(Measure(places.channel))) for design in designs]
         note = f"In sum {' before and '.join(sums)}{' after' if len(sums) > 1 else ''}, on average over the cycle."
     head = (*first, *(TWO if len(designs) > 1 else ONE))
-    return Grid(f"{places.title}{at} [{places.channel.unit}]", head, rows, note=note, left=len(first))
+    return Grid(f"{places.title}{at} [{unit}]", head, rows, note=note, left=len(first))
 
 
 def _cells(each: list[CycleMeasures], scale: float) -> list[str]:

@@ -1,0 +1,83 @@
+"""Natural modes of the crankshaft's twist, and the orders that meet them (V4, V6)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from laufruhe.physics.torsion import chain_of
+from laufruhe.plots.speed_axis import LIMIT, RPM, mark_points
+from laufruhe.plots.style import AFTER, FAINT, GREEN, INK, ORANGE, entry, entry_of_dots, headed, page
+from laufruhe.present.measures import changed
+from laufruhe.present.numbers import number
+from laufruhe.present.torsion import TorsionFacts, facts_of, is_twisted, speed_range
+from laufruhe.problem.channels.torsional import TORSIONAL_FREQUENCIES
+from laufruhe.solvers.result import Result
+
+MOST_MODES, LARGEST = 3, 11.0
+COLOURS = (AFTER, ORANGE, GREEN)
+applies = is_twisted
+
+
+def figure(result: Result) -> Figure:
+    """To the left how far each disc swings, to the right critical speeds, dots as large as their vector sums."""
+    low, high = speed_range(result)
+    facts = facts_of(result.final, low, high)
+    drawn = page(1, 2, (4.9, 3.6), gap=0.85)
+    shapes, speeds = drawn.panels
+    names = [disc.name for disc in chain_of(result.final.engine).discs]
+    _shapes(shapes, facts, names)
+    _speeds(speeds, result, facts, high)
+    count = min(MOST_MODES, len(facts.modes.frequencies))
+    legend: list[Artist] = [
+        entry(f"mode {m + 1}, {number(float(facts.modes.frequencies[m]))} Hz", color=COLOURS[m], linewidth=2.0)
+        for m in range(count)
+    ]
+    legend += [entry("main order", color=INK, linewidth=1.4), entry("other order", color=FAINT, linewidth=0.6)]
+    legend.append(entry_of_dots("vector sum of an order and mode", color=INK, markersize=6.0))
+    which = "of the design as decided" if changed(result) else "as given"
+    lines = f"Natural modes {which}, and where an order meets them: the larger the dot, the more cylinders add up."
+    return headed(drawn, result, "Torsional vibration of the crankshaft", lines, legend)
+
+
+def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
+    places = range(len(names))
+    axes.axhline(0.0, color=FAINT, linewidth=0.7)
+    for m in range(min(MOST_MODES, facts.modes.shapes.shape[1])):
+        axes.plot(places, facts.modes.shapes[:, m], "o-", color=COLOURS[m], linewidth=1.6, markersize=4.0)
+    axes.set(ylim=(-1.1, 1.1), ylabel="swing, the largest one")
+    axes.set_xticks(list(places), names, rotation=60, ha="right", size=7.5)
+
+
+def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> None:
+    shown = [float(f) for f in facts.modes.frequencies[:MOST_MODES]]
+    bands = [l.outside for l in result.problem.limits if l.measure.channel is TORSIONAL_FREQUENCIES and l.outside]
+    reach = 1.12 * max([shown[0], *(f for f in shown if f <= max(facts.orders) * high / math.tau), *sum(bands, ())])
+    for band in bands:
+        axes.axhspan(*band, color=LIMIT, alpha=0.13, linewidth=0)
+    for order in facts.orders:
+        is_main = order in facts.main
+        look: Any = {"color": INK, "linewidth": 1.4} if is_main else {"color": FAINT, "linewidth": 0.6}
+        axes.plot([0.0, high * RPM], [0.0, order * high / math.tau], **look, zorder=1)
+        # its name where it leaves the panel
+        top = min(high, math.tau * reach / order)
+        if is_main or (order == int(order) and order <= 6):
+            across, up = top * RPM, order * top / math.tau
+            at_top = top < high
+            axes.annotate(f"{order:g}", (across, up), (0 if at_top else 3, 2 if at_top else 0), size=7.5, color=INK,
+                          textcoords="offset points", ha="center" if at_top else "left",
+                          va="bottom" if at_top else "center", annotation_clip=False)  # fmt: skip
+    largest = float(facts.sums.max()) or 1.0
+    for m, frequency in enumerate(shown):
+        axes.axhline(frequency, color=COLOURS[m], linewidth=1.3)
+        for k, order in enumerate(facts.orders):
+            speed = math.tau * frequency / order
+            if speed <= high:
+                size = LARGEST * math.sqrt(float(facts.sums[k, m]) / largest)
+                axes.plot(speed * RPM, frequency, "o", color=COLOURS[m], markersize=size, zorder=5, alpha=0.85)
+    mark_points(axes, result, 0.02)
+    axes.set(xlim=(0.0, high * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")

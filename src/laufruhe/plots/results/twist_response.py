@@ -1,0 +1,52 @@
+"""Torque in the sections of the crankshaft over its speed, and where a limit bars it (V8)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from laufruhe.physics.torsion import chain_of
+from laufruhe.plots.speed_axis import LIMIT, RPM, mark_points
+from laufruhe.plots.style import FAINT, entry, headed, page, series_of
+from laufruhe.present.numbers import number
+from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range, speeds_between, torque_over_speed
+from laufruhe.solvers.result import Result
+
+applies = is_twisted
+# heights beyond this many times the median peak are cut off: resonances that hardly anything damps
+MOST = 40.0
+
+
+def figure(result: Result) -> Figure:
+    """Half of the peak to peak torque: thick in the section that has most, thin in all others of the last design."""
+    low, high = speed_range(result)
+    speeds = speeds_between(result.final, low, high)
+    drawn = page(1, 1, (7.4, 3.6))
+    (axes,) = drawn.panels
+    series = series_of(result)
+    found = [torque_over_speed(one.design, speeds) for one in series]
+    for each in found[-1].T:
+        axes.plot(speeds * RPM, each, color=FAINT, linewidth=0.6, alpha=0.7, zorder=1.5)
+    legend: list[Artist] = []
+    names = [section.name for section in chain_of(result.final.engine).sections]
+    for one, torque in zip(series, found, strict=True):
+        largest = torque.max(axis=1)
+        axes.plot(speeds * RPM, largest, color=one.colour, linewidth=1.8)
+        k = int(np.argmax(np.where(np.isfinite(largest), largest, 0.0)))
+        worst = f": at most {number(float(largest[k]), 3)} N m at {number(speeds[k] * RPM, 3)} rpm"
+        legend.append(one.entry(f"{worst}, {names[int(np.argmax(torque[k]))]}"))
+    legend.append(entry("each section", color=FAINT, linewidth=0.6))
+    bars = barred_ranges(result, result.final)
+    for each in bars:
+        axes.axvspan(each.lowest * RPM, each.highest * RPM, color=LIMIT, alpha=0.13, linewidth=0)
+    legend += [Patch(facecolor=LIMIT, alpha=0.13, label="barred by a limit")] if bars else []
+    whole = np.concatenate([torque.max(axis=1) for torque in found])
+    finite = whole[np.isfinite(whole)]
+    top = min(float(finite.max(initial=1.0)), MOST * float(np.median(finite)) if len(finite) else 1.0)
+    mark_points(axes, result, 0.98)
+    axes.set(xlim=(low * RPM, high * RPM), ylim=(0.0, 1.1 * top), xlabel="crank speed [rpm]",
+             ylabel="alternating torque [N m]")  # fmt: skip
+    lines = "Half of the peak to peak torque in the section that has most of it, steady at every speed."
+    return headed(drawn, result, "Twist of the crankshaft over speed", lines, legend)

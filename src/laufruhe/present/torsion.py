@@ -1,0 +1,216 @@
+"""What tables, files and pictures show of the twist of the crankshaft: modes, critical speeds, response over speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import OperatingPoint
+from laufruhe.physics.torsion import (
+    TorsionalModes,
+    chain_of,
+    critical_speed,
+    has_torsion,
+    main_orders,
+    natural_modes,
+    receptances,
+    section_stiffness,
+    shaft_torque,
+    throw_torques,
+    vector_sums,
+)
+from laufruhe.present.measures import Array
+from laufruhe.problem.channels.torsional import HIGHEST
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Limit, load_rows
+from laufruhe.solvers.result import Result
+
+SPEEDS = 120
+_SLOWEST, _FASTEST = 0.3, 1.25
+_HALVINGS = 10
+
+
+@dataclass(frozen=True)
+class Critical:
+    """Where an order meets a natural frequency.
+
+    Attributes
+    ----------
+    speed
+        Of the crank [rad/s].
+    mode
+        1 is the lowest.
+    vector_sum
+        Of this order and mode (V6).
+    is_main
+        Whether no firing order changes that.
+    torque
+        Largest amplitude of this order in any section at that speed [N m]; None where nothing damps it.
+    """
+
+    speed: float
+    order: float
+    mode: int
+    vector_sum: float
+    is_main: bool
+    torque: float | None
+
+
+@dataclass(frozen=True)
+class Barred:
+    """Speeds at which a limit of the twist is exceeded [rad/s]."""
+
+    limit: str
+    lowest: float
+    highest: float
+
+
+@dataclass(frozen=True, eq=False)
+class TorsionFacts:
+    """Of one design.
+
+    Attributes
+    ----------
+    modes
+        At the highest operating point, for the sake of pendulums.
+    orders, sums
+        All up to the highest that counts, and their vector sums, shape (orders, modes).
+    main
+        Main orders among them.
+    criticals
+        Between the speeds looked at, the largest torque first.
+    """
+
+    modes: TorsionalModes
+    orders: tuple[float, ...]
+    sums: Array
+    main: tuple[float, ...]
+    criticals: tuple[Critical, ...]
+
+
+def is_twisted(result: Result) -> bool:
+    """Whether the crankshaft of this result has discs and shafts."""
+    return has_torsion(result.problem.engine, result.problem.fidelity)
+
+
+def speed_range(result: Result) -> tuple[float, float]:
+    """Speeds looked at [rad/s]: those asked for, or from under to over the operating points."""
+    asked = chain_of(result.final.engine).speeds
+    speeds = [point.speed for point in result.problem.points]
+    return asked or (_SLOWEST * min(speeds), _FASTEST * max(speeds))
+
+
+@lru_cache(maxsize=8)
+def facts_of(design: Evaluation, low: float, high: float) -> TorsionFacts:
+    """Modes, vector sums and the critical speeds between two [rad/s]."""
+    engine, chain = design.engine, chain_of(design.engine)
+    fastest = max((loads.point for loads in design.loads), key=lambda point: point.speed)
+    modes, turns = natural_modes(chain, fastest.speed), engine.cycle.turns
+    orders = tuple(k / turns for k in range(1, int(HIGHEST * turns) + 1))
+    sums, main = vector_sums(engine, orders, modes), main_orders(engine, HIGHEST)
+    found = []
+    for m, frequency in enumerate(modes.frequencies):
+        for k, order in enumerate(orders):
+            speed = critical_speed(float(frequency), order)
+            if low <= speed <= high:
+                torque = _torque_there(design, replace(fastest, speed=speed), order)
+                found.append(Critical(speed, order, m + 1, float(sums[k, m]), order in main, torque))
+    found.sort(key=lambda each: -np.inf if each.torque is None else -each.torque)
+    return TorsionFacts(modes, orders, sums, main, tuple(found))
+
+
+def _torque_there(design: Evaluation, point: OperatingPoint, order: float) -> float | None:
+    """Amplitude of an order in the section that it loads most."""
+    chain, torques = chain_of(design.engine), throw_torques(design.engine, point, design.fidelity)
+    try:
+        flexible = receptances(chain, np.array([order]), point.speed)[0]
+    except ModelError:
+        return None
+    stiff = section_stiffness(chain, np.array([order]), point.speed)[0]
+    return float(np.abs(stiff * (flexible @ torques.at(order))).max())
+
+
+def speeds_between(design: Evaluation, low: float, high: float) -> Array:
+    """Even steps, and the critical speeds among them, where peaks stand."""
+    critical = [each.speed for each in facts_of(design, low, high).criticals]
+    return np.unique([*np.linspace(low, high, SPEEDS), *critical])
+
+
+def torque_over_speed(design: Evaluation, speeds: Array) -> Array:
+    """Half of the peak to peak torque in every section, shape (speeds, sections), of the point with most load."""
+    points = [loads.point for loads in design.loads]
+    means = [throw_torques(design.engine, point, design.fidelity).coefficients[0].real.sum() for point in points]
+    point = points[int(np.argmax(means))]
+    found = np.full((len(speeds), len(chain_of(design.engine).sections)), np.inf)
+    for k, speed in enumerate(speeds):
+        try:
+            torque = shaft_torque(design.engine, replace(point, speed=float(speed)), design.fidelity)
+        except ModelError:
+            continue
+        found[k] = 0.5 * np.ptp(torque.sample(design.samples), axis=0)
+    return found
+
+
+def barred_ranges(result: Result, design: Evaluation) -> tuple[Barred, ...]:
+    """Speeds at which the design would break a limit of its twist, each end found by halving."""
+    return _barred(design, result.problem.limits, *speed_range(result))
+
+
+@lru_cache(maxsize=8)
+def _barred(design: Evaluation, limits: tuple[Limit, ...], low: float, high: float) -> tuple[Barred, ...]:
+    found = []
+    for limit in limits:
+        if limit.measure.feels_order:
+            ranges = _ranges(_exceeds(design, limit), speeds_between(design, low, high))
+            found += [Barred(limit.name, *ends) for ends in ranges]
+    return tuple(found)
+
+
+def _exceeds(design: Evaluation, limit: Limit) -> Callable[[float], bool]:
+    """Whether the limit is broken at a speed, under the load of any point that counts."""
+    counted = [each for each in design.loads if limit.measure.counts_point(each.point)]
+    # points that differ in their speed alone are one
+    loads = {each.point.gas: each for each in counted}.values()
+
+    def at(speed: float) -> bool:
+        for each in loads:
+            point = replace(each.point, speed=speed)
+            try:
+                moved = PointLoads(point, each.wrench, None, None, design.engine, design.fidelity)
+                signals = [limit.measure.load.signal(moved)]
+            except ModelError:
+                return True
+            own = replace(limit.measure, points=None)
+            if load_rows(own, [point], signals, design.engine, design.samples).value > limit.maximum:
+                return True
+        return False
+
+    return at
+
+
+def _ranges(is_barred: Callable[[float], bool], speeds: Array) -> list[tuple[float, float]]:
+    state = [is_barred(float(speed)) for speed in speeds]
+    found: list[tuple[float, float]] = []
+    start = float(speeds[0]) if state[0] else None
+    for k in range(1, len(speeds)):
+        if state[k] != state[k - 1]:
+            edge = _edge(is_barred, float(speeds[k - 1]), float(speeds[k]), state[k])
+            if start is None:
+                start = edge
+            else:
+                found.append((start, edge))
+                start = None
+    return [*found, (start, float(speeds[-1]))] if start is not None else found
+
+
+def _edge(is_barred: Callable[[float], bool], low: float, high: float, after: bool) -> float:
+    """Where it changes between two speeds: the end that is barred, so that none is left out."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if is_barred(middle) == after else (middle, high)
+    return low if after else high

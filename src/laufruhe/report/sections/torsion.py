@@ -1,0 +1,69 @@
+"""Natural modes of the crankshaft's twist, the speeds at which orders meet them, and speeds that are barred."""
+
+from __future__ import annotations
+
+from laufruhe.present.measures import changed
+from laufruhe.present.numbers import DASH, number
+from laufruhe.present.torsion import TorsionFacts, barred_ranges, facts_of, is_twisted, speed_range
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import Result
+from laufruhe.units import readable
+
+MOST_MODES, MOST_CRITICALS = 4, 8
+RPM = readable("rad/s")[1]
+
+
+def tables(result: Result) -> list[Grid]:
+    """Modes, the critical speeds that twist it most, before and after, and barred ranges."""
+    if not is_twisted(result):
+        return []
+    reach = speed_range(result)
+    before, after = facts_of(result.initial, *reach), facts_of(result.final, *reach)
+    grids = [_modes(result, after)]
+    if changed(result):
+        return [*grids, _criticals(before, "as given"), _criticals(after, "as decided"), _barred(result)]
+    return [*grids, _criticals(after, "as given"), _barred(result)]
+
+
+def _modes(result: Result, facts: TorsionFacts) -> Grid:
+    chain = result.final.engine.torsion
+    names = [disc.name for disc in chain.discs] if chain is not None else []
+    shown = range(min(MOST_MODES, len(facts.modes.frequencies)))
+    rows = tuple(
+        (
+            f"{m + 1}",
+            number(float(facts.modes.frequencies[m])),
+            *(f"{swing:+.3f}" for swing in facts.modes.shapes[:, m]),
+        )
+        for m in shown
+    )
+    rest = len(facts.modes.frequencies) - len(shown)
+    more = f" {rest} higher one(s) are in result.json." if rest else ""
+    note = f"Undamped. Angle of every disc, the largest of each mode one.{more}"
+    return Grid("Natural modes of the crankshaft", ("mode", "Hz", *names), rows, note=note)
+
+
+def _criticals(facts: TorsionFacts, which: str) -> Grid:
+    rows = tuple(
+        (number(each.speed * RPM), f"{each.order:g}" + (" main" if each.is_main else ""), f"{each.mode}",
+         number(each.vector_sum, 3, 1.0), DASH if each.torque is None else number(each.torque))
+        for each in facts.criticals[:MOST_CRITICALS]
+    )  # fmt: skip
+    main = ", ".join(f"{order:g}" for order in facts.main)
+    note = (
+        f"The {len(rows)} that twist it most of {len(facts.criticals)} in the range looked at. Vector sum: swings "
+        f"of the throws, each when its cylinder fires, added up. Main orders ({main}) have the same for every firing "
+        "order. Torque: amplitude of that order in the section that it loads most."
+    )
+    head = ("rpm", "order", "mode", "vector sum", "torque [N m]")
+    return Grid(f"Critical speeds of the crankshaft {which}", head, rows, note=note)
+
+
+def _barred(result: Result) -> Grid:
+    rows = tuple(
+        (each.limit, f"{number(each.lowest * RPM)} to {number(each.highest * RPM)}")
+        for each in barred_ranges(result, result.final)
+    )
+    low, high = (number(speed * RPM) for speed in speed_range(result))
+    note = f"Between {low} and {high} rpm, with the load of the operating points: where the limit would be exceeded."
+    return Grid("Barred speed ranges", ("limit", "rpm"), rows, note=note)

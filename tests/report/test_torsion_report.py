@@ -1,0 +1,100 @@
+"""What tables, files and pictures say of the crankshaft's twist is what the physics gives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.physics.torsion import natural_modes, shaft_torque, vector_sums
+from laufruhe.plots import draw
+from laufruhe.present.torsion import torque_over_speed
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.report.json_result import as_dict
+from laufruhe.report.sections import tables_of
+from laufruhe.solvers.result import Result
+from problem_files import PROBLEMS
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return laufruhe.solve(laufruhe.load(PROBLEMS / "inline-five-torsion.toml"))
+
+
+@pytest.fixture(scope="module")
+def record(result: Result) -> dict:
+    return as_dict(result)
+
+
+def test_modes_and_critical_speeds(result: Result, record: dict) -> None:
+    found, engine = record["torsion"], result.final.engine
+    modes = natural_modes(engine.torsion)
+    assert found["frequencies"] == pytest.approx(modes.frequencies)
+    assert np.array(found["shapes"]) == pytest.approx(modes.shapes.T)
+    assert np.array(found["vector_sums"]) == pytest.approx(vector_sums(engine, found["orders"], modes))
+    assert found["main_orders"] == [2.5, 5.0, 7.5, 10.0]
+    low, high = found["speeds"]
+    expected = {
+        (order, m + 1): math.tau * f / order for m, f in enumerate(modes.frequencies) for order in found["orders"]
+    }
+    inside = {key: speed for key, speed in expected.items() if low <= speed <= high}
+    assert {(each["order"], each["mode"]): each["speed"] for each in found["critical_speeds"]} == pytest.approx(inside)
+    torques = [each["torque"] for each in found["critical_speeds"]]
+    assert torques == sorted(torques, reverse=True)
+    # the strongest one is what the response has in that order there
+    first = found["critical_speeds"][0]
+    there = shaft_torque(engine, replace(result.problem.points[1], speed=first["speed"]))
+    assert np.abs(there.at(first["order"])).max() == pytest.approx(first["torque"], rel=1e-9)
+
+
+def test_barred_ranges_end_where_the_limit_is_reached(result: Result, record: dict) -> None:
+    (limit,) = result.problem.limits
+    barred = record["torsion"]["barred"]
+    assert len(barred) == 5
+
+    def stress(speed: float) -> float:
+        points = tuple(replace(point, speed=speed) for point in result.problem.points)
+        problem = replace(result.problem, points=points, phasing=None, engine=result.final.engine)
+        return evaluate(problem).value(limit.measure)
+
+    for each in barred:
+        assert stress(0.5 * (each["lowest"] + each["highest"])) > limit.maximum
+    inner = barred[1]
+    for edge, way in ((inner["lowest"], -1.0), (inner["highest"], 1.0)):
+        assert stress(edge + 0.1 * way) < limit.maximum < stress(edge - 0.1 * way)
+    # the operating points themselves stand outside
+    speeds = [point.speed for point in result.problem.points]
+    assert not any(each["lowest"] <= speed <= each["highest"] for each in barred for speed in speeds)
+
+
+def test_torque_over_speed_is_that_of_the_points(result: Result) -> None:
+    point = result.problem.points[0]
+    (row,) = torque_over_speed(result.final, np.array([point.speed]))
+    values = shaft_torque(result.final.engine, point).sample(result.final.samples)
+    assert row == pytest.approx(0.5 * np.ptp(values, axis=0))
+
+
+def test_places_and_tables(result: Result, record: dict) -> None:
+    names = [each["name"] for each in record["shaft_torque"]]
+    assert names == [section.name for section in result.final.engine.torsion.sections]
+    assert record["shaft_stress"][1]["max"] == pytest.approx(
+        record["shaft_torque"][1]["max"] * 16.0 / (math.pi * 0.048**3), rel=1e-9
+    )
+    grids = {grid.title: grid for grid in tables_of(result)}
+    assert {
+        "Natural modes of the crankshaft",
+        "Critical speeds of the crankshaft as decided",
+        "Barred speed ranges",
+    } <= set(grids)
+    stress = grids["Shear stress of the crankshaft [N/mm^2]"]
+    assert float(stress.rows[0][-1]) < 100.0
+    assert "2.5, 5, 7.5, 10" in grids["Critical speeds of the crankshaft as decided"].note
+
+
+@pytest.mark.slow
+def test_pictures(result: Result, tmp_path: Path) -> None:
+    assert {"twist_modes.png", "twist_response.png"} <= set(draw(result, tmp_path))
