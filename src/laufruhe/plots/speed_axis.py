@@ -45,7 +45,7 @@ def order_entries(facts: MountingFacts, colour: str) -> list[Artist]:
 
 def limits_on(result: Result, channel: Channel) -> list[Limit]:
     """Limits of the problem on one channel."""
-    return [limit for limit in result.problem.mount_limits if limit.measure.channel is channel]
+    return [limit for limit in result.problem.limits if limit.measure.channel is channel]
 
 
 def mark_points(axes: Axes, result: Result, share: float) -> None:

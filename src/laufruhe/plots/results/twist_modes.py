@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from laufruhe.physics.torsion import chain_of
-from laufruhe.plots.speed_axis import LIMIT, RPM, mark_points
+from laufruhe.plots.speed_axis import LIMIT, RPM, limits_on, mark_points
 from laufruhe.plots.style import AFTER, FAINT, GREEN, INK, ORANGE, entry, entry_of_dots, headed, page
 from laufruhe.present.measures import changed
 from laufruhe.present.numbers import number
@@ -55,7 +55,7 @@ def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
 
 def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> None:
     shown = [float(f) for f in facts.modes.frequencies[:MOST_MODES]]
-    bands = [l.outside for l in result.problem.limits if l.measure.channel is TORSIONAL_FREQUENCIES and l.outside]
+    bands = [limit.outside for limit in limits_on(result, TORSIONAL_FREQUENCIES) if limit.outside is not None]
     reach = 1.12 * max([shown[0], *(f for f in shown if f <= max(facts.orders) * high / math.tau), *sum(bands, ())])
     for band in bands:
         axes.axhspan(*band, color=LIMIT, alpha=0.13, linewidth=0)
