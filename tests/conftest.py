@@ -8,6 +8,8 @@ import pytest
 from hypothesis import settings
 from hypothesis.configuration import set_hypothesis_home_dir
 
+import shared
+
 # Tests run in a process for each core: none of them starts further ones unless it says how many.
 if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "sched_getaffinity"):
     os.sched_getaffinity = lambda _: {0}
@@ -28,12 +30,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     wanted = bool(config.getoption("--long"))
-    left_out = [item for item in items if (item.get_closest_marker("long") is not None) != wanted]
-    items[:] = [item for item in items if item not in set(left_out)]
-    config.hook.pytest_deselected(items=left_out)
+    sorted_out: dict[bool, list[pytest.Item]] = {True: [], False: []}
+    for item in items:
+        sorted_out[(item.get_closest_marker("long") is not None) == wanted].append(item)
+    items[:] = sorted_out[True]
+    config.hook.pytest_deselected(items=sorted_out[False])
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    shared.prepare(config)
     # Hypothesis keeps tables beside the tests unless told where; nothing may stay behind.
     home = tempfile.TemporaryDirectory(prefix="hypothesis-")
     set_hypothesis_home_dir(Path(home.name))

@@ -85,7 +85,7 @@ def test_direction_of_time(seed: int) -> None:
     _same(_changed(problem, parts, rotors, mounts), problem)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", first_fast(range(60), 8, long=range(15, 60)))
 @pytest.mark.parametrize(
     ("mass", "length", "time"),
     [(1e6, 1.0, 1.0), (1e-6, 1.0, 1.0), (1.0, 1e6, 1.0), (1.0, 1e-6, 1.0), (1.0, 1.0, 1e6), (1.0, 1.0, 1e-6),

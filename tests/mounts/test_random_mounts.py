@@ -11,7 +11,17 @@ from lanes import first_fast
 from mounts.random_mounts import FAMILIES, complaints, drawn_problem
 
 CASES = list(itertools.product(range(100, 103), FAMILIES))
-LONG = [(100, "gas"), (100, "four"), (100, "tied"), (100, "joint"), (100, "one"), (101, "lossy"), (101, "tied")]
+LONG = [
+    (100, "gas"),
+    (100, "four"),
+    (100, "tied"),
+    (100, "joint"),
+    (100, "one"),
+    (101, "lossy"),
+    (101, "tied"),
+    (102, "gas"),
+    (102, "lossy"),
+]
 
 
 @pytest.mark.parametrize(("seed", "family"), first_fast(CASES, 3, LONG))

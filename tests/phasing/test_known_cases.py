@@ -117,7 +117,7 @@ COUPLES = [
         (9, ()),
         (10, ()),
         (11, (pytest.mark.slow,)),
-        (12, (pytest.mark.slow,)),
+        (12, (pytest.mark.long if cycle is Cycle.TWO_STROKE else pytest.mark.slow,)),
     )
 ]
 

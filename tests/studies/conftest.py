@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import pickle
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -11,10 +11,12 @@ from typing import Any
 import pytest
 import xarray as xr
 
+from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.replication.expressions import value_of
-from laufruhe.studies.scenes import Scenes
+from laufruhe.studies.runner import run
+from shared import once
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 
@@ -24,19 +26,43 @@ def parts_of(file: str) -> dict[str, Replication]:
     return {part.name: part for part in load_study(PROBLEMS / f"{file}.toml").study.parts}  # type: ignore[misc]
 
 
+def shared_part(file: str, name: str) -> Path:
+    """Folder of the finished points of one part, and its dataset, which one process of the tests has computed."""
+
+    def fill(folder: Path) -> None:
+        study = load_study(PROBLEMS / f"{file}.toml")
+        alone = study.study.model_copy(update={"parts": [parts_of(file)[name]]})
+        data = run(study.model_copy(update={"study": alone}), PROBLEMS, folder / KEPT)[0][name]
+        (folder / "data").write_bytes(pickle.dumps(data))
+
+    return once(f"{file}-{name}", fill)
+
+
 @cache
 def computed(file: str, name: str) -> xr.Dataset:
-    part, scenes = parts_of(file)[name], Scenes(PROBLEMS)
-    points = part.points(scenes)
-    # what is kept on disk between two runs is JSON
-    records = [json.loads(json.dumps(part.answer(point, scenes))) for point in points]
-    return part.dataset(points, records)
+    found: xr.Dataset = pickle.loads((shared_part(file, name) / "data").read_bytes())
+    return found
 
 
 @pytest.fixture(scope="session")
 def figure() -> Callable[[str], xr.Dataset]:
     """Dataset of a figure of the tractor study."""
     return lambda name: computed("tractor-study", name)
+
+
+@pytest.fixture(scope="session")
+def finished() -> Callable[[str, Path], None]:
+    """Put the finished points of a whole replication into a folder: its command goes on from there."""
+
+    def fill(file: str, folder: Path) -> None:
+        folder.mkdir(parents=True)
+        for part in parts_of(file):
+            points = shared_part(file, part) / KEPT
+            if points.exists():
+                with (folder / KEPT).open("ab") as kept:
+                    kept.write(points.read_bytes())
+
+    return fill
 
 
 @pytest.fixture(scope="session")

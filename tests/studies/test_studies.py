@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -335,9 +335,12 @@ def test_two_stroke_shaft_is_the_closed_form(star: str, root: float, second: boo
 
 
 @pytest.mark.slow
-def test_every_figure_and_statement_is_on_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_figure_and_statement_is_on_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, finished: Callable[[str, Path], None]
+) -> None:
     """The whole study by its command: a picture and a dataset a figure, and the list of statements."""
     monkeypatch.chdir(tmp_path)
+    finished("tractor-study", tmp_path / "results" / "tractor-study")
     answer = CliRunner().invoke(app, ["study", str(PROBLEMS / "tractor-study.toml")])
     assert answer.exit_code == 0, answer.output
     folder = tmp_path / "results" / "tractor-study"
