@@ -64,7 +64,7 @@ def shares(rng: np.random.Generator, count: int) -> np.ndarray:
 
 def grid_of(points: np.ndarray, steps: int) -> Grid:
     """Rows of (points, places, steps) in that order."""
-    return Grid(np.repeat(points, PLACES * steps) / (PLACES * steps), steps)
+    return Grid(np.repeat(points, PLACES * steps) / (PLACES * steps), steps, points=len(points))
 
 
 def sampled(signals: list[Spectrum], steps: int) -> np.ndarray:
@@ -245,6 +245,12 @@ class TestForms:
         heads = np.zeros(len(cones.value))
         for head, size in zip(cones.head, sizes, strict=True):
             heads[head] = max(heads[head], size)
+        if cones.under is not None:
+            # the heads over others are as large as what stands under them
+            row, head, factor = cones.under
+            for top in set(head[factor < 0.0]):
+                sums = np.bincount(row, np.where(head == top, 0.0, factor * heads[head]))
+                heads[top] = float((sums / -np.bincount(row, np.where(head == top, factor, 0.0))).max())
         assert (cones.value >= 0.0).all()
         exact = norm.value(one_signal(weights), v)
         rounding = (1e-6, 1e-6) if cones.centred else (ROUNDING, 1e-300)
@@ -329,7 +335,7 @@ class TestDualRows:
     def test_spread_rows_stay_in_the_dual_ball(self, norm: Norm, seed: int, times: int) -> None:
         grid, signals, rng = scene(seed)
         z = norm.dual_feasible(grid, rng.standard_normal((len(grid.weights), 2)) * 10.0 ** rng.uniform(-2, 2))
-        fine = Grid(np.repeat(grid.weights / times, times), grid.steps * times)
+        fine = Grid(np.repeat(grid.weights / times, times), grid.steps * times, points=grid.points)
         spread = norm.spread(z, grid.steps, times)
         assert spread.shape == (len(fine.weights), 2)
         assert norm.dual_norm(fine, spread) <= norm.dual_norm(grid, z) * (1.0 + ROUNDING)
@@ -346,7 +352,7 @@ class TestDualRows:
         grid, signals, _ = scene(seed)
         z = norm.spread(norm.subgradient(grid, sampled(signals, grid.steps)), grid.steps, 4)
         v = sampled(signals, 4 * grid.steps)
-        whole = norm.value(Grid(np.repeat(grid.weights / 4, 4), 4 * grid.steps), v)
+        whole = norm.value(Grid(np.repeat(grid.weights / 4, 4), 4 * grid.steps, points=grid.points), v)
         assert float((z * v).sum()) <= whole * (1.0 + 1e-10)
 
 
@@ -395,3 +401,31 @@ class TestWeightless:
 
     def test_a_maximum_has_no_weights(self) -> None:
         assert NORMS["maximum"].dual_norm(Grid(np.zeros(2), 1), np.array([[3.0], [4.0]])) == 7.0
+
+
+class TestWorstMean:
+    """What operating points make of it: groups, whose shares the dual rows tell."""
+
+    @given(SEEDS)
+    def test_it_is_the_largest_of_the_means(self, seed: int) -> None:
+        grid, signals, rng = scene(seed)
+        v = sampled(signals, grid.steps)
+        blocks = np.split(v, grid.points)
+        assert NORMS["worst mean"].value(grid, v) == pytest.approx(
+            max(lengths(own).mean() for own in blocks), rel=1e-12
+        )
+        # its dual adds up what each mean has alone
+        z = rng.standard_normal(v.shape)
+        alone = sum(len(own) * lengths(own).max() for own in np.split(z, grid.points))
+        assert NORMS["worst mean"].dual_norm(grid, z) == pytest.approx(alone, rel=1e-12)
+
+    @given(SEEDS)
+    def test_its_cones_hold_every_point(self, seed: int) -> None:
+        grid, signals, _ = scene(seed)
+        v = sampled(signals, grid.steps)
+        cones = NORMS["worst mean"].cones(grid)
+        heads = np.append(lengths(v), NORMS["worst mean"].value(grid, v))
+        row, head, factor = cones.under
+        sums = np.bincount(row, factor * heads[head])
+        assert sums.max() == pytest.approx(0.0, abs=1e-12 * heads.max())
+        assert len(sums) == grid.points

@@ -65,7 +65,7 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity
                 rows = rows @ ca.diag(ca.DM(list(quantity.direction_weights)))
             blocks.append(rows)
             weights += [point.weight / whole / len(mounts) / samples] * samples
-    return ca.vertcat(*blocks), Grid(np.array(weights), samples)
+    return ca.vertcat(*blocks), Grid(np.array(weights), samples, points=len(chosen))
 
 
 def transmitted(points: Sequence[PointResponse], quantity: Measure) -> list[tuple[Any, Any]]:

@@ -118,7 +118,7 @@ class UnevenModel:
                 values = [values[0] @ ca.DM(m.real).T for m in self._maps(measure, 0.0, point)]
             blocks += values
             weights.append(np.full(len(values) * steps, point.weight / whole / len(values) / steps))
-        return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps)
+        return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps, points=len(chosen))
 
     def _signal(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
         """What a channel has of each mount, or of the block."""

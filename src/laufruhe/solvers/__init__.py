@@ -12,6 +12,7 @@ from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import Listener, listening
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
@@ -116,8 +117,23 @@ def _asks_block(problem: Problem) -> bool:
     return _asks_loads(problem) and _nothing_inside(problem)
 
 
+def _adds_points(problem: Problem) -> bool:
+    """Whether no norm takes operating points as groups: boxes, stars and smooth programs know none such."""
+    return not any(measure.is_load and measure.norm.joins_points for measure in problem.measures)
+
+
+def _asks_stars(problem: Problem) -> bool:
+    """Whether stars may be told apart by all that is asked: by loads, and by masses."""
+    wheel = any(measure.channel.is_flywheel for measure in problem.measures)
+    return _asks_loads(problem) and _adds_points(problem) and not wheel
+
+
 def _nothing_inside(problem: Problem) -> bool:
-    return not any(measure.is_inside or measure.channel.is_flywheel for measure in problem.measures)
+    return _adds_points(problem) and not any(map(_is_inside, problem.measures))
+
+
+def _is_inside(measure: Measure) -> bool:
+    return measure.is_inside or measure.channel.is_flywheel
 
 
 def _asks_loads(problem: Problem) -> bool:
@@ -132,10 +148,10 @@ METHODS: tuple[Method, ...] = (
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_unbalances)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_block, Reach.WHOLE, _places),
-    Method("stars, each with cones", frozenset({_S, _U}), _asks_loads, Reach.WHOLE, _stars),
+    Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
-    Method("smooth program, boxes of stiffness", frozenset({_K}), lambda _: True, Reach.NEAR, _smooth),
-    Method("smooth program", frozenset({_U, _K, _M}), lambda _: True, Reach.ASIDE, _smooth),
+    Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _smooth),
+    Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _smooth),
     Method("flywheel and the rest apart", frozenset(Kind) - {_S}, lambda problem: bool(problem.flywheel_decisions),
            Reach.ASIDE, _apart),
     Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _nothing_inside, Reach.ASIDE,

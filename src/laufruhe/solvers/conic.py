@@ -241,6 +241,11 @@ def _program(
     for (maximum, _), block in zip(problem.limits, blocks[len(problem.terms) :], strict=True):
         rows.add(0, np.arange(columns)[block.heads], block.cones.value, np.array([maximum / block.unit]))
         rows.cones.append(clarabel.NonnegativeConeT(1))
+    for block in blocks:
+        if block.cones.under is not None:
+            at, heads, factors = block.cones.under
+            rows.add(at, block.first + heads, factors, np.zeros(int(at.max()) + 1))
+            rows.cones.append(clarabel.NonnegativeConeT(int(at.max()) + 1))
     starts = [_add_norm(rows, block, problem) for block in blocks]
     cost = np.zeros(columns)
     for (weight, _), block in zip(problem.terms, blocks, strict=False):

@@ -42,11 +42,14 @@ class Grid:
     bends
         The last rows of every signal, at angles where it bends; those before follow each other at equal steps of its
         period.
+    points
+        Operating points, each with as many rows, one behind the other.
     """
 
     weights: Array
     steps: int
     bends: int = 0
+    points: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,8 @@ class Cones:
         Whether one cone holds all rows; else each row has its own.
     centred
         Whether the rows of every signal are counted from a vector that is free.
+    under
+        Linear functions of the heads that are at most zero: their numbers, heads and factors, shapes (n,).
     """
 
     value: Array
@@ -72,6 +77,7 @@ class Cones:
     factors: Array
     whole: bool = False
     centred: bool = False
+    under: tuple[NDArray[np.intp], NDArray[np.intp], Array] | None = None
 
 
 class SmoothProgram(Protocol):
@@ -106,6 +112,9 @@ class Norm(ABC):
         Whether it is the length of the longest row, so that under a limit each row keeps it by itself.
     of_row_lengths
         Whether nothing but the lengths of the rows matters, wherever they stand.
+    joins_points
+        Whether it is more than a weighted sum, or the largest, of what every row alone says: operating points count
+        as groups.
     """
 
     name: ClassVar[str]
@@ -115,6 +124,7 @@ class Norm(ABC):
     sums_lengths: ClassVar[bool] = False
     is_largest: ClassVar[bool] = False
     of_row_lengths: ClassVar[bool] = True
+    joins_points: ClassVar[bool] = False
 
     def __repr__(self) -> str:
         return f"<{self.name}>"

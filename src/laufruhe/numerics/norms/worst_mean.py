@@ -1,0 +1,136 @@
+"""max_p mean_p |v_k|: the mean over the cycle and the places, at the operating point where it is largest.
+
+A largest of norms is a norm, so what is proven of a mean is proven of it. Weights of operating points do not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from laufruhe.numerics.norms.mean import Mean, between
+from laufruhe.numerics.norms.norm import (
+    Array,
+    Cones,
+    Grid,
+    Norm,
+    OrderBounds,
+    SmoothProgram,
+    lengths,
+    softened_lengths,
+)
+from laufruhe.numerics.spectrum import Spectrum
+
+_MEAN = Mean()
+
+
+class WorstMean(Norm):
+    """The largest mean of any operating point."""
+
+    name = "worst mean"
+    averages = True
+    of_row_lengths = False
+    joins_points = True
+
+    def value(self, grid: Grid, rows: Array) -> float:
+        """max_p mean_p |v_k|."""
+        return float(self._means(grid, rows).max(initial=0.0))
+
+    def subgradient(self, grid: Grid, rows: Array) -> Array:
+        """That of the mean at the worst operating point."""
+        means, z = self._means(grid, rows), np.zeros_like(rows)
+        if len(means):
+            own = slice(int(np.argmax(means)) * _size(grid), (int(np.argmax(means)) + 1) * _size(grid))
+            z[own] = _MEAN.subgradient(Grid(_shares(grid)[own], grid.steps), rows[own])
+        return z
+
+    def dual_norm(self, grid: Grid, z: Array) -> float:
+        """sum_p max_k |z_k| / w_k, weights of every operating point adding up to one."""
+        return float(self._prices(grid, z).sum())
+
+    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+        """The design's own directions, by the solver's shares of the operating points."""
+        size, shares = lengths(rows), _shares(grid)
+        prices = np.repeat(self._prices(grid, z), _size(grid))
+        small = size <= 1e-6 * float(size.max(initial=0.0))
+        along = rows * (prices * shares / np.where(size > 0.0, size, 1.0))[:, None]
+        return np.where(small[:, None], z, along)
+
+    def spread(self, z: Array, steps: int, times: int) -> Array:
+        """Straight from angle to angle."""
+        return between(z, steps, times)
+
+    def cones(self, grid: Grid) -> Cones:
+        """A head for each row, and one over the mean of every operating point."""
+        count, size = len(grid.weights), _size(grid)
+        point = np.arange(count) // size
+        value = np.zeros(count + 1)
+        value[-1] = 1.0
+        under = (
+            np.concatenate([point, np.arange(grid.points)]),
+            np.concatenate([np.arange(count), np.full(grid.points, count)]),
+            np.concatenate([_shares(grid), np.full(grid.points, -1.0)]),
+        )
+        return Cones(value, np.arange(count), np.ones(count), under=under)
+
+    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+        """A variable that no mean of softened lengths exceeds (E22)."""
+        import casadi as ca
+
+        weights = ca.DM(_shares(grid).reshape(grid.points, _size(grid)))
+        softened = softened_lengths(rows, share * unit) / unit
+        means = ca.sum2(weights * ca.reshape(softened, _size(grid), grid.points).T)
+        top = program.head(ca.mmax(means))
+        program.hold(means - top)
+        return top * unit
+
+    def limited(
+        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+    ) -> tuple[Any, float, float]:
+        """The same variable."""
+        return self.least(program, grid, rows, 1.0, share), most, 1.0
+
+    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+        """The largest of what the means do not exceed."""
+        return max((_MEAN.above([own], np.ones(1)) for own in _counted(signals, shares)), default=0.0)
+
+    def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
+        """No more than that of the mean which is off most."""
+        errors = (_MEAN.sampling_bound([own], np.ones(1), steps, finest) for own in _counted(signals, shares))
+        return max(errors, default=0.0)
+
+    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
+        """The largest of what the means are not under."""
+        one = np.ones(1)
+        pairs = zip(squares, roots, shares, strict=True)
+        return max((_MEAN.least_of_orders([s], [r], one) for s, r, share in pairs if share > 0.0), default=0.0)
+
+    def _means(self, grid: Grid, rows: Array) -> Array:
+        return np.asarray((_shares(grid) * lengths(rows)).reshape(grid.points, _size(grid)).sum(axis=1))
+
+    def _prices(self, grid: Grid, z: Array) -> Array:
+        """Of every operating point the dual norm of a mean of its own."""
+        blocks = zip(
+            _shares(grid).reshape(grid.points, _size(grid)),
+            z.reshape(grid.points, _size(grid), z.shape[-1]),
+            strict=True,
+        )
+        return np.array([_MEAN.dual_norm(Grid(shares, grid.steps), own) for shares, own in blocks])
+
+
+def _size(grid: Grid) -> int:
+    """Rows of one operating point."""
+    return len(grid.weights) // grid.points
+
+
+def _shares(grid: Grid) -> Array:
+    """Weights of which those of every operating point add up to one, shape (k,)."""
+    blocks = grid.weights.reshape(grid.points, _size(grid))
+    whole = blocks.sum(axis=1, keepdims=True)
+    return np.asarray(blocks / np.where(whole > 0.0, whole, 1.0)).reshape(-1)
+
+
+def _counted(signals: Sequence[Spectrum], shares: Array) -> list[Spectrum]:
+    return [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
