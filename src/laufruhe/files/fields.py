@@ -216,6 +216,7 @@ OpenInertia: TypeAlias = Annotated[float | Open, Number("kg m^2", above=0.0, ope
 Density: TypeAlias = Annotated[float, Number("kg/m^3", above=0.0)]
 Pressure: TypeAlias = Annotated[float, Number("Pa")]
 PositivePressure: TypeAlias = Annotated[float, Number("Pa", above=0.0)]
+PositiveTorque: TypeAlias = Annotated[float, Number("N m", above=0.0)]
 Angle: TypeAlias = Annotated[float, Number("rad", plain=_DEG)]
 OpenAngle: TypeAlias = Annotated[float | Open, Number("rad", plain=_DEG, openable=True)]
 Speed: TypeAlias = Annotated[float, Number("rad/s", above=0.0)]

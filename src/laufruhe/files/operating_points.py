@@ -13,6 +13,7 @@ from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, all_different, one_of
 from laufruhe.files.fields import Name, Table
+from laufruhe.files.friction import Brake
 from laufruhe.machine import Cycle, OperatingPoint, PressureTrace
 from laufruhe.machine.gas import GasModel
 from laufruhe.physics.seiliger_cycle import motored_cycle
@@ -28,6 +29,8 @@ class OperatingPointTable(Table):
     speed: f.Speed | None = None
     mean_piston_speed: f.PistonSpeed | None = None
     imep: f.Pressure | None = f.told("In place of that of [gas].")
+    bmep: f.PositivePressure | None = f.told("At the brake; [friction] makes imep of it, and of what it may be off.")
+    brake_torque: f.PositiveTorque | None = f.told("In place of bmep.")
     motored: bool = f.told("The charge is compressed and gets no heat.", False)
     gas: bool = f.told("false leaves the gas out altogether.", True)
     up_to: f.Speed | None = f.told("Last speed of a range that starts at speed.")
@@ -36,7 +39,7 @@ class OperatingPointTable(Table):
 
 
 def operating_points(
-    tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float
+    tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float, brake: Brake | None = None
 ) -> tuple[OperatingPoint, ...]:
     """Speeds and loads of an engine whose gas, where a point says no other, is this."""
     points = []
@@ -46,7 +49,11 @@ def operating_points(
         for speed in speeds:
             at = units.shown(speed, "rad/s", 6)
             name = (f"{table.name} {at}" if len(speeds) > 1 else table.name) if table.name else at
-            points.append(OperatingPoint(name, speed, _loaded(gas, table, cycle, where), table.weight / len(speeds)))
+            loads = _loads(table, speed, brake, where, name)
+            for said, imep in loads:
+                load = _loaded(gas, table.model_copy(update={"imep": imep}), cycle, where)
+                share = table.weight / len(speeds) / len(loads)
+                points.append(OperatingPoint(f"{name}{said}", speed, load, share))
     if len(points) > MOST_POINTS:
         rule = f"makes {len(points)} operating points, more than {MOST_POINTS}"
         raise Refused("operating_points", None, rule, "take wider steps, or sweep the speed in a study")
@@ -68,6 +75,26 @@ def _speeds(table: OperatingPointTable, stroke: float, where: str) -> tuple[floa
         value = units.shown(table.up_to, "rad/s")
         raise Refused(f"{where}.up_to", value, "does not lie above the first speed", "give a higher one")
     return tuple(first + (table.up_to - first) * k / (table.steps - 1) for k in range(table.steps))
+
+
+def _loads(
+    table: OperatingPointTable, speed: float, brake: Brake | None, where: str, name: str
+) -> list[tuple[str, float | None]]:  # fmt: skip
+    """What the load adds to the name, and the indicated mean pressure: of one at the brake as friction may be."""
+    given = [key for key in ("imep", "bmep", "brake_torque") if getattr(table, key) is not None]
+    if len(given) > 1 or (table.motored and given[1:]):
+        raise Refused(f"{where}.{given[0]}", None, f"is given beside {given[1]}", "keep one")
+    if table.bmep is None and table.brake_torque is None:
+        return [("", table.imep)]
+    if brake is None:
+        raise Refused(f"{where}.{given[0]}", None, "needs [friction]", "say what is lost between gas and brake")
+    if table.motored or not table.gas:
+        raise Refused(f"{where}.{given[0]}", None, "goes with an engine that burns fuel", "leave it out")
+    bmep = table.bmep if table.bmep is not None else brake.pressure(table.brake_torque or 0.0)
+    least, middle, largest = brake.indicated(bmep, speed, name)
+    if least == largest:
+        return [("", middle)]
+    return [(", least load", least), (", mean load", middle), (", most load", largest)]
 
 
 def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, where: str) -> GasModel | None:

@@ -15,6 +15,7 @@ from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.fields import Table
 from laufruhe.files.flywheel import FlywheelTable
+from laufruhe.files.friction import FrictionTable
 from laufruhe.files.gas import GasTable
 from laufruhe.files.mounts import BlockTable, MountsTable
 from laufruhe.files.operating_points import OperatingPointTable
@@ -46,6 +47,7 @@ class ProblemFile(Table):
     phasing: PhasingTable | None = None
     operating_points: list[OperatingPointTable] = Field(min_length=1)
     gas: GasTable | None = None
+    friction: FrictionTable | None = None
     mounts: MountsTable | None = None
     block: BlockTable | None = None
     main_bearings: list[MainBearingTable] = Field(default_factory=list)

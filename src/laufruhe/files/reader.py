@@ -21,6 +21,7 @@ from laufruhe.files.complaints import Refused, complaints_of, key_path
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import flywheel_of
+from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of
 from laufruhe.files.mounts import mounts_of
 from laufruhe.files.operating_points import operating_points
@@ -28,7 +29,7 @@ from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.torsion import torsion_of
-from laufruhe.machine import Engine
+from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem, Search
@@ -171,7 +172,8 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
     chain = torsion_of(file.torsion, cylinders, throws)
     engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel)
-    points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke)
+    brake = _brake(file, cylinders, cycle, path.parent)
+    points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke, brake)
     scene, decisions = Scene(engine, points), (*collected.decisions, *found.decisions, *of_wheel)
     objective = objective_of(file.objective, scene)
     _check_decided(decisions)
@@ -186,12 +188,25 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         objective=objective,
         limits=limits_of(file.constraints, scene),
         source=file.source,
-        assumptions=tuple(file.assumptions),
+        assumptions=(*file.assumptions, *(brake.said if brake else ())),
         tolerance=file.tolerance,
         mount_numbers=found.numbers,
         search=Search(**file.search.model_dump()),
     )
     return at_fidelity(problem, file.fidelity)
+
+
+def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:
+    """What makes indicated loads of those at the brake."""
+    if file.friction is None:
+        return None
+    if not any(point.bmep is not None or point.brake_torque is not None for point in file.operating_points):
+        raise Refused(
+            "friction", None, "serves no operating point", "give one a bmep or a brake_torque, or leave it out"
+        )
+    if any(part.bore is None for part in cylinders):
+        raise Refused("engine.bore", None, "is missing, and a load at the brake is over the displacement", "add it")
+    return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
 
 
 def _check_decided(decisions: Sequence[Decision]) -> None:

@@ -1,0 +1,43 @@
+"""Rows of numbers in a CSV file beside a problem."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from laufruhe.files.complaints import Refused
+
+MOST_ROWS = 100_000
+
+
+def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[tuple[float, ...]]:
+    """The numbers of a file's first columns, whose names a complaint about `key` tells.
+
+    Columns are parted by commas, semicolons or tabs; beside the latter two a comma may
+    be the decimal sign. The first row may be a heading, rows that begin with # are notes.
+    """
+    beside, many = "give a CSV file beside the problem", "pair" if len(columns) == 2 else "row"
+    try:
+        if path.exists() and not path.is_file():
+            raise Refused(key, file, "is no file", beside)
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, ValueError) as error:
+        why = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
+        raise Refused(key, file, f"cannot be read ({why})", beside) from None
+    parted_by = next((sign for sign in ";\t" if sign in text), ",")
+    rows: list[tuple[float, ...]] = []
+    heading = True
+    for number, line in enumerate(text.splitlines(), 1):
+        cells = [cell.strip().strip('"') for cell in line.split(parted_by)]
+        if not line.strip() or cells[0].startswith("#"):
+            continue
+        try:
+            told = [cells[k] if parted_by == "," else cells[k].replace(",", ".") for k in range(len(columns))]
+            rows.append(tuple(float(cell) for cell in told))
+        except (ValueError, IndexError):
+            if not heading:
+                rule = f"line {number} is no {many} of numbers"
+                raise Refused(key, file, rule, "write: " + ", ".join(columns)) from None
+        heading = False
+        if len(rows) > MOST_ROWS:
+            raise Refused(key, file, f"has more than {MOST_ROWS} rows", "thin it out")
+    return rows

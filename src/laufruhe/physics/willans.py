@@ -1,0 +1,102 @@
+"""Indicated mean pressure from the brake: friction from a Willans line or from motoring, with its deviation (W1-W4).
+
+The fuel burnt at one speed grows along a straight line with the load; where the line is extended to no fuel, the
+load is that of the friction alone, negative (Willans). A line through measured points has a standard deviation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+
+FEWEST = 3
+"""Points that a line and its deviation take."""
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Friction mean effective pressure and its standard deviation [Pa]."""
+
+    mean: float
+    deviation: float
+
+    def indicated(self, brake: float, deviations: float) -> tuple[float, float, float]:
+        """Least, middle and largest indicated mean pressure at a brake mean pressure [Pa] (W4)."""
+        room = deviations * self.deviation
+        return brake + self.mean - room, brake + self.mean, brake + self.mean + room
+
+
+@dataclass(frozen=True)
+class _Line:
+    """y = a + b x, and the covariances of a and b."""
+
+    intercept: float
+    slope: float
+    covariance: NDArray[np.float64]
+
+
+def mean_pressure(torque: float, displacement: float, turns: int) -> float:
+    """Mean effective pressure [Pa] of a torque [N m], a cycle taking so many turns (W1)."""
+    return math.tau * turns * torque / displacement
+
+
+def willans_friction(brake: Sequence[float], fuel: Sequence[float]) -> Friction:
+    """Friction from the fuel burnt at brake mean pressures [Pa] of one speed, fuel in any unit (W2).
+
+    Raises
+    ------
+    ModelError
+        If there are fewer than three points, one load twice, or no line of friction.
+    """
+    line = _line(brake, fuel, "load")
+    if line.slope <= 0.0:
+        raise ModelError("the fuel does not rise with the load; check the columns")
+    friction = line.intercept / line.slope
+    if friction <= 0.0:
+        raise ModelError("the line through the fuel has no friction: it meets no fuel at a driving load; check it")
+    # d(a / b) = da / b - a db / b^2
+    by = np.array([1.0, -friction]) / line.slope
+    return Friction(friction, math.sqrt(max(float(by @ line.covariance @ by), 0.0)))
+
+
+def motoring_friction(speeds: Sequence[float], drag: Sequence[float], speed: float) -> Friction:
+    """Friction at a speed from the mean pressure [Pa] that motoring took at several, on a straight line (W3).
+
+    Raises
+    ------
+    ModelError
+        If there are fewer than three points, one speed twice, or no friction at the speed.
+    """
+    line = _line(speeds, drag, "speed")
+    friction, by = line.intercept + line.slope * speed, np.array([1.0, speed])
+    if friction <= 0.0:
+        raise ModelError("the line through the motoring pressures has no friction at this speed; check it")
+    return Friction(friction, math.sqrt(max(float(by @ line.covariance @ by), 0.0)))
+
+
+def _line(x: Sequence[float], y: Sequence[float], what: str) -> _Line:
+    """Least squares, and the covariances that the scatter about the line gives."""
+    if len(x) < FEWEST:
+        raise ModelError(f"a line and its deviation take {FEWEST} points, and there are {len(x)}; measure more")
+    places = sorted(x)
+    size = max(abs(places[0]), abs(places[-1]))
+    if any(b - a <= SAME * size for a, b in pairwise(places)):
+        raise ModelError(f"one {what} stands there twice; give the mean of what was measured at it")
+    # about the middle, where both are independent of each other
+    middle, given = float(np.mean(x)), np.asarray(y, dtype=float)
+    apart = np.asarray(x, dtype=float) - middle
+    spread = float(apart @ apart)
+    slope = float(apart @ given) / spread
+    rest = given - given.mean() - slope * apart
+    scatter = float(rest @ rest) / (len(given) - 2)
+    steep, level = scatter / spread, scatter / len(given)
+    covariance = np.array([[level + middle**2 * steep, -middle * steep], [-middle * steep, steep]])
+    return _Line(float(given.mean()) - slope * middle, slope, covariance)

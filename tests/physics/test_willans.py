@@ -1,0 +1,197 @@
+"""Friction from a Willans line or from motoring, and the loads that it leaves open."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import optimize
+
+import laufruhe
+from laufruhe.errors import InputError, ModelError
+from laufruhe.physics.fidelity import EXACT
+from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.willans import mean_pressure, motoring_friction, willans_friction
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.prove.certificate import Proof
+from problem_files import PROBLEMS, changed, loaded
+
+LOADS = np.array([1.0, 3.0, 5.0, 8.0, 11.0]) * 1e5
+FUEL = 0.4 * (LOADS * 1e-5 + 2.0) + np.array([0.02, -0.01, -0.03, 0.015, 0.01])
+BRAKE = """
+title = "Four at its brake"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+bore = "85 mm"
+stroke = "88 mm"
+rod_ratio = 0.3
+reciprocating_mass = "0.95 kg"
+cylinder_spacing = "97 mm"
+firing_order = [1, 3, 4, 2]
+[[operating_points]]
+name = "pulling"
+speed = "1750 rpm"
+brake_torque = "250 N m"
+[gas]
+model = "wiebe"
+imep = "10 bar"
+start = -4
+duration = 55
+[friction]
+file = "fuel.csv"
+[objective]
+minimise = "worst mean roll moment"
+"""
+ROWS = "speed, torque, fuel\n1750, 20, 2.0\n1750, 60, 3.3\n1750, 120, 5.5\n1750, 180, 7.4\n3000, 20, 5\n"
+
+
+@pytest.fixture(scope="module")
+def solved() -> laufruhe.solvers.Result:
+    return laufruhe.solve(laufruhe.load(PROBLEMS / "car-four-willans.toml"))
+
+
+def test_mean_pressure_of_the_bench_manual() -> None:
+    """DW10: 250 N m of 1997 cm3 are 15.7 bar."""
+    assert mean_pressure(250.0, 1997e-6, 2) == pytest.approx(15.7e5, rel=3e-3)
+    # and of the indicated work: torque times the angle of a cycle over the displacement
+    assert mean_pressure(250.0, 1997e-6, 1) == pytest.approx(0.5 * mean_pressure(250.0, 1997e-6, 2))
+
+
+def test_line_and_deviation_are_those_of_regression() -> None:
+    """Against SciPy's curve_fit, which fits the friction itself and tells its variance."""
+    found = willans_friction(LOADS, FUEL)
+    (_, friction), covariance = optimize.curve_fit(lambda x, b, f: b * (x + f), LOADS, FUEL, (4e-6, 2e5))
+    assert found.mean == pytest.approx(friction, rel=1e-6)
+    assert found.deviation == pytest.approx(math.sqrt(covariance[1, 1]), rel=1e-4)
+
+
+def test_deviation_is_that_of_many_scattered_tables() -> None:
+    rng = np.random.default_rng(1)
+    truth, scatter = 0.4 * (LOADS * 1e-5 + 2.0), 0.02
+    many = [willans_friction(LOADS, truth + rng.normal(0.0, scatter, len(LOADS))) for _ in range(3000)]
+    spread = float(np.std([each.mean for each in many]))
+    told = math.sqrt(float(np.mean([each.deviation**2 for each in many])))
+    assert told == pytest.approx(spread, rel=0.05)
+    assert np.mean([each.mean for each in many]) == pytest.approx(2e5, rel=0.01)
+
+
+@given(st.floats(0.01, 100.0), st.floats(0.1, 10.0))
+def test_units_of_fuel_and_load(fuel: float, load: float) -> None:
+    """The unit of the fuel does not count; friction has that of the load."""
+    one, other = willans_friction(LOADS, FUEL), willans_friction(load * LOADS, fuel * FUEL)
+    assert other.mean == pytest.approx(load * one.mean, rel=1e-9)
+    assert other.deviation == pytest.approx(load * one.deviation, rel=1e-6)
+
+
+def test_motoring_line() -> None:
+    speeds, drag = np.array([100.0, 200.0, 300.0, 400.0]), np.array([1.0, 1.31, 1.58, 1.92]) * 1e5
+    found = motoring_friction(speeds, drag, 250.0)
+    (slope, level), covariance = np.polyfit(speeds - 250.0, drag, 1, cov=True)
+    assert found.mean == pytest.approx(level)
+    assert found.deviation == pytest.approx(math.sqrt(covariance[1, 1]))
+    assert slope > 0.0
+
+
+@pytest.mark.parametrize(
+    ("loads", "fuel", "rule"),
+    [
+        ([1.0, 2.0], [1.0, 2.0], "take 3 points"),
+        ([1.0, 2.0, 2.0, 3.0], [1.0, 2.0, 2.1, 3.0], "stands there twice"),
+        ([1.0, 2.0, 3.0], [3.0, 2.0, 1.0], "does not rise"),
+        ([1.0, 2.0, 3.0], [0.5, 2.0, 3.5], "no friction"),
+    ],
+)
+def test_tables_that_make_no_line(loads: list[float], fuel: list[float], rule: str) -> None:
+    with pytest.raises(ModelError, match=rule):
+        willans_friction(loads, fuel)
+
+
+def test_scenarios_of_the_ready_problem(solved: laufruhe.solvers.Result) -> None:
+    """Both loads stand at the middle and two deviations to either side; the worst of them all is proven least."""
+    problem = solved.problem
+    assert len(problem.points) == 6
+    loads = [point.gas.imep for point in problem.points[:3]]
+    brake = mean_pressure(250.0, sum(p.piston_area * p.stroke for p in problem.engine.slider_cranks), 2)
+    # the table was made up about 2.2 bar
+    assert loads[1] - brake == pytest.approx(2.2e5, abs=loads[2] - loads[1])
+    assert loads[2] - loads[1] == pytest.approx(loads[1] - loads[0])
+    assert solved.certificate.kind is Proof.GLOBAL
+    means = [
+        float(np.mean([mount.mean for mount in laufruhe.problem.evaluation.measured(solved.final, k)]))
+        for k in range(6)
+    ]
+    assert solved.objective.value == pytest.approx(max(means), rel=1e-6)
+    # two operating points hold the design: it is not the best for either alone
+    assert max(means[:3]) == pytest.approx(max(means[3:]), rel=1e-3)
+    for chosen in (problem.points[2:3], problem.points[5:6]):
+        alone = laufruhe.solve(replace(problem, points=chosen))
+        assert alone.objective.value < solved.objective.value * (1.0 - 1e-3)
+    assert "bar of friction" in problem.assumptions[-1]
+
+
+def test_no_load_between_is_worse_than_the_ends(solved: laufruhe.solvers.Result) -> None:
+    """The pressure of a cycle of finite heat release is affine in imep, and a mean of lengths convex: the ends tell."""
+    problem = solved.problem
+    point = problem.points[0]
+    low, high = problem.points[0].gas.imep, problem.points[2].gas.imep
+    torques = [
+        gas_loads(problem.engine, replace(point.gas, imep=p), EXACT).coefficients[:, 3]
+        for p in (low, 0.3 * high + 0.7 * low, high)
+    ]
+    assert np.abs(torques[1] - 0.7 * torques[0] - 0.3 * torques[2]).max() < 1e-10 * np.abs(torques[1]).max()
+    between = tuple(replace(point, gas=replace(point.gas, imep=p)) for p in np.linspace(low, high, 9))
+    named = tuple(replace(p, name=f"{k}") for k, p in enumerate(between))
+    worst = evaluate(replace(problem, points=named), solved.final.engine).value(problem.objective[0].measure)
+    ends = evaluate(replace(problem, points=(named[0], named[-1])), solved.final.engine)
+    assert worst == pytest.approx(ends.value(problem.objective[0].measure), rel=1e-9)
+
+
+def test_loads_at_the_brake_from_a_file_and_told(tmp_path: Path) -> None:
+    (tmp_path / "fuel.csv").write_text(ROWS, encoding="utf-8")
+    problem = loaded(tmp_path, BRAKE)
+    assert [point.name for point in problem.points] == [f"pulling, {which} load" for which in ("least", "mean", "most")]
+    middle = problem.points[1].gas.imep
+    told = changed(BRAKE, 'file = "fuel.csv"', 'fmep = "2 bar"')
+    (only,) = loaded(tmp_path, told).points
+    volume = math.pi / 4 * 0.085**2 * 0.088 * 4
+    assert only.gas.imep == pytest.approx(mean_pressure(250.0, volume, 2) + 2e5)
+    apart = loaded(tmp_path, changed(told, '"2 bar"', '"2 bar"\ndeviation = "0.3 bar"\ndeviations = 1')).points
+    assert apart[2].gas.imep - apart[0].gas.imep == pytest.approx(0.6e5)
+    (tmp_path / "fuel.csv").write_text("1000;0,9\n2000;1,5\n3000;2,0\n", encoding="utf-8")
+    drag = changed(BRAKE, 'file = "fuel.csv"', 'file = "fuel.csv"\nkind = "motoring"\nload_unit = "bar"')
+    assert loaded(tmp_path, drag).points[1].gas.imep < middle
+
+
+@pytest.mark.parametrize(
+    ("rows", "old", "new", "said"),
+    [
+        ("1750, 20, 2\n1750, 60, 3\n", "", "", "has 2 points at 1750 rpm of pulling, and a line takes 3"),
+        (ROWS.replace("1750, 60", "1750, 20"), "", "", "one load stands there twice"),
+        ("1750, 20, 9\n1750, 60, 6\n1750, 90, 5\n", "", "", "does not rise with the load"),
+        ("1750, 20, 0.5\n1750, 60, 3.0\n1750, 90, 5.7\n", "", "", "no friction"),
+        ("1750, 20, 2.2\n1750, 60, 3.0\n1750, 90, 6\n", "", "", "friction"),
+        ("1750, 20, nan\n1750, 60, 3\n1750, 90, 5\n", "", "", "not finite"),
+        ("1750, 20\n1750, 60\n", "", "", "no row of numbers"),
+        (ROWS, 'file = "fuel.csv"', "", "is missing"),
+        (ROWS, 'file = "fuel.csv"', 'file = "fuel.csv"\nfmep = "2 bar"', "given twice"),
+        (ROWS, 'file = "fuel.csv"', 'file = "fuel.csv"\ndeviation = "1 bar"', "follows from the file"),
+        (ROWS, 'file = "fuel.csv"', 'file = "fuel.csv"\nload_unit = "kg"', "load_unit"),
+        (ROWS, 'brake_torque = "250 N m"', 'brake_torque = "250 N m"\nbmep = "9 bar"', "given beside"),
+        (ROWS, 'brake_torque = "250 N m"', "", "serves no operating point"),
+        (ROWS, 'brake_torque = "250 N m"', 'brake_torque = "250 N m"\nmotored = true', "burns fuel"),
+        (ROWS, '[friction]\nfile = "fuel.csv"', "", "needs [friction]"),
+        (ROWS, 'bore = "85 mm"', "", "bore"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_load_is_refused_in_one_line(rows: str, old: str, new: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "fuel.csv").write_text(rows, encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        loaded(tmp_path, changed(BRAKE, old, new) if old else BRAKE)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
