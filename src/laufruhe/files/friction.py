@@ -84,7 +84,7 @@ class Brake:
         least, middle, most, loss, off = (f"{1e-5 * p:.4g}" for p in (*found, friction.mean, friction.deviation))
         self.said.append(
             f"Indicated mean pressure at {where} {middle} bar, {least} to {most} bar: {1e-5 * brake:.4g} bar at the "
-            f"brake and {loss} bar of friction, {self.table.deviations:g} standard deviations of {off} bar to either side."
+            f"brake and {loss} bar of friction, {self.table.deviations:g} deviations of {off} bar to either side."
         )
         return found
 
