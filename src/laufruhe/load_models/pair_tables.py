@@ -84,11 +84,8 @@ class PairObjective:
     limits: tuple[tuple[float, PairTable], ...]
 
     @classmethod
-    def of(cls, problem: StarProblem) -> PairObjective | None:
-        """Of a problem that has nothing but root mean squares, and nothing to decide beside the star; else None."""
-        norms = [norm for _, norm in (*problem.terms, *problem.limits)]
-        if problem.domains or not all(norm.norm.is_euclidean for norm in norms):
-            return None
+    def of(cls, problem: StarProblem) -> PairObjective:
+        """Of a problem that has nothing but root mean squares, and nothing to decide beside the star."""
         terms, limits = (
             tuple((number, pair_table(norm)) for number, norm in each) for each in (problem.terms, problem.limits)
         )

@@ -57,6 +57,11 @@ def reduced_inertia(part: SliderCrank) -> float:
 
     With a long rod half the reciprocating mass at the crank radius.
     """
+    return _reduced_inertia(replace(part, name="", x=0.0, bank=0.0, throw=part.fires_at, firing_angle=0.0))
+
+
+@lru_cache(maxsize=256)
+def _reduced_inertia(part: SliderCrank) -> float:
     motion = part.motion(np, 2.0 * math.pi * np.arange(_STEPS) / _STEPS)
     swinging = sum(
         mass * float(np.mean(np.abs(velocity * np.ones(_STEPS)) ** 2)) for mass, (_, velocity, _) in motion.points

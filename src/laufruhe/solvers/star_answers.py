@@ -82,12 +82,14 @@ def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> 
 def _by_orders(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
     """Firing orders one by one where root mean squares alone are asked, else by cone programs."""
     (family,) = families
-    model = family.model(phasing)
-    objective = PairObjective.of(model.at(model.samples))
-    if objective is None or phasing.shafts.optional or family.fixed or phasing.method is Method.PROGRAM:
+    own = [measure for measure in problem.measures if not measure.channel.is_number]
+    squares = all(measure.is_load and measure.norm.is_euclidean for measure in own)
+    if not squares or problem.decisions or phasing.shafts.optional or family.fixed or phasing.method is Method.PROGRAM:
         return _by_designs(problem, phasing, families)
     if phasing.cylinders > MOST_SLOTS:
         raise ModelError(f"firing orders of more than {MOST_SLOTS} cylinders are too many to look at; give throws")
+    model = family.model(phasing)
+    objective = PairObjective.of(model.at(model.samples))
     found = enumerate_orders(objective, phasing.cylinders, phasing.best, phasing.time_limit)
     answer = _stars_answer(phasing, family, found, "every firing order looked at, pair by pair of throws")
     return replace(answer, infeasible=0 if answer.designs else found.nodes)
