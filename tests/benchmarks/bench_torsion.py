@@ -108,7 +108,7 @@ def main() -> None:
         "# Torsional vibration",
         "",
         f"`problems/{PROBLEM.name}`: seven discs. Processor time of one core, medians of {RUNS} runs; our response",
-        "has the torque of gas, pistons and rods in its time. Apart: largest difference of the two, over the largest value.",
+        "has the torque of gas, pistons and rods in its time. Apart: largest difference over the largest value.",
         "",
         "| what | Laufruhe [ms] | openTorsion [ms] | ratio | apart |",
         "| --- | ---: | ---: | ---: | ---: |",
