@@ -161,7 +161,8 @@ def _said_wrong(status: int, out: str, err: str, folder: Path) -> tuple[str, str
     if len(lines) > MOST_LINES:
         return "many lines", f"{len(lines)}: {err[:300]}"
     for line in lines:
-        if not line.startswith((f"{folder}/", f"{folder}: ", "laufruhe: ")):
+        # damage may name another file, and that is the one at fault
+        if not line.startswith((f"{folder}/", f"{folder}: ", "laufruhe: ", "/dev/null: ")):
             return "stray line", err[:600]
         said = line.replace(f"{folder}", "")
         if len(said) > MOST_CHARACTERS:

@@ -82,6 +82,8 @@ BAD = [
         """engine.strok = "120 mm": is not a key here; did you mean 'stroke'?"""),
     bad("misspelt key", "throws =", "thorws =",
         "engine.thorws = [0, 180, 180, 0]: is not a key here; did you mean 'throws'?"),
+    bad("key that begins with a space", "stroke =", '" stroke" =',
+        """engine." stroke" = "120 mm": is not a key here; did you mean 'stroke'?"""),
     bad("misspelt table", "[objective]", "[objektive]",
         """objektive = {"minimise": "mean mount force"}: is not a key here; did you mean 'objective'?"""),
     bad("misspelt key of a tagged table", "imep =", "imp =",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias, get_args
@@ -16,6 +17,7 @@ from laufruhe.errors import Complaint, LaufruheError, ModelError, printed
 Loc: TypeAlias = tuple[str | int, ...]
 MOST_COMPLAINTS = 20
 """That a file gets at once."""
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _CLOSE = 0.6
 _RULES = {
     "int_type": "must be a whole number",
@@ -73,10 +75,11 @@ def _is_misspelt(loc: Loc, unknown: Sequence[Loc]) -> bool:
 
 
 def key_path(loc: Sequence[str | int]) -> str:
-    """engine.throws[2], counted from one as the reader counts."""
+    """engine.throws[2], counted from one as the reader counts; in quotes what TOML has in quotes."""
     text = ""
     for part in loc:
-        text += f"[{part + 1}]" if isinstance(part, int) else (f".{part}" if text else str(part))
+        key = f"[{part + 1}]" if isinstance(part, int) else part if _BARE.fullmatch(part) else f'"{part}"'
+        text += key if not text or isinstance(part, int) else f".{key}"
     return text
 
 
