@@ -27,6 +27,20 @@ READY = {
     "replication-five-cylinder": (6, ["Second-order couple (Fig. 2.8.13)"]),
     "replication-free-couples": (17, []),
     "replication-three-mounts": (12, []),
+    "replication-crank-pin": (8, ["Gas force (first line)"]),
+    "replication-worked-diesel": (
+        13,
+        [
+            "Piston area (A3)",
+            "A2 of the mean pressure of 4 at (G b5)",
+            "Load for the friction, where it is used (G c V2)",
+            "Flywheel in all, where it is used (G b3)",
+            "Pull on an arm of the flywheel (E b2)",
+            "Modulus of the web, by the 1/8 that is printed (G c II)",
+            "Buckling of the rod, by the 15^3 that is printed (H a4)",
+            "Fuel of a stroke (J 4)",
+        ],
+    ),
 }
 GRID = xr.DataArray([4.0, 1.0, 3.0], dims="k", coords={"k": [0.0, 1.0, 2.0]})
 NAMES = {"x": 2.0, "y": {"a": GRID}, "throws": [0, 180, 180, 0]}
@@ -50,6 +64,8 @@ class TestExpressions:
         ("abs(couple_star([0, 240, 120]))", 3.0**0.5),
         ("degrees(couple_star([0, 180]))", 0.0),
         ("negligible < noticeable", True),
+        ("lever_share([0, 4, 6], 1, 1)", 0.75),
+        ("excursion([3, 1, -1, -3], 2)", 8.0),
     ])  # fmt: skip
     def test_values(self, text: str, value: Any) -> None:
         assert value_of(text, NAMES) == pytest.approx(value)

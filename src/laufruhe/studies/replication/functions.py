@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine.layouts import stations
+from laufruhe.physics.bearing_loads import lever_shares
 from laufruhe.physics.elastic_mounts import single_transmissibility
 from laufruhe.physics.modes import GRAVITY, sag_for_critical_speed, sag_frequency
 from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE
@@ -68,6 +69,22 @@ def join(*parts: Any) -> NDArray[np.float64]:
     return np.concatenate([np.ravel(np.asarray(part, dtype=float)) for part in parts])
 
 
+def excursion(torques: Any, angle: float) -> float:
+    """Largest less smallest work of a torque about its mean, each held over so much of the angle (T2)."""
+    held = np.ravel(np.asarray(torques, dtype=float))
+    if not held.size:
+        raise ValueError("no torques")
+    work = np.cumsum(held - held.mean()) * angle
+    return float(np.ptp(np.append(work, 0.0)))
+
+
+def lever_share(bearings: Sequence[float], place: float, number: int) -> float:
+    """Share of a load at a place that the bearing of this number carries, the shaft cut in its bearings (B4)."""
+    if len(set(bearings)) < len(bearings):
+        raise ValueError("two bearings in one place")
+    return float(lever_shares(bearings, [place])[number - 1, 0])
+
+
 def transmissibility(ratio: Any, loss_factor: Any) -> Any:
     """Foundation over exciting force of one mass on one spring (E11), of labelled arrays too."""
     import xarray as xr
@@ -83,7 +100,8 @@ FUNCTIONS: Mapping[str, Any] = {
     "abs": abs, "len": len, "at": at, "argmin": _arg("min"), "argmax": _arg("max"), "orders": orders,
     "join": join, "rising": lambda values: bool(np.all(np.diff(np.asarray(values)) > 0.0)),
     "degrees": lambda z: math.degrees(cmath.phase(z)), "conjugate": lambda z: z.conjugate(),
-    "couple_star": couple_star, "transmissibility": transmissibility,
+    "couple_star": couple_star, "excursion": excursion, "lever_share": lever_share,
+    "transmissibility": transmissibility,
     "sag_for_critical_speed": sag_for_critical_speed, "sag_frequency": sag_frequency,
 }  # fmt: skip
 """Every function that an expression may call."""

@@ -81,7 +81,7 @@ def _row(one: xr.Dataset, readings: Sequence[str]) -> list[str]:
 
 
 def _shown(value: float) -> str:
-    return "0" if abs(value) < _NOTHING else f"{value:.4g}"
+    return "0" if abs(value) < _NOTHING else f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
 
 
 def counted(datasets: Iterable[xr.Dataset]) -> str:

@@ -15,7 +15,7 @@ from laufruhe.files.asked import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.channels import CHANNELS, LoadChannel, mounting_in
 from laufruhe.problem.evaluation import measured, samples_of
 from laufruhe.problem.measure import MEASURES
 from laufruhe.solvers.result import Result
@@ -24,7 +24,13 @@ from laufruhe.studies.replication.expressions import check_among
 ORDERS = (1.0, 2.0, 4.0, 6.0)
 FORCE, COUPLE = slice(0, 3), slice(4, 6)
 DECISION = "decision "
-DIMENSIONS = ("angle", "direction", "firing", "mode", "motion", "mount", "number", "order", "turns")
+PLACES = ("mount", "bearing", "cylinder", "section")
+DIRECTIONS = {1: ("", ()), 2: ("axis", ("along", "across")), 3: ("direction", ("forward", "left", "up"))}
+"""Names of the components of a load, by how many it has."""
+DIMENSIONS = (
+    "angle", "axis", "bearing", "cylinder", "direction", "firing", "mode", "motion", "mount", "number", "order",
+    "section", "turns",
+)  # fmt: skip
 """Along which quantities may lie."""
 
 
@@ -89,6 +95,20 @@ def _signal(result: Result, _: AskedTable) -> Labelled:
     return Labelled(values.tolist(), {"angle": angle, "mount": names, "direction": ["lateral", "vertical"]})
 
 
+def _over_cycle(channel: LoadChannel, result: Result, _: AskedTable) -> Labelled:
+    """Any load over the cycle, place by place (C2); what stands alone has no label."""
+    values = samples_of(result.final, 0, channel)
+    degrees = 360.0 * result.final.engine.cycle.turns
+    labels: dict[str, list[Any]] = {"angle": (degrees * np.arange(len(values)) / len(values)).tolist()}
+    place = next((name for name in PLACES if f"{name}s" in channel.keys), "")
+    if place:
+        labels[place] = list(channel.places(result.final.engine))
+    dimension, names = DIRECTIONS[values.shape[-1]]
+    if dimension:
+        labels[dimension] = list(names)
+    return Labelled(values.reshape([len(each) for each in labels.values()]).tolist(), labels)
+
+
 def _by_mount(measure: str, result: Result, _: AskedTable) -> Labelled:
     values = [getattr(one, measure) for one in measured(result.final, 0)]
     return Labelled(values, {"mount": result.final.mount_names})
@@ -133,5 +153,6 @@ RESULTS: Mapping[str, Callable[[Result, AskedTable], Labelled]] = {
     "firing intervals": _intervals,
     "energy shares": _energy,
     "lower bound": _bound,
+    **{f"{c} over the cycle": partial(_over_cycle, c) for c in CHANNELS.values() if isinstance(c, LoadChannel)},
 }
 """Quantities beside the measures."""
