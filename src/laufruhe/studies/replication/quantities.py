@@ -15,9 +15,9 @@ from laufruhe.files.asked import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.problem.channels import CHANNELS, LoadChannel, mounting_in
+from laufruhe.problem.channels import CHANNELS, mounting_in
 from laufruhe.problem.evaluation import measured, samples_of
-from laufruhe.problem.measure import MEASURES
+from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.solvers.result import Result
 from laufruhe.studies.replication.expressions import check_among
 
@@ -95,8 +95,9 @@ def _signal(result: Result, _: AskedTable) -> Labelled:
     return Labelled(values.tolist(), {"angle": angle, "mount": names, "direction": ["lateral", "vertical"]})
 
 
-def _over_cycle(channel: LoadChannel, result: Result, _: AskedTable) -> Labelled:
+def _over_cycle(measure: Measure, result: Result, _: AskedTable) -> Labelled:
     """Any load over the cycle, place by place (C2); what stands alone has no label."""
+    channel = measure.load
     values = samples_of(result.final, 0, channel)
     degrees = 360.0 * result.final.engine.cycle.turns
     labels: dict[str, list[Any]] = {"angle": (degrees * np.arange(len(values)) / len(values)).tolist()}
@@ -153,6 +154,6 @@ RESULTS: Mapping[str, Callable[[Result, AskedTable], Labelled]] = {
     "firing intervals": _intervals,
     "energy shares": _energy,
     "lower bound": _bound,
-    **{f"{c} over the cycle": partial(_over_cycle, c) for c in CHANNELS.values() if isinstance(c, LoadChannel)},
+    **{f"{c} over the cycle": partial(_over_cycle, Measure(c)) for c in CHANNELS.values() if c.is_load},
 }
 """Quantities beside the measures."""
