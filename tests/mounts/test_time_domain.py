@@ -8,13 +8,19 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from laufruhe.errors import ModelError
+import laufruhe
+from laufruhe.errors import InputError, ModelError
 from laufruhe.machine import Block, Mount
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.run_up import periodic_state, run_through, time_model
+from laufruhe.physics.speed_map import split_loads
 from laufruhe.physics.time_mounting import INTEGRATION
+from laufruhe.problem.channels import mounting_in
+from laufruhe.report.json_result import as_dict
+from laufruhe.solvers import Status
 from mounts.powertrain import powertrain, random_mounting, wrench
+from problem_files import PROBLEMS, loaded
 
 RPM = np.pi / 30.0
 
@@ -155,3 +161,78 @@ def test_a_mode_far_too_fast_to_resolve_is_followed_in_a_run_up():
         assert (mounting.modes.frequencies[-1] > 1e5) == (method == "Radau")
         runs.append(run_through(mounting, Spectrum(Fraction(1), lift), None, 0.0, 60.0, 0.6, 12, method, 1e-5))
     assert runs[1].force == pytest.approx(runs[0].force, rel=1e-2, abs=1e-2 * runs[0].worst_force)
+
+
+def test_roll_of_the_block_is_the_turn_that_its_mounts_tell():
+    """Of any motion: travels of three mounts determine it, and its turn about x is told alone."""
+    mounting = powertrain(damping=20.0)
+    model, rng = time_model(mounting), np.random.default_rng(5)
+    middle = np.array(mounting.block.centre_of_gravity)
+    rows = []
+    for mount in mounting.mounts:
+        x, y, z = np.array(mount.position) - middle
+        rows.append(np.hstack([np.eye(3), np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])]))
+    for y in rng.standard_normal((4, 6)):
+        own = (model.travels @ y).reshape(-1, 3)
+        global_axes = np.einsum("mab,ma->mb", np.array([m.orientation for m in mounting.mounts]), own)
+        motion, *_ = np.linalg.lstsq(np.vstack(rows), global_axes.reshape(-1), rcond=None)
+        assert model.roll @ y == pytest.approx(motion[3], rel=1e-9)
+
+
+RUN = '[run_up]\nup_to = "1000 rpm"\ntime = "1 s"\nshut_down_time = "2 s"\n'
+
+
+def limited(most: str) -> str:
+    return f'[[constraints]]\nlimit = "run-up travel"\nmax = "{most}"\n'
+
+
+@pytest.fixture(scope="module")
+def soft() -> str:
+    text = (PROBLEMS / "soft-mounts-run-up.toml").read_text(encoding="utf-8")
+    return text[: text.index("[run_up]")]
+
+
+def test_a_run_up_is_a_limit_that_is_checked(soft, tmp_path):
+    """Where the best design without it keeps it, nothing changes; where not, no design is called one."""
+    alone = laufruhe.solve(loaded(tmp_path, soft))
+    kept = laufruhe.solve(loaded(tmp_path, soft + RUN + limited("2 mm")))
+    assert kept.objective.value == pytest.approx(alone.objective.value)
+    assert kept.certificate.kind == alone.certificate.kind
+    found = next(limit for limit in kept.limits if limit.name == "run-up travel")
+    assert 0.0 < found.value < 2e-3
+    broken = laufruhe.solve(loaded(tmp_path, soft + RUN + limited("0.1 mm")))
+    assert broken.status is Status.FAILED
+    assert broken.certificate is None
+    assert "'run-up travel'" in broken.message
+    record = as_dict(kept)["run_up"]
+    assert record["up_to"] == pytest.approx(1000.0 * RPM)
+    assert max(record[way]["travel"] for way in ("up", "down")) == found.value
+    # integrated at ten times the steps and a thousandth of the tolerance
+    design = kept.final
+    point = min(kept.problem.points, key=lambda p: p.speed)
+    loads = split_loads(design.engine, point, design.fidelity)
+    fine = run_through(mounting_in(design.engine), *loads, 0.0, 1000.0 * RPM, 1.0, 600, tolerance=1e-8)
+    assert record["up"]["travel"] == pytest.approx(fine.worst_travel, rel=1e-2)
+    assert record["up"]["twist"] == pytest.approx(fine.worst_twist, rel=1e-2)
+    assert record["up"]["force"] == pytest.approx(fine.worst_force, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("run", "rule"),
+    [
+        ("", "needs elastic mounts that an engine is run up on"),
+        (RUN.replace("up_to", 'operating_point = "sprint"\nup_to'), "is none here"),
+        (RUN.replace('"1 s"', '"0 s"'), "must be more than"),
+    ],
+)
+def test_run_ups_that_say_too_little(soft, run, rule, tmp_path):
+    with pytest.raises(InputError, match=rule):
+        loaded(tmp_path, soft + run + limited("1 mm"))
+
+
+def test_a_run_up_is_not_minimised_and_needs_springs(soft, tmp_path):
+    with pytest.raises(InputError, match="not minimised but limited"):
+        loaded(tmp_path, soft.replace('minimise = "static sag"', 'minimise = "run-up force"') + RUN)
+    rigid = (PROBLEMS / "tractor-single.toml").read_text(encoding="utf-8")
+    with pytest.raises(InputError, match="needs elastic mounts, that have resonances"):
+        loaded(tmp_path, rigid + RUN)

@@ -30,6 +30,7 @@ _NEEDS = {
     Needs.DIAMETERS: ("needs the diameter of a shaft", "give one in [torsion]"),
     Needs.FLYWHEEL: ("needs a flywheel", "add [flywheel] with an inertia or a rim, or fidelity.crank_inertia"),
     Needs.RIM: ("needs the rim of a flywheel", "add [flywheel.rim]"),
+    Needs.RUN: ("needs elastic mounts that an engine is run up on", "add [run_up] and [mounts] of kind elastic"),
     Needs.ARMS: ("needs the arms of a flywheel", "add [flywheel.rim.arms]"),
 }
 _PLACES = {
@@ -128,6 +129,7 @@ class Scene:
             Needs.DIAMETERS: chain is not None and any(s.diameter is not None for s in chain.sections),
             Needs.FLYWHEEL: wheel is not None,
             Needs.RIM: rim is not None,
+            Needs.RUN: engine.run is not None,
             Needs.ARMS: rim is not None and rim.arms is not None,
         }
         return has[needs]
@@ -220,7 +222,7 @@ def objective_of(table: ObjectiveTable | None, scene: Scene) -> tuple[Term, ...]
 def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Measure:
     found = scene.measure(name, table, where)
     if not found.channel.minimised:
-        others = [n for n, (channel, _) in MEASURES.items() if channel.is_mounting and channel.minimised]
+        others = [n for n, (channel, _) in MEASURES.items() if channel.is_number and channel.minimised]
         raise Refused(where, name, "is not minimised but limited", "use one of: " + ", ".join(others))
     return found
 

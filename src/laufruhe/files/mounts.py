@@ -11,7 +11,7 @@ from pydantic import Field
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, all_different, blamed_on, nearest, none_of
 from laufruhe.files.fields import Name, Open, Table
-from laufruhe.machine import Block, Mount
+from laufruhe.machine import Block, Mount, Run
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.modes import free_motion
 from laufruhe.problem.decision import (
@@ -239,3 +239,27 @@ class _Numbers:
                 drives = [v for v in decision.mount_drives if v.mount == leader and v.number == number]
                 new = (MountDrive(last, number, gain * drive.gain) for drive in drives)
                 self.decisions[d] = replace(decision, drives=(*decision.drives, *new))
+
+
+class RunUpTable(Table):
+    """From rest to a speed and back, through resonance."""
+
+    up_to: f.Speed
+    time: f.Time = f.told("Of the run-up.", 3.0)
+    shut_down_time: f.Time | None = f.told("That of the run-up unless told.")
+    operating_point: str | None = f.told("Whose gas drives the engine meanwhile; the slowest unless told.")
+
+
+def run_of(table: RunUpTable | None, block: Block | None, points: Sequence[str]) -> Run | None:
+    """How the engine is run up and shut down."""
+    if table is None:
+        return None
+    if block is None:
+        raise Refused(
+            "run_up", None, "needs elastic mounts, that have resonances", 'add [mounts] with kind = "elastic"'
+        )
+    if table.operating_point is not None and table.operating_point not in points:
+        raise Refused(
+            "run_up.operating_point", table.operating_point, "is none here", nearest(table.operating_point, points)
+        )
+    return Run(table.up_to, table.time, table.shut_down_time or table.time, table.operating_point or "")

@@ -17,7 +17,7 @@ from laufruhe.files.fields import Table
 from laufruhe.files.flywheel import FlywheelTable
 from laufruhe.files.friction import FrictionTable
 from laufruhe.files.gas import GasTable
-from laufruhe.files.mounts import BlockTable, MountsTable
+from laufruhe.files.mounts import BlockTable, MountsTable, RunUpTable
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
@@ -50,6 +50,7 @@ class ProblemFile(Table):
     friction: FrictionTable | None = None
     mounts: MountsTable | None = None
     block: BlockTable | None = None
+    run_up: RunUpTable | None = None
     main_bearings: list[MainBearingTable] = Field(default_factory=list)
     torsion: TorsionTable | None = None
     flywheel: FlywheelTable | None = None

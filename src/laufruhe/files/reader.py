@@ -23,7 +23,7 @@ from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import flywheel_of
 from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of
-from laufruhe.files.mounts import mounts_of
+from laufruhe.files.mounts import mounts_of, run_of
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.problem_file import ProblemFile
@@ -171,9 +171,10 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     bearings = bearings_of(file.main_bearings, cylinders)
     rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
     chain = torsion_of(file.torsion, cylinders, throws)
-    engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel)
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke, brake)
+    run = run_of(file.run_up, found.block, [point.name for point in points])
+    engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run)
     scene, decisions = Scene(engine, points), (*collected.decisions, *found.decisions, *of_wheel)
     objective = objective_of(file.objective, scene)
     _check_decided(decisions)

@@ -221,8 +221,8 @@ class AffineModel:
     def norm(self, measure: Measure, samples: int, averaged: bool = False) -> AffineNorm:
         """A measure at `samples` steps over the common period, a mean averaged about them where asked."""
         channel = measure.channel
-        if measure.is_mounting:
-            # a number of mounts that stay: the same for every design
+        if channel.is_number:
+            # of mounts or of a flywheel that stay: the same for every design
             only = Rows(MEAN, np.array([[self.bare.value(measure)]]), Grid(np.ones(1), 1))
             return _stacked(only, [np.zeros((1, 1))] * len(self._changes), self._keep_all)
         if not isinstance(channel, LoadChannel):

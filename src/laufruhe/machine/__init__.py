@@ -7,6 +7,7 @@ from laufruhe.machine.flywheel import Arms, Flywheel, Rim
 from laufruhe.machine.gas import Charge, GasModel, PressureTrace, Seiliger, Wiebe
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
+from laufruhe.machine.run import Run
 from laufruhe.machine.slider_crank import Rod, SliderCrank
 from laufruhe.machine.torsion import Absorber, Disc, Section, Torsion
 
@@ -29,6 +30,7 @@ __all__ = [
     "Rod",
     "Role",
     "Rotor",
+    "Run",
     "Section",
     "Seiliger",
     "Shaft",

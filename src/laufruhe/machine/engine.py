@@ -15,6 +15,7 @@ from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.gas import GasModel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
+from laufruhe.machine.run import Run
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.machine.torsion import Torsion
 from laufruhe.numerics.spectrum import as_order
@@ -82,6 +83,8 @@ class Engine:
         Discs and shafts that its crankshaft twists between; None where nothing is asked of them.
     flywheel
         What turns with the crank; None where nothing is asked of it.
+    run
+        How it is run up and shut down; None where nothing is said of that.
     """
 
     name: str
@@ -93,6 +96,7 @@ class Engine:
     bearings: tuple[Bearing, ...] = ()
     torsion: Torsion | None = None
     flywheel: Flywheel | None = None
+    run: Run | None = None
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "bearings"):

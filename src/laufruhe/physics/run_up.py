@@ -52,6 +52,8 @@ class TimeModel:
         Of the bump stops along every own axis, shape (3 mounts,).
     turns
         Own axes of the mounts, shape (mounts, 3, 3).
+    roll
+        From y to the turn of the block about x, shape (6,).
     """
 
     stiffness: Array
@@ -63,6 +65,7 @@ class TimeModel:
     gaps: Array
     stops: Array
     turns: Array
+    roll: Array
 
     @property
     def has_stops(self) -> bool:
@@ -115,6 +118,7 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
         gaps=np.repeat([mount.stop_gap for mount in mounting.mounts], 3),
         stops=np.repeat([mount.stop_stiffness for mount in mounting.mounts], 3),
         turns=turns,
+        roll=root.T[3],
     )
 
 
@@ -233,13 +237,14 @@ class RunUp:
     ----------
     speeds
         Crank speed at the end of every stretch [rad/s], shape (n,).
-    force, travel
-        Largest on any mount within the stretch, shape (n,) [N], [m].
+    force, travel, twist
+        Largest on any mount within the stretch, and largest roll of the block, shape (n,) [N], [m], [rad].
     """
 
     speeds: Array
     force: Array
     travel: Array
+    twist: Array
 
     @property
     def worst_force(self) -> float:
@@ -250,6 +255,11 @@ class RunUp:
     def worst_travel(self) -> float:
         """Over the whole run [m]."""
         return float(self.travel.max())
+
+    @property
+    def worst_twist(self) -> float:
+        """Over the whole run [rad]."""
+        return float(self.twist.max())
 
 
 def run_through(
@@ -286,7 +296,7 @@ def run_through(
     rates = _rates(model, _sweeping(loads, first, gain))
     fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in loads))
     state, edges = np.zeros(12), np.linspace(0.0, duration, stretches + 1)
-    force, travel = np.zeros(stretches), np.zeros(stretches)
+    force, travel, twist = np.zeros((3, stretches))
     least = 1e-3 * tolerance * _static_size(model, loads[0][1] * max(first, last) ** 2)
     count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
     for k, (start, end) in enumerate(pairwise(edges)):
@@ -294,8 +304,9 @@ def run_through(
         states = _solved(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least)
         force[k] = np.linalg.norm(model.mount_forces(states[:6], states[6:]), axis=-1).max()
         travel[k] = np.linalg.norm((model.travels @ states[:6]).T.reshape(len(times), -1, 3), axis=-1).max()
+        twist[k] = np.abs(model.roll @ states[:6]).max()
         state = states[:, -1]
-    return RunUp(first + gain * edges[1:], force, travel)
+    return RunUp(first + gain * edges[1:], force, travel, twist)
 
 
 def _sweeping(

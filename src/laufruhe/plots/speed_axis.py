@@ -8,7 +8,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from laufruhe.plots.style import FAINT, VERMILION, entry
-from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of
+from laufruhe.present.mounting import MountingFacts, critical_speed, driven, facts_of, main_order
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit
 from laufruhe.solvers.result import Result
@@ -19,16 +19,6 @@ REACH = 1.25
 LIMIT = VERMILION
 # styles tell orders apart in print as well
 STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
-
-
-def driven(facts: MountingFacts) -> list[float]:
-    """Natural frequencies that the engine excites; the highest where it excites none [Hz]."""
-    return [facts.modes.frequencies[j] for j in facts.excited] or [facts.modes.frequencies[-1]]
-
-
-def main_order(facts: MountingFacts) -> float:
-    """The order that loads the mounts most."""
-    return facts.orders[0] if facts.orders else 1.0
 
 
 def fastest(result: Result) -> float:

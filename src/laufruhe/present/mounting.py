@@ -86,3 +86,13 @@ def main_orders(evaluation: Evaluation, mounting: ElasticMounting) -> tuple[floa
 def critical_speed(frequency: float, order: float) -> float:
     """Crank speed at which an order meets a natural frequency [rad/s]."""
     return math.tau * frequency / order
+
+
+def driven(facts: MountingFacts) -> list[float]:
+    """Natural frequencies that the engine excites; the highest where it excites none [Hz]."""
+    return [float(facts.modes.frequencies[j]) for j in facts.excited] or [float(facts.modes.frequencies[-1])]
+
+
+def main_order(facts: MountingFacts) -> float:
+    """The order that loads the mounts most."""
+    return facts.orders[0] if facts.orders else 1.0

@@ -15,6 +15,7 @@ from laufruhe.physics.torsion import absorber_heat, chain_of
 from laufruhe.physics.wrench import WRENCH
 from laufruhe.present.measures import Array, is_met, limits_of, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.present.run_up import run_of, run_point, shown_runs
 from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range
 from laufruhe.present.torsion import facts_of as torsion_of
 from laufruhe.problem.channels import LoadChannel
@@ -61,7 +62,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         **{key: _all_points(result, [point[key] for point in points]) for key in places},
         "shaking": _largest([point["shaking"] for point in points]),
         "points": [{key: point[key] for key in own} for point in points],
-        **({"modes": _modes(result.final)} if is_elastic(result) else {}),
+        **({"modes": _modes(result.final), "run_up": _runs(result)} if is_elastic(result) else {}),
         **({"torsion": _torsion(result)} if is_twisted(result) else {}),
         "firing_intervals": list(result.final.engine.firing_intervals),
         **_phasing(result),
@@ -227,6 +228,17 @@ def _torsion(result: Result) -> Record:
             {"name": each.name, "heat": [float(at[k]) for at in heat]} for k, each in enumerate(chain.absorbers)
         ],
     }
+
+
+def _runs(result: Result) -> Record:
+    """The most on any mount, and the largest roll, from rest to a speed and back; null on an endless resonance."""
+    run = run_of(result)
+    shown = zip(("up", "down"), shown_runs(result, result.final), strict=True)
+    most = {
+        f"{way}": {"time": getattr(run, way), **_of(found, "force=worst_force travel=worst_travel twist=worst_twist")}
+        for way, found in shown
+    }
+    return {"up_to": run.speed, "point": run_point(result).name, **most}
 
 
 def _phasing(result: Result) -> Record:

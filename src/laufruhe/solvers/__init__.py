@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -12,7 +12,7 @@ from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import Listener, listening
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
-from laufruhe.problem.measure import Measure
+from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
@@ -207,6 +207,18 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
     return replace(found, certificate=replace(own, method=f"{own.method}; {CUT_SHORT}"))
 
 
+def _checked(problem: Problem, checked: Sequence[Limit]) -> Result:
+    """The best design without limits that no method designs for: where it keeps them, it is the best with them."""
+    others = tuple(limit for limit in problem.limits if limit not in checked)
+    found = with_limits(_decided(problem.changed(limits=others)), problem.limits)
+    broken = broken_limits(checked, found.final) if found.status in (Status.OPTIMAL, Status.FEASIBLE) else ()
+    if not broken:
+        return found
+    names = " and ".join(f"'{name}'" for name in broken)
+    why = f"the best design found breaks {names}: a run-up is checked, not designed for; relax it, or limit travel"
+    return replace(found, status=Status.FAILED, certificate=None, message=why)
+
+
 def _decided(problem: Problem) -> Result:
     """By the first method that suits."""
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
@@ -222,6 +234,9 @@ def _decided(problem: Problem) -> Result:
             return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
         return with_limits(_decided(problem.changed(limits=moved)), problem.limits)
+    checked = [limit for limit in problem.limits if limit.measure.channel.is_checked]
+    if checked and kinds:
+        return _checked(problem, checked)
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
         raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
     moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)

@@ -2,66 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from matplotlib.figure import Figure
 
-from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.run_up import RunUp, run_through
-from laufruhe.physics.speed_map import split_loads
-from laufruhe.plots.speed_axis import RPM, driven, main_order
+from laufruhe.plots.speed_axis import LIMIT, RPM, limits_on
 from laufruhe.plots.style import INK, entry, headed, page, series_of
-from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
+from laufruhe.present.mounting import is_elastic
 from laufruhe.present.numbers import figure as words
-from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import Evaluation
+from laufruhe.present.run_up import run_of, run_point, shown_runs
+from laufruhe.problem.channels import RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
-SECONDS = 3.0
-MOST_SWINGS = 2e3
-# criticals beyond this many times the highest speed are left out
-REACH_OVER = 5.0
 _RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
+_ROWS = (("largest force [N]", RUN_FORCE), ("largest travel [mm]", RUN_TRAVEL), ("largest roll [deg]", RUN_TWIST))
 applies = is_elastic
 
 
 def figure(result: Result) -> Figure:
-    """Envelope of force and travel over speed."""
-    drawn = page(2, 1, (6.8, 2.0), gap=0.35)
-    last = _last(result)
-    point = min(result.problem.points, key=lambda p: p.speed)
-    most, legend = [0.0, 0.0], []
+    """Envelope of force, travel and roll over speed."""
+    drawn = page(3, 1, (6.8, 1.7), gap=0.3)
+    run, factors = run_of(result), [readable(channel.unit)[1] for _, channel in _ROWS]
+    most, legend = [0.0] * len(_ROWS), []
     for one in series_of(result):
-        loads = split_loads(one.design.engine, point, one.design.fidelity)
-        runs = [_run(one.design, *loads, *ends) for ends in ((0.0, last), (last, 0.0))]
-        for run, (style, _) in zip(runs, _RUNS, strict=True):
-            for k, (axes, values) in enumerate(zip(drawn.panels, (run.force, 1e3 * run.travel), strict=True)):
-                axes.plot(run.speeds * RPM, values, color=one.colour, linestyle=style, linewidth=1.4)
-                most[k] = max(most[k], float(values.max(initial=0.0)))
-        force, travel = max(run.worst_force for run in runs), max(run.worst_travel for run in runs)
+        runs = shown_runs(result, one.design)
+        for found, (style, _) in zip(runs, _RUNS, strict=True):
+            for k, values in enumerate((found.force, found.travel, found.twist)):
+                drawn.panels[k].plot(
+                    found.speeds * RPM, factors[k] * values, color=one.colour, linestyle=style, linewidth=1.4
+                )
+                most[k] = max(most[k], factors[k] * float(values.max(initial=0.0)))
+        force, travel = max(each.worst_force for each in runs), max(each.worst_travel for each in runs)
         legend.append(one.entry(f": at most {words(force, 'N', 3)}, {words(travel, 'm', 3)}"))
-    for axes, label, top in zip(drawn.panels, ("largest force [N]", "largest travel [mm]"), most, strict=True):
-        axes.set(xlim=(0.0, last * RPM), ylim=(0.0, 1.1 * top or 1.0), ylabel=label)
-    drawn.panels[0].tick_params(labelbottom=False)
-    drawn.panels[1].set_xlabel("crank speed [rpm]")
+    for axes, (label, channel), factor, top in zip(drawn.panels, _ROWS, factors, most, strict=True):
+        limits = [factor * limit.maximum for limit in limits_on(result, channel)]
+        for limit in limits:
+            axes.axhline(limit, color=LIMIT, linewidth=1.0)
+        axes.set(xlim=(0.0, run.speed * RPM), ylim=(0.0, 1.1 * max([top, *limits]) or 1.0), ylabel=label)
+        axes.tick_params(labelbottom=axes is drawn.panels[-1])
+    drawn.panels[-1].set_xlabel("crank speed [rpm]")
+    if any(limits_on(result, channel) for _, channel in _ROWS):
+        legend.append(entry("limit", color=LIMIT))
     legend += [entry(name, color=INK, linestyle=style) for style, name in _RUNS]
-    lines = f"On any mount, in {SECONDS:g} s at constant acceleration; loads of {point.name}."
+    times = f"{run.up:g} s" if run.up == run.down else f"{run.up:g} s up and {run.down:g} s down"
+    lines = f"On any mount, in {times} at constant acceleration; loads of {run_point(result).name}."
     return headed(drawn, result, "Through resonance", lines, legend)
-
-
-def _last(result: Result) -> float:
-    """End of the runs: past every critical speed that is not far from the operating points [rad/s]."""
-    facts = facts_of(result.final)
-    top = max(point.speed for point in result.problem.points)
-    critical = [critical_speed(frequency, main_order(facts)) for frequency in driven(facts)]
-    return 1.5 * max((speed for speed in critical if speed <= REACH_OVER * top), default=top)
-
-
-def _run(design: Evaluation, inertia: Spectrum, gas: Spectrum | None, first: float, last: float) -> RunUp:
-    # gas torque orders beyond these shake the block by less than a line's width
-    kept = None if gas is None else gas.kept(12.0)
-    mounting = mounting_in(design.engine)
-    # a mode that swings a million times in a run is followed, not resolved
-    stiff = SECONDS * mounting.modes.frequencies[-1] > MOST_SWINGS
-    method: Literal["RK45", "Radau"] = "Radau" if stiff else "RK45"
-    return run_through(mounting, inertia.kept(12.0), kept, first, last, SECONDS, 60, method, 1e-4)

@@ -44,12 +44,16 @@ from laufruhe.problem.channels.kinds import (
     NumberChannel,
     PlaceChannel,
 )
+from laufruhe.problem.channels.runs import OF_RUNS, RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.problem.channels.torsional import TORSIONAL
 from laufruhe.problem.loads import PointLoads
 
 __all__ = [
     "OF_MOUNTS",
     "ON_BLOCK",
+    "RUN_FORCE",
+    "RUN_TRAVEL",
+    "RUN_TWIST",
     "Channel",
     "LoadChannel",
     "MassChannel",
@@ -221,6 +225,6 @@ CHANNELS: Mapping[str, Channel] = {
         MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE, SIDE_FORCE,
         FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
         TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
-        SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *TORSIONAL,
+        *OF_RUNS, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *TORSIONAL,
     )
 }  # fmt: skip

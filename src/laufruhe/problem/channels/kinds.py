@@ -39,6 +39,7 @@ class Needs(StrEnum):
     FLYWHEEL = "flywheel"
     RIM = "rim"
     ARMS = "arms"
+    RUN = "run-up"
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +86,7 @@ class Channel:
     is_number: ClassVar[bool] = False
     is_mounting: ClassVar[bool] = False
     is_placing: ClassVar[bool] = False
+    is_checked: ClassVar[bool] = False
 
     def __str__(self) -> str:
         return self.name

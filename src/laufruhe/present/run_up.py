@@ -1,0 +1,35 @@
+"""Run-up and shut-down that tables, files and pictures show."""
+
+from __future__ import annotations
+
+from laufruhe.machine import OperatingPoint, Run
+from laufruhe.physics.run_up import RunUp
+from laufruhe.physics.runs import point_of, runs_of
+from laufruhe.present.mounting import critical_speed, driven, facts_of, main_order
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.solvers.result import Result
+
+SECONDS = 3.0
+# criticals beyond this many times the highest speed are left out
+REACH_OVER, BEYOND = 5.0, 1.5
+
+
+def run_of(result: Result) -> Run:
+    """As the problem says, or in three seconds past every critical speed that is not far from the operating points."""
+    if result.problem.engine.run is not None:
+        return result.problem.engine.run
+    facts = facts_of(result.final)
+    top = max(point.speed for point in result.problem.points)
+    critical = [critical_speed(frequency, main_order(facts)) for frequency in driven(facts)]
+    last = BEYOND * max((speed for speed in critical if speed <= REACH_OVER * top), default=top)
+    return Run(last, SECONDS, SECONDS)
+
+
+def run_point(result: Result) -> OperatingPoint:
+    """The operating point whose gas drives the engine meanwhile."""
+    return point_of(run_of(result), result.problem.points)
+
+
+def shown_runs(result: Result, design: Evaluation) -> tuple[RunUp, RunUp]:
+    """Up and down, of one of the designs of a result."""
+    return runs_of(design.engine, run_point(result), design.fidelity, run_of(result))

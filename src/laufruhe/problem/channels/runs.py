@@ -1,0 +1,38 @@
+"""What a run-up and a shut-down through resonance reach (E28)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from laufruhe.physics.run_up import RunUp
+from laufruhe.physics.runs import point_of, runs_of
+from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.channels.kinds import Needs, NumberChannel
+
+
+@dataclass(frozen=True, eq=False)
+class RunChannel(NumberChannel):
+    """The most of a number in run-up and shut-down, integrated in time: no method designs for it."""
+
+    needs: Needs = Needs.RUN
+    minimised: bool = False
+    is_checked: ClassVar[bool] = True
+
+
+def _most(name: str, unit: str, number: Callable[[RunUp], float]) -> RunChannel:
+    def values(_: Asked, evaluation: Answered) -> Sequence[float]:
+        run = evaluation.engine.run
+        if run is None:
+            return ()
+        point = point_of(run, [loads.point for loads in evaluation.loads])
+        return (max(map(number, runs_of(evaluation.engine, point, evaluation.fidelity, run))),)
+
+    return RunChannel(name, unit, values=values)
+
+
+RUN_FORCE = _most("run-up force", "N", lambda run: run.worst_force)
+RUN_TRAVEL = _most("run-up travel", "m", lambda run: run.worst_travel)
+RUN_TWIST = _most("run-up twist", "rad", lambda run: run.worst_twist)
+OF_RUNS = (RUN_FORCE, RUN_TRAVEL, RUN_TWIST)
