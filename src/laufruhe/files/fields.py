@@ -31,6 +31,11 @@ T = TypeVar("T")
 Given = TypeVar("Given", bound=BaseModel)
 
 
+# what may stand behind a number: what of it is no tolerance, the reader says
+_BEHIND = "(?:(?:±|[+]/?-).*)?$"
+_TOLERANCE = {"type": "string", "description": "How far a built one may be off.", "examples": ["± 2 %"]}
+
+
 @dataclass(frozen=True)
 class Open:
     """A number left open between bounds [SI], with a value to start from."""
@@ -88,14 +93,19 @@ class Number:
         if not self.openable:
             return number
         pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
-        between = {"type": "object", "properties": {"between": pair, "start": number}, "required": ["between"]}
+        between = {
+            "type": "object",
+            "properties": {"between": pair, "start": number, "tolerance": _TOLERANCE},
+            "required": ["between"],
+        }
         return {"anyOf": [number, {**between, "additionalProperties": False}]}
 
     def _number_schema(self) -> dict[str, Any]:
         if not self.unit:
-            return {"type": "number"}
+            # text where it has a tolerance
+            return {"anyOf": [{"type": "number"}, {"type": "string", "examples": ["0.26 ± 1 %"]}]}
         told = {"description": units.dimension_name(self.unit), "examples": [units.example(self.unit)]}
-        text = {"type": "string", "pattern": units.pattern(self.unit), **told}
+        text = {"type": "string", "pattern": units.pattern(self.unit)[:-1] + _BEHIND, **told}
         return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
 
     def _read(self, given: Any) -> float | Open:

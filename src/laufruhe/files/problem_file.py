@@ -21,6 +21,7 @@ from laufruhe.files.mounts import BlockTable, MountsTable, RunUpTable
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
+from laufruhe.files.tolerances import RobustTable, TolerancesTable
 from laufruhe.files.torsion import TorsionTable
 
 SCHEMA = "laufruhe.schema.json"
@@ -60,6 +61,8 @@ class ProblemFile(Table):
     constraints: list[ConstraintTable] = Field(default_factory=list)
     fidelity: FidelityTable = Field(default_factory=FidelityTable)
     search: SearchTable = Field(default_factory=SearchTable)
+    tolerances: TolerancesTable | None = None
+    robust: RobustTable | None = None
 
 
 def schema() -> str:

@@ -7,6 +7,7 @@ import sys
 import tomllib
 from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -28,11 +29,14 @@ from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
+from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbers
 from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem, Search
+from laufruhe.problem.tolerance import Drawing, Tolerances
+from laufruhe.problem.tolerance import Path as Place
 
 DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 10_000_000
 """Of a file: tables within tables, entries of one list or table, and bytes."""
@@ -60,14 +64,18 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
     if "study" in tables:
         raise InputError(str(path), (Complaint("study", "", "makes this a study file", "use laufruhe study"),))
     try:
-        file = ProblemFile.model_validate(tables)
+        plain, written = parted(tables)
+    except Refused as refused:
+        raise InputError(str(path), (refused.complaint,)) from None
+    try:
+        file = ProblemFile.model_validate(plain)
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, ProblemFile)) from None
     try:
-        if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
-            return _assembled(file, file.engine, path=path)
-        closed = partial(_assembled, file, path=path)
-        return opened(file.engine, file.balancer_shafts, file.phasing, closed)
+        problem = _of_file(file, path)
+        each = tolerances_of(written, file.tolerances, problem, plain)
+        over = over_of(file.robust, each)
+        return problem.changed(tolerances=Tolerances(each, _Rebuilt(plain, path)), over=over) if each else problem
     except Refused as refused:
         raise InputError(str(path), (refused.complaint,)) from None
     except ModelError as error:
@@ -77,6 +85,31 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
 def shown_as(path: Path) -> Path:
     """By what name a file is spoken of: `-` is standard input."""
     return Path("stdin") if path == STDIN else path
+
+
+def _of_file(file: ProblemFile, path: Path) -> Problem:
+    """The problem of a file, its tolerances left out."""
+    if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
+        return _assembled(file, file.engine, path=path)
+    closed = partial(_assembled, file, path=path)
+    return opened(file.engine, file.balancer_shafts, file.phasing, closed)
+
+
+@dataclass(frozen=True)
+class _Rebuilt:
+    """What a file describes with other numbers at some of its places."""
+
+    tables: Mapping[str, Any]
+    path: Path
+
+    def __call__(self, changes: Mapping[Place, str | float]) -> Drawing:
+        """As built."""
+        try:
+            found = _of_file(ProblemFile.model_validate(with_numbers(self.tables, changes)), self.path)
+        except (ValidationError, Refused, ModelError) as error:
+            at = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
+            raise ModelError(f"an engine within its tolerances cannot be built, {at}: {error}; narrow one") from None
+        return Drawing(found.engine, found.points, found.decisions, found.mount_numbers)
 
 
 def tables_of(path: Path) -> dict[str, Any]:

@@ -88,12 +88,15 @@ class AffineProblem:
         Of the decisions.
     samples
         Steps over the common period of the load rows.
+    groups
+        Of each term the sum that it belongs to, the largest of which is minimised; one sum of all when empty.
     """
 
     terms: tuple[tuple[float, AffineNorm], ...]
     limits: tuple[tuple[float, AffineNorm], ...]
     domains: tuple[Domain, ...]
     samples: int
+    groups: tuple[int, ...] = ()
 
     @property
     def size(self) -> int:
@@ -129,8 +132,15 @@ class AffineProblem:
         return np.concatenate(found) if found else np.zeros(0)
 
     def objective(self, x: Array) -> float:
-        """Weighted sum of the terms."""
-        return sum(weight * norm.value(x) for weight, norm in self.terms)
+        """Weighted sum of the terms, or the largest of several."""
+        values = np.array([weight * norm.value(x) for weight, norm in self.terms])
+        return float(np.bincount(self.groups or [0] * len(values), values).max(initial=0.0))
+
+    def shared(self, shares: Array) -> AffineProblem:
+        """One sum in place of the largest of several, each by its share: no more, where shares add up to one."""
+        kept = [k for k, group in enumerate(self.groups) if shares[group] > 0.0]
+        terms = tuple((self.terms[k][0] * float(shares[self.groups[k]]), self.terms[k][1]) for k in kept)
+        return replace(self, terms=terms, groups=())
 
     def excess(self, x: Array) -> float:
         """Largest relative excess over a limit, negative where all have room; zero without limits."""

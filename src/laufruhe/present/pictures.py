@@ -14,6 +14,7 @@ PICTURES = {
     "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
     "modes": "Share of each motion in the kinetic energy of each natural mode.",
     "run_up": "Largest force and travel on any mount while the engine runs up and is shut down.",
+    "robust": "The best drawing and the design decided, each built many times, and what each tolerance costs.",
     "trade": "What slightly uneven firing buys.",
 }
 CAPTIONS = {f"{name}.png": caption for name, caption in PICTURES.items()}

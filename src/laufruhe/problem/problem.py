@@ -13,6 +13,7 @@ from laufruhe.problem.decision import Decision, Kind, Numbers, moved_numbers
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.sets import Value
+from laufruhe.problem.tolerance import NO_TOLERANCES, Drawing, Over, Tolerances
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,10 @@ class Problem:
         How searches go about what is not convex.
     phasing
         What of throws, firing order and the choice of shafts is open; None if nothing is.
+    tolerances
+        How far built engines stand from the drawing.
+    over
+        Of which of them what is minimised and limited is taken; None for the drawing.
     """
 
     name: str
@@ -78,6 +83,8 @@ class Problem:
     mount_numbers: tuple[tuple[float, ...], ...] = ()
     search: Search = Search()
     phasing: Phasing | None = None
+    tolerances: Tolerances = NO_TOLERANCES
+    over: Over | None = None
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"
@@ -177,9 +184,12 @@ class Problem:
     def objective_name(self) -> str:
         """What is minimised, in words; empty where nothing is."""
         terms = self.objective
+        name = " + ".join(f"{term.weight:g} x {term.measure.name}" for term in terms)
         if len(terms) == 1 and terms[0].weight == 1.0:
-            return terms[0].measure.name
-        return " + ".join(f"{term.weight:g} x {term.measure.name}" for term in terms)
+            name = terms[0].measure.name
+        if self.over is None or not terms:
+            return name
+        return self.over.named(name, self.tolerances.is_affine)
 
     @property
     def objective_unit(self) -> str | None:
@@ -200,6 +210,15 @@ class Problem:
     def at(self, fidelity: Fidelity) -> Problem:
         """The same problem at another fidelity."""
         return self.changed(fidelity=fidelity)
+
+    def built(self, errors: Any) -> Problem:
+        """The problem of engines with these errors, shape (columns,), none of which is left to chance (R2)."""
+        given = Drawing(self.engine, self.points, self.decisions, self.mount_numbers)
+        found = self.tolerances.built(given, errors)
+        return replace(
+            self, engine=found.engine, points=found.points, decisions=found.decisions,
+            mount_numbers=found.mount_numbers, tolerances=NO_TOLERANCES, over=None,
+        )  # fmt: skip
 
     def design(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Engine:
         """The engine with decisions, all of them unless some are named, in place of those it was given with."""

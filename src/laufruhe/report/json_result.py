@@ -66,6 +66,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         **({"torsion": _torsion(result)} if is_twisted(result) else {}),
         "firing_intervals": list(result.final.engine.firing_intervals),
         **_phasing(result),
+        **_robust(result),
         "fidelity": {
             # the crank inertia is null where the crank turns evenly
             **asdict(problem.fidelity),
@@ -257,3 +258,22 @@ def _star(star: RankedStar) -> Record:
     names += "free_force=forces free_couple=couples even firing_order_count=order_count"
     orders = [_of(order, "order neighbours longest_gap roll_content intervals") for order in star.firing_orders]
     return {**_of(star, names), "firing_orders": orders}
+
+
+def _robust(result: Result) -> Record:
+    """`robust` where built engines were decided for: two designs under tolerance, and the price of each tolerance."""
+    found = result.robust
+    if found is None:
+        return {}
+    names = "exact share scenarios divisions engines seed exceeding exceeding_at_most"
+    designs = {"best_drawing": found.nominal, "decided": found.robust}
+    return {
+        "robust": {
+            "over": "worst case" if found.over.share is None else found.over.share,
+            **_of(found, names),
+            **{key: {**_of(d, "drawing worst share low high quantiles"),
+                     "decisions": {name: {"value": value, "unit": unit} for name, value, unit in d.decisions}}
+               for key, d in designs.items()},
+            "tolerances": [_of(t, "name size unit law scope errors price saving") for t in found.tolerances],
+        }
+    }  # fmt: skip

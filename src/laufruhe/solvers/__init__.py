@@ -21,6 +21,7 @@ from laufruhe.solvers.apart import solve_apart
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.places import solve_places
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.robust import solve_robust
 from laufruhe.solvers.unbalances import beyond_mounts, solve_unbalances
 
 __all__ = ["METHODS", "Result", "Status", "solve", "state"]
@@ -220,7 +221,9 @@ def _checked(problem: Problem, checked: Sequence[Limit]) -> Result:
 
 
 def _decided(problem: Problem) -> Result:
-    """By the first method that suits."""
+    """By the first method that suits, for the drawing or for the engines that are built to it."""
+    if problem.over is not None:
+        return solve_robust(problem, _decided)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
     kinds = kinds_of(problem)

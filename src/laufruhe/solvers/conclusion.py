@@ -168,6 +168,7 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
         Whether it is only where a search starts, so that it may stand on a resonance.
     """
     started = time.perf_counter()
+    problem = problem if problem.over is None else problem.changed(over=None)
     evaluation = evaluate_start(problem) if to_start_from else evaluate(problem)
     return Result(
         problem=problem,

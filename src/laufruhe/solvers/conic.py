@@ -9,7 +9,7 @@ it had: whatever it says is judged by the exact model, and bounds are taken from
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem, reach
 from laufruhe.numerics.budget import left
-from laufruhe.numerics.norms import Cones, Grid, lengths
+from laufruhe.numerics.norms import Grid, lengths
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers, excludes
+from laufruhe.solvers.cone_rows import Block, Rows
 
 Array = NDArray[np.float64]
 
@@ -35,6 +36,8 @@ ATTEMPTS: tuple[Mapping[str, Any], ...] = (
 """Settings of the solver, in the order in which they are tried."""
 FEW_ROWS, ROUNDS, NEAR_LIMIT = 500, 6, 0.95
 """Rows of a peak that are all taken, how often rows are added, and the share of a limit from which they are."""
+LEAST_SHARE = 1e-7
+"""Under which a sum is no part of the largest."""
 SHORTEST = 0.05
 """Seconds that one attempt has where time is over."""
 
@@ -53,71 +56,15 @@ class ConicSolution:
         Spent inside the cone solver.
     iterations
         Of the interior-point method.
+    shares
+        Of every sum of terms in the largest of them, which add up to one; empty where there is one sum.
     """
 
     x: Array | None
     multipliers: Multipliers
     solver_seconds: float
     iterations: int
-
-
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """One norm: its columns of heads and its rows in the program.
-
-    Attributes
-    ----------
-    cones
-        Its form.
-    unit
-        Rows are counted in it.
-    first
-        First column of its heads.
-    """
-
-    norm: AffineNorm
-    cones: Cones
-    unit: float
-    first: int
-
-    @property
-    def heads(self) -> slice:
-        """Columns of the heads."""
-        return slice(self.first, self.first + len(self.cones.value))
-
-    @property
-    def centres(self) -> NDArray[np.int64]:
-        """Column of the free vector that each number of the rows is counted from, shape (k, d); none, (0, 0)."""
-        if not self.cones.centred:
-            return np.zeros((0, 0), dtype=int)
-        k, d = self.norm.constant.shape
-        signal = np.arange(k) // self.norm.grid.steps
-        return np.asarray(self.heads.stop + signal[:, None] * d + np.arange(d))
-
-
-class _Rows:
-    """A x + s = b, s in a product of cones: blocks of rows as they are added."""
-
-    def __init__(self, columns: int) -> None:
-        self.columns = columns
-        self.entries: list[tuple[NDArray[np.int64], NDArray[np.int64], Array]] = []
-        self.right: list[Array] = []
-        self.cones: list[Any] = []
-        self.count = 0
-
-    def add(self, rows: Any, columns: Any, values: Any, right: Array) -> None:
-        """Entries, their rows counted from the block's first."""
-        at, across, numbers = np.broadcast_arrays(rows, columns, values)
-        self.entries.append((at.ravel() + self.count, across.ravel(), numbers.ravel()))
-        self.right.append(right)
-        self.count += len(right)
-
-    def matrix(self) -> Any:
-        from scipy.sparse import csc_array
-
-        rows, columns, values = (np.concatenate([entry[k] for entry in self.entries]) for k in range(3))
-        used = values != 0.0
-        return csc_array((values[used], (rows[used], columns[used])), shape=(self.count, self.columns))
+    shares: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def solve_cones(problem: AffineProblem, held: tuple[Array, Array] | None = None) -> ConicSolution:
@@ -128,7 +75,8 @@ def solve_cones(problem: AffineProblem, held: tuple[Array, Array] | None = None)
     held
         A and b of A x = b, which the decision vector is to keep as well.
     """
-    acting = [k for k, (_, norm) in enumerate(problem.terms) if norm.slope.any()]
+    # of several sums those that nothing acts on may still be the largest
+    acting = [k for k, (_, norm) in enumerate(problem.terms) if norm.slope.any() or problem.groups]
     binding = [k for k, limit in enumerate(problem.limits) if _may_bind(problem, *limit)]
     fewer = replace(
         problem, terms=tuple(problem.terms[k] for k in acting), limits=tuple(problem.limits[k] for k in binding)
@@ -218,20 +166,20 @@ def _rank(problem: AffineProblem, x: Array | None) -> tuple[float, float]:
 
 def _program(
     problem: AffineProblem, held: tuple[Array, Array] | None
-) -> tuple[list[_Block], list[int], _Rows, Array]:  # fmt: skip
+) -> tuple[list[Block], list[int], Rows, Array]:  # fmt: skip
     """Blocks of the norms, their first rows, all rows, and the cost of every column."""
     import clarabel
 
     unit = reach(problem, [norm for _, norm in problem.terms])
-    blocks: list[_Block] = []
+    blocks: list[Block] = []
     columns = problem.size
     for norm, size in [
         *((norm, unit) for _, norm in problem.terms),
         *((norm, reach(problem, [norm])) for _, norm in problem.limits),
     ]:
-        blocks.append(_Block(norm, norm.norm.cones(norm.grid), size, columns))
+        blocks.append(Block(norm, norm.norm.cones(norm.grid), size, columns))
         columns = int(blocks[-1].centres.max(initial=blocks[-1].heads.stop - 1)) + 1
-    rows = _Rows(columns)
+    rows = Rows(columns)
     if held is not None:
         matrix, right = held
         rows.add(np.arange(len(right))[:, None], np.arange(problem.size), matrix * problem.units, right)
@@ -247,13 +195,34 @@ def _program(
             rows.add(at, block.first + heads, factors, np.zeros(int(at.max()) + 1))
             rows.cones.append(clarabel.NonnegativeConeT(int(at.max()) + 1))
     starts = [_add_norm(rows, block, problem) for block in blocks]
-    cost = np.zeros(columns)
-    for (weight, _), block in zip(problem.terms, blocks, strict=False):
-        cost[block.heads] = weight * block.cones.value
-    return blocks, starts, rows, cost
+    return blocks, starts, rows, _cost(problem, blocks, rows)
 
 
-def _told(rows: _Rows, cost: Array, told: Mapping[str, Any]) -> Any:
+def _cost(problem: AffineProblem, blocks: Sequence[Block], rows: Rows) -> Array:
+    """Of every column; of several sums the cost is a last column that none of them exceeds."""
+    import clarabel
+
+    sums = np.zeros((max(problem.groups, default=0) + 1, rows.columns))
+    for k, ((weight, _), block) in enumerate(zip(problem.terms, blocks, strict=False)):
+        sums[problem.groups[k] if problem.groups else 0, block.heads] = weight * block.cones.value
+    if not problem.groups:
+        return np.asarray(sums[0])
+    group, column = np.nonzero(sums)
+    last = np.arange(len(sums))
+    rows.add(
+        np.concatenate([group, last]),
+        np.concatenate([column, np.full(len(sums), rows.columns)]),
+        np.concatenate([sums[group, column], np.full(len(sums), -1.0)]),
+        np.zeros(len(sums)),
+    )
+    rows.cones.append(clarabel.NonnegativeConeT(len(sums)))
+    rows.columns += 1
+    cost = np.zeros(rows.columns)
+    cost[-1] = 1.0
+    return cost
+
+
+def _told(rows: Rows, cost: Array, told: Mapping[str, Any]) -> Any:
     import clarabel
     from scipy.sparse import csc_array
 
@@ -267,15 +236,24 @@ def _told(rows: _Rows, cost: Array, told: Mapping[str, Any]) -> Any:
     return clarabel.DefaultSolver(nothing, cost, rows.matrix(), right, rows.cones, settings).solve()
 
 
-def _answer(problem: AffineProblem, blocks: list[_Block], starts: list[int], found: Any) -> ConicSolution:
+def _answer(problem: AffineProblem, blocks: list[Block], starts: list[int], found: Any) -> ConicSolution:
     """Decisions in their sets, and dual rows; zero where the solver has lost its numbers."""
     x = projected(problem, _numbers(found.x)[: problem.size] * problem.units)
     duals = _numbers(found.z)
     unit = blocks[0].unit if problem.terms else 1.0
     rows = [_dual_rows(block, duals, start, unit) for block, start in zip(blocks, starts, strict=True)]
-    terms = tuple(z / weight for z, (weight, _) in zip(rows, problem.terms, strict=False))
+    shares = np.ones(1)
+    if problem.groups:
+        # the last rows of the program are those of the sums
+        shares = np.maximum(duals[len(duals) - max(problem.groups) - 1 :], 0.0)
+        shares = shares / shares.sum() if shares.any() else np.full(len(shares), 1.0 / len(shares))
+        shares = np.where(shares > LEAST_SHARE, shares, 0.0)
+        shares = shares / shares.sum()
+    of = [float(shares[group]) for group in problem.groups] or [1.0] * len(problem.terms)
+    terms = tuple(z / (weight * share or 1.0) for z, (weight, _), share in zip(rows, problem.terms, of, strict=False))
     multipliers = Multipliers(terms, tuple(rows[len(terms) :]))
-    return ConicSolution(x, multipliers, float(found.solve_time), int(found.iterations))
+    own = shares if problem.groups else np.zeros(0)
+    return ConicSolution(x, multipliers, float(found.solve_time), int(found.iterations), own)
 
 
 def _numbers(values: Sequence[float]) -> Array:
@@ -289,7 +267,7 @@ def projected(problem: AffineProblem, x: Array) -> Array:
     return x
 
 
-def _add_domain(rows: _Rows, domain: Domain, unit: float) -> None:
+def _add_domain(rows: Rows, domain: Domain, unit: float) -> None:
     """The decision's own set, in units of a size (P4)."""
     import clarabel
 
@@ -307,7 +285,7 @@ def _add_domain(rows: _Rows, domain: Domain, unit: float) -> None:
     rows.cones.append(clarabel.SecondOrderConeT(3))
 
 
-def _add_norm(rows: _Rows, block: _Block, problem: AffineProblem) -> int:
+def _add_norm(rows: Rows, block: Block, problem: AffineProblem) -> int:
     """V0 + B x in a cone a row, or in one cone for a root mean square; returns the first row."""
     import clarabel
 
@@ -334,7 +312,7 @@ def _add_norm(rows: _Rows, block: _Block, problem: AffineProblem) -> int:
     return start
 
 
-def _dual_rows(block: _Block, duals: Array, start: int, objective_unit: float) -> Array:
+def _dual_rows(block: Block, duals: Array, start: int, objective_unit: float) -> Array:
     """mu Z of the rows [SI] (P2), in the objective's own unit."""
     k, d = block.norm.constant.shape
     if block.cones.whole:

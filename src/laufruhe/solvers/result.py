@@ -12,6 +12,7 @@ from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.ranking import PhasingResult
+from laufruhe.solvers.robust_result import RobustResult
 
 
 class Status(StrEnum):
@@ -110,6 +111,8 @@ class Result:
         Seconds by what they were spent on.
     phasing
         Ranking of stars and firing orders, where these were open.
+    robust
+        Designs under tolerance, where built engines were decided for.
     """
 
     problem: Problem
@@ -125,6 +128,7 @@ class Result:
     error_estimate: float = 0.0
     timing: dict[str, float] = field(default_factory=dict)
     phasing: PhasingResult | None = None
+    robust: RobustResult | None = None
 
     @property
     def prices(self) -> dict[Side, float]:

@@ -83,7 +83,7 @@ def solve_unbalances(problem: Problem) -> Result:
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
-        conflict = _conflict(_tightened(model.at(samples), 0.0), [limit.name for limit in problem.load_limits])
+        conflict = conflict_of(tightened(model.at(samples), 0.0), [limit.name for limit in problem.load_limits])
         return none_within(problem, initial, conflict, timing)
     hopeless = _hopeless(problem, optimum)
     if hopeless:
@@ -137,7 +137,7 @@ def _allowed(problem: Problem, model: AffineModel, samples: int, nothing: float)
 
 def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float, margin: float) -> _Optimum | None:
     coarse, fine = model.at(samples), model.at(2 * samples)
-    solution = solve_cones(_tightened(coarse, margin))
+    solution = solve_cones(tightened(coarse, margin))
     if solution.x is None:
         return None
     x = _settled(problem, fine, solution.x)
@@ -151,7 +151,7 @@ def _has_peaks(problem: Problem) -> bool:
     return any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
 
 
-def _tightened(affine: AffineProblem, margin: float) -> AffineProblem:
+def tightened(affine: AffineProblem, margin: float) -> AffineProblem:
     """Limits a little lower."""
     return replace(affine, limits=tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits))
 
@@ -249,7 +249,7 @@ def _shown(limits: Sequence[Limit], optimum: _Optimum, value: float) -> Shown:
     )
 
 
-def _conflict(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:
+def conflict_of(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:
     """A smallest set of limits that no design meets together: each is needed for the contradiction."""
     kept = list(range(len(affine.limits)))
     for k in range(len(affine.limits)):

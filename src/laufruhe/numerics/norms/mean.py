@@ -24,6 +24,9 @@ from laufruhe.numerics.norms.norm import (
 )
 from laufruhe.numerics.spectrum import Spectrum
 
+LEAST = 1e-9
+"""Share of the longest row that a majorant takes the shortest for."""
+
 
 class Mean(Norm):
     """Weighted sum of the lengths."""
@@ -67,6 +70,11 @@ class Mean(Norm):
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
         """Lengths times weights."""
         return np.asarray(np.dot(lengths, weights))
+
+    def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float]:
+        """|v| <= (|v|^2 / c + c) / 2 of every row."""
+        size = np.maximum(lengths, LEAST * float(lengths.max(initial=0.0)) or 1.0)
+        return grid.weights / size, 0.5 * float(grid.weights @ size)
 
     def cones(self, grid: Grid) -> Cones:
         """A head for each row."""

@@ -165,6 +165,15 @@ class Norm(ABC):
         """Of many designs from the lengths of their rows, shape (..., k) to (...); the lengths are used up."""
         raise TypeError(f"{self.name} is not known from lengths alone")
 
+    def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float] | None:
+        """Squares that lie over the norm, and touch it where the rows are as long as these (R6).
+
+        Returns
+        -------
+        a, shape (k,), and c of norm(V) <= c + sum_k a_k |v_k|^2 / 2 for every V; None where the norm has no such.
+        """
+        return None
+
     @abstractmethod
     def cones(self, grid: Grid) -> Cones:
         """As second-order cones."""

@@ -54,6 +54,11 @@ class RootMeanSquare(Norm):
         """The root of squares times weights."""
         return np.asarray(np.sqrt(np.dot(np.multiply(lengths, lengths, out=lengths), weights)))
 
+    def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float]:
+        """N <= (N^2 / c + c) / 2 of the whole."""
+        whole = self.value(grid, lengths[:, None]) or 1.0
+        return grid.weights / whole, 0.5 * whole
+
     def cones(self, grid: Grid) -> Cones:
         """One cone for all rows, each times the root of its weight."""
         return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), whole=True)

@@ -1,0 +1,341 @@
+"""Tolerances in a problem file: "1.25 kg ± 2 %" at a number, a table [tolerances], and what each moves."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+from pydantic import Field
+
+from laufruhe import units
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused, key_path
+from laufruhe.files.fields import Table
+from laufruhe.machine import Engine, Rotor
+from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.tolerance import (
+    AddedDrive,
+    Error,
+    ErrorDrive,
+    FileDrive,
+    Law,
+    Over,
+    Path,
+    PistonDrive,
+    Scope,
+    ShareDrive,
+    Tolerance,
+)
+
+SIGNS = ("±", "+-", "+/-")
+_TOLERANCE = re.compile(
+    r"^(?P<number>.*?)\s*(?:±|\+/-|\+-)\s*(?P<size>.*?)(?P<words>(?:\s+(?:normal|uniform|piece|batch))*)\s*$"
+)
+_NUMBER = re.compile(r"^\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_ROOMS = ("engine", "gas", "mounts", "block", "counterweights", "balancer_shafts")
+_SIZES = ("mass", "unbalance", "radius")
+_EXAMPLE = 'write for example "1.25 kg ± 2 %" or "1.25 kg +- 25 g normal batch"'
+RESIDUAL = "tolerances.residual_unbalance"
+
+
+class TolerancesTable(Table):
+    """What of a built engine has no number in the drawing that it could be off from."""
+
+    residual_unbalance: str | None = Field(
+        default=None, description="Left on the crankshaft by balancing: an unbalance on each plane, or a grade of "
+        "ISO 21940-11 for all of them together.", examples=["G 6.3", "50 g cm"],
+    )  # fmt: skip
+    rotor_mass: f.PositiveMass | None = f.told("That the grade is of: crankshaft, flywheel, clutch.")
+    planes: int = Field(default=2, ge=1, le=48, description="Of balancing, from the first throw to the last.")
+    law: Literal["uniform", "normal"] = "uniform"
+
+
+class RobustTable(Table):
+    """Of which built engines what is minimised and limited is taken."""
+
+    over: str = Field(default="worst case", description='"worst case", or a share of engines such as "95 %".')
+    engines: int = Field(default=1000, ge=20, le=100_000, description="Drawn where a share is minimised.")
+    seed: int = Field(default=1, ge=0)
+
+
+@dataclass(frozen=True)
+class Written:
+    """A tolerance as it stands in a file.
+
+    Attributes
+    ----------
+    path
+        Of the number.
+    text
+        All of it.
+    number, unit
+        Of the drawing, as written; no number where that is open.
+    size
+        Largest error as written: with a unit, in percent, or a plain number.
+    """
+
+    path: Path
+    text: str
+    number: float | None
+    unit: str
+    size: str
+    law: Law
+    scope: Scope | None
+
+    @property
+    def where(self) -> str:
+        """For the reader of a complaint."""
+        return key_path(self.path)
+
+    def refused(self, rule: str, remedy: str) -> Refused:
+        """One line about it."""
+        return Refused(self.where, self.text, rule, remedy)
+
+    @property
+    def is_share(self) -> bool:
+        """Whether it is in percent."""
+        return self.size.endswith("%")
+
+    @property
+    def error(self) -> float:
+        """Largest error, in the unit of the number, or as a share."""
+        if self.is_share:
+            share = self._parsed(self.size[:-1].strip() or "?", "") / 100.0
+            if share >= 1.0:
+                raise self.refused("is a tolerance of the whole number or more", "give less than 100 %")
+            return share
+        if not self.unit:
+            return self._parsed(self.size, "")
+        own = f"1 {self.unit}"
+        dimension = units.dimension_of(own)
+        if dimension is None:
+            raise self.refused("is no number with a unit known here", _EXAMPLE)
+        bare = _NUMBER.fullmatch(self.size) is not None
+        return self._parsed(f"{self.size} {self.unit}" if bare else self.size, dimension) / units.parse(own, dimension)
+
+    def _parsed(self, text: str, dimension: str) -> float:
+        try:
+            value = units.parse(text, dimension)
+        except units.UnitError:
+            raise self.refused(f"has a tolerance '{self.size}' that is no number of its kind", _EXAMPLE) from None
+        if value < 0.0:
+            raise self.refused("has a negative tolerance", "both ways are meant; leave the sign out")
+        return value
+
+
+def parted(tables: Mapping[str, Any]) -> tuple[dict[str, Any], list[Written]]:
+    """Tables of a file without their tolerances, and these."""
+    found: list[Written] = []
+    plain = {key: _parted(value, (key,), found) if key in _ROOMS else value for key, value in tables.items()}
+    return plain, found
+
+
+def _parted(node: Any, path: Path, found: list[Written]) -> Any:
+    if isinstance(node, list):
+        return [_parted(entry, (*path, k), found) for k, entry in enumerate(node)]
+    if isinstance(node, dict):
+        told = node.get("tolerance")
+        if "between" in node and isinstance(told, str):
+            found.append(_written(told if any(sign in told for sign in SIGNS) else f"± {told}", path))
+            node = {key: value for key, value in node.items() if key != "tolerance"}
+            if found[-1].number is not None:
+                raise found[-1].refused("gives a number beside its bounds", 'write for example "± 2 %"')
+        return {key: _parted(value, (*path, key), found) for key, value in node.items()}
+    if isinstance(node, str) and any(sign in node for sign in SIGNS) and path[-1] not in ("name", "names"):
+        written = _written(node, path)
+        if written.number is None:
+            return node
+        found.append(written)
+        return node[: re.search(r"±|\+/-|\+-", node).start()].strip() if written.unit else written.number  # type: ignore[union-attr]
+    return node
+
+
+def _written(text: str, path: Path) -> Written:
+    match = _TOLERANCE.match(text)
+    where = key_path(path)
+    if match is None or not match["size"]:
+        raise Refused(where, text, "has a sign of a tolerance and none behind it", _EXAMPLE)
+    words = match["words"].split()
+    laws, scopes = ([w for w in words if w in list(kind)] for kind in (Law, Scope))
+    if len(laws) > 1 or len(scopes) > 1:
+        raise Refused(where, text, "names two laws or two scopes", "keep one of each")
+    number = _NUMBER.match(match["number"])
+    return Written(
+        path, text, float(number.group()) if number else None, units.unit_of(match["number"]), match["size"],
+        Law(laws[0]) if laws else Law.UNIFORM, Scope(scopes[0]) if scopes else None,
+    )  # fmt: skip
+
+
+def with_numbers(tables: Mapping[str, Any], changes: Mapping[Path, str | float]) -> dict[str, Any]:
+    """Tables with other numbers at some places."""
+    return {key: _changed(value, (key,), changes) for key, value in tables.items()}
+
+
+def _changed(node: Any, path: Path, changes: Mapping[Path, str | float]) -> Any:
+    if path in changes:
+        return changes[path]
+    if isinstance(node, dict):
+        return {key: _changed(value, (*path, key), changes) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_changed(value, (*path, k), changes) for k, value in enumerate(node)]
+    return node
+
+
+def over_of(table: RobustTable | None, tolerances: Sequence[Tolerance]) -> Over | None:
+    """Of which engines what is minimised and limited is taken."""
+    if table is None:
+        return None
+    if not tolerances:
+        raise Refused("robust", None, "has no tolerances to stand", 'give a number one, for example "1.25 kg ± 2 %"')
+    if table.over == "worst case":
+        return Over(None, table.engines, table.seed)
+    try:
+        share = units.parse(table.over, "") if table.over.strip().endswith("%") else math.nan
+    except units.UnitError:
+        share = math.nan
+    if not 0.5 < share < 1.0:
+        rule = "is neither the worst case nor a share of engines between 50 and 100 %"
+        raise Refused("robust.over", table.over, rule, 'write "worst case", or for example "95 %"')
+    if table.engines * (1.0 - share) < 1.0:
+        rule = f"leaves none of {table.engines} engines above"
+        raise Refused("robust.over", table.over, rule, "raise engines, or lower the share")
+    return Over(share, table.engines, table.seed)
+
+
+def tolerances_of(
+    written: Sequence[Written], table: TolerancesTable | None, problem: Problem, tables: Mapping[str, Any]
+) -> tuple[Tolerance, ...]:
+    """All tolerances of a file, and what of the engine each moves."""
+    found = [_tolerance(one, problem, tables) for one in written]
+    return (*found, *_residual(table, problem.engine, max(point.speed for point in problem.points)))
+
+
+_Found: TypeAlias = tuple[list[Error], float, str]
+
+
+def _tolerance(one: Written, problem: Problem, tables: Mapping[str, Any]) -> Tolerance:
+    key = one.path[-1]
+    pieces = {"reciprocating_mass": _pistons, "rotating_mass": _pins}
+    if one.path[:1] == ("engine",) and len(one.path) == 2 and key in pieces:
+        errors, size, unit = pieces[str(key)](one, problem.engine)
+    elif one.path[0] in ("counterweights", "balancer_shafts") and key in _SIZES:
+        errors, size, unit = _rotor(one, problem, tables)
+    else:
+        return _of_file(one)
+    scope = one.scope or Scope.PIECE
+    name = f"{errors[0].name}.{key}" if one.path[0] != "engine" else one.where
+    if scope is Scope.BATCH:
+        errors = [Error(name, tuple(drive for error in errors for drive in error.drives))]
+    return Tolerance(name, unit, size, tuple(errors), one.law, scope)
+
+
+def _pistons(one: Written, engine: Engine) -> _Found:
+    size = _mass(one)
+    drives = [(part.name, PistonDrive(k, size)) for k, part in enumerate(engine.slider_cranks)]
+    if size >= min(part.reciprocating_mass for part in engine.slider_cranks):
+        raise one.refused("is a tolerance of the whole mass or more", "give less")
+    return [Error(name, (drive,)) for name, drive in drives], size, "kg"
+
+
+def _pins(one: Written, engine: Engine) -> _Found:
+    """Every throw once: cylinders on one throw share its mass."""
+    size, found, seen = _mass(one), [], set()
+    for part in engine.slider_cranks:
+        at = (part.shaft.name, round(part.x, 9), round(math.remainder(part.throw, math.tau), 9))
+        if at in seen:
+            continue
+        seen.add(at)
+        pin = Rotor("pin", part.x, part.crank_radius * complex(math.cos(part.throw), math.sin(part.throw)), part.shaft)
+        found.append(
+            Error(
+                f"throw of {part.name}",
+                (AddedDrive(f"error of the pin of {part.name}", part.x, size * pin.unbalance, part.shaft),),
+            )
+        )
+    return found, size, "kg"
+
+
+def _mass(one: Written) -> float:
+    """Largest error of a mass [kg]."""
+    number = one.number or 0.0
+    return one.error * (abs(number) if one.is_share else 1.0) * units.parse(f"1 {one.unit}", "kg")
+
+
+def _rotor(one: Written, problem: Problem, tables: Mapping[str, Any]) -> _Found:
+    """Of the size of one counterweight or balancer."""
+    names = _names(one.path, tables)
+    decided = {drive.rotor: decision for decision in problem.decisions for drive in decision.rotor_drives}
+    if one.is_share:
+        share = one.error
+    elif one.number:
+        share = one.error / abs(one.number)
+    else:
+        rule = "is open, and an error in its own unit points where it does"
+        raise one.refused(rule, "give the tolerance in percent")
+    if share >= 1.0:
+        raise one.refused("is a tolerance of the whole number or more", "give less")
+    errors = [Error(name, (ShareDrive(name, share),)) for name in names]
+    if not any(
+        rotor.name in names and (rotor.unbalance != 0.0 or rotor.name in decided) for rotor in problem.engine.rotors
+    ):
+        raise one.refused("has nothing that could be off", "leave the tolerance out")
+    return errors, share, ""
+
+
+def _names(path: Path, tables: Mapping[str, Any]) -> list[str]:
+    """Rotors that a table of a file makes."""
+    table = tables[str(path[0])][path[1]]
+    if path[0] == "counterweights":
+        return [str(table["name"])]
+    unbalances, j = table["unbalances"], int(path[3])
+    own = unbalances[j].get("name")
+    single = len(unbalances) == 1 and own is None
+    return [str(table["name"]) if single else f"{table['name']}.{own or j + 1}"]
+
+
+def _of_file(one: Written) -> Tolerance:
+    """Of any other number: the engine is put together anew with it."""
+    if one.number is None:
+        raise one.refused("is open, and only masses and unbalances may be open and off", "fix it, or leave it out")
+    if one.scope is Scope.PIECE and not any(isinstance(part, int) for part in one.path):
+        raise one.refused("is one number of the whole engine", "write batch, or leave the word out")
+    gain = one.error * (abs(one.number) if one.is_share else 1.0)
+    dimension = (units.dimension_of(f"1 {one.unit}") or "") if one.unit else ""
+    size = gain * (units.parse(f"1 {one.unit}", dimension) if one.unit else 1.0)
+    drive: ErrorDrive = FileDrive(one.path, one.number, gain, one.unit)
+    scope = one.scope or (Scope.PIECE if any(isinstance(part, int) for part in one.path) else Scope.BATCH)
+    return Tolerance(one.where, dimension, size, (Error(one.where, (drive,)),), one.law, scope)
+
+
+def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> list[Tolerance]:
+    """What balancing leaves on the crankshaft, at any angle, on planes from the first throw to the last."""
+    if table is None or table.residual_unbalance is None:
+        if table is not None and table.rotor_mass is not None:
+            raise Refused("tolerances.rotor_mass", None, "goes with a grade", "add residual_unbalance, or leave it out")
+        return []
+    grade = grade_of(table.residual_unbalance)
+    if grade is None:
+        try:
+            each = units.parse(table.residual_unbalance, "kg m")
+        except units.UnitError:
+            rule, remedy = "is neither a grade nor an unbalance", 'write for example "G 6.3" or "50 g cm"'
+            raise Refused(RESIDUAL, table.residual_unbalance, rule, remedy) from None
+        if table.rotor_mass is not None:
+            raise Refused("tolerances.rotor_mass", None, "goes with a grade, not with an unbalance", "leave it out")
+    elif table.rotor_mass is None:
+        rule = "is missing, and a grade is of a mass"
+        raise Refused("tolerances.rotor_mass", None, rule, "add that of crankshaft, flywheel and clutch")
+    else:
+        each = permitted_unbalance(grade, table.rotor_mass, speed) / table.planes
+    if each < 0.0:
+        raise Refused(RESIDUAL, table.residual_unbalance, "is negative", "give its size")
+    front, rear = (pick(part.x for part in engine.slider_cranks) for pick in (max, min))
+    places = [front + (rear - front) * k / max(table.planes - 1, 1) for k in range(table.planes)]
+    errors = tuple(
+        Error(f"plane {k + 1}", (AddedDrive(f"residual unbalance {k + 1}", x, each),), 2) for k, x in enumerate(places)
+    )
+    return [Tolerance(RESIDUAL, "kg m", each, errors, Law(table.law))]

@@ -1,0 +1,73 @@
+"""One design as it is built: its loads as norms of rows that are affine in the errors (R2, R3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.numerics.batch_norms import BatchNorm
+from laufruhe.problem.evaluation import Evaluation, evaluate, over
+from laufruhe.problem.measure import Measure, bends_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+
+Array = NDArray[np.float64]
+
+
+class BuiltEngines:
+    """The loads of one design as drawn, and what every error of a whole size adds.
+
+    Parameters
+    ----------
+    problem
+        With its tolerances; loads have to be affine in all errors.
+    values
+        Of its decisions.
+    samples
+        Steps over the cycle.
+    """
+
+    def __init__(self, problem: Problem, values: Sequence[Value], samples: int) -> None:
+        self.problem, self.samples = problem, samples
+        units = np.concatenate([np.zeros((1, problem.tolerances.count)), np.eye(problem.tolerances.count)])
+        self._built = [evaluated(problem.built(unit), values, samples) for unit in units]
+
+    @property
+    def drawn(self) -> Evaluation:
+        """As on the drawing."""
+        return self._built[0]
+
+    def norm(self, measure: Measure) -> AffineNorm:
+        """A measure over the errors."""
+        drawn, finer = self.drawn, measure.norm.refinement
+        bends = None
+        if measure.is_load:
+            signals = over(drawn.engine.cycle.base_order, drawn.signals(measure.load))
+            bends = bends_of(measure, signals, drawn.engine)
+        rows = [each.rows(measure, finer * self.samples, bends) for each in self._built]
+        bare = rows[0].vectors
+        slope = np.stack([each.vectors - bare for each in rows[1:]], axis=-1) if rows[1:] else bare[..., None][..., :0]
+        return AffineNorm(rows[0].norm, bare, np.ascontiguousarray(slope), rows[0].grid)
+
+    @property
+    def terms(self) -> tuple[tuple[float, AffineNorm], ...]:
+        """Of the objective."""
+        return tuple((term.weight, self.norm(term.measure)) for term in self.problem.objective)
+
+
+def evaluated(built: Problem, values: Sequence[Value], samples: int) -> Evaluation:
+    """A design with the errors of a built problem."""
+    return evaluate(built, built.design(values), samples)
+
+
+def values_of(terms: Sequence[tuple[float, AffineNorm]], errors: Array) -> Array:
+    """Weighted sum of the norms of many engines, errors of shape (engines, columns)."""
+    features = np.concatenate([np.ones((len(errors), 1)), errors], axis=1)
+    total = np.zeros(len(errors))
+    for weight, norm in terms:
+        rows = np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
+        total += weight * BatchNorm(norm.norm, np.ascontiguousarray(rows), norm.grid).values(features)
+    return total

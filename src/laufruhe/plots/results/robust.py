@@ -1,0 +1,68 @@
+"""Two designs built many times: share of engines against what they make; and what each tolerance costs."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from laufruhe.plots.style import AFTER, BEFORE, FAINT, INK, entry, headed, page, thin
+from laufruhe.present.measures import objective_unit
+from laufruhe.present.numbers import number
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.robust_result import SHARES, BuiltDesign, RobustResult
+
+WORST, DRAWN = (0, (4, 2)), (0, (1, 2))
+MOST_TOLERANCES = 8
+
+
+def applies(result: Result) -> bool:
+    """Where built engines were decided for."""
+    return result.robust is not None
+
+
+def figure(result: Result) -> Figure:
+    """What share of engines stays below, design by design, over bars of what tolerances cost."""
+    found, unit = result.robust, objective_unit(result)
+    if found is None:
+        raise ValueError("nothing was decided for built engines")
+    drawn = page(2, 1, (6.4, 2.3), gap=0.85)
+    first, second = drawn.panels
+    for design, colour in ((found.nominal, BEFORE), (found.robust, AFTER)):
+        _curve(first, design, colour)
+    first.axhline(100.0 * found.share, color=FAINT, linewidth=0.7, linestyle=DRAWN)
+    name = result.problem.changed(over=None).objective_name
+    first.set(
+        ylim=(0.0, 104.0), ylabel="engines below [%]", xlabel=f"{name} [{unit}]" if len(name) < 60 else f"[{unit}]"
+    )
+    _bars(second, found, unit)
+    worst = "worst case, which no engine exceeds" if found.exact else "worst engine drawn"
+    legend = [
+        entry("best drawing", color=BEFORE), entry("decided", color=AFTER),
+        entry("as drawn", color=INK, linestyle=DRAWN), entry(worst, color=INK, linestyle=WORST),
+    ]  # fmt: skip
+    lines = (
+        f"{found.engines:,} engines built at random within their tolerances; below, which tolerance to narrow first."
+    )
+    return headed(drawn, result, "The price of tolerances", lines, legend)
+
+
+def _curve(axes: Axes, design: BuiltDesign, colour: str) -> None:
+    axes.plot(design.quantiles, [100.0 * share for share in SHARES], color=colour, linewidth=1.8)
+    axes.axvline(design.drawing, color=colour, linewidth=1.2, linestyle=DRAWN)
+    axes.axvline(design.worst, color=colour, linewidth=1.4, linestyle=WORST)
+
+
+def _bars(axes: Axes, found: RobustResult, unit: str) -> None:
+    shown = found.tolerances[:MOST_TOLERANCES]
+    top = thin(one.saving for one in shown)
+    axes.barh(range(len(shown)), [max(one.saving, 0.0) for one in shown], color=AFTER, height=0.55)
+    for k, one in enumerate(shown):
+        axes.text(0.01 * top, k - 0.36, one.name, size=7.5, color=INK, va="bottom")
+        axes.text(
+            max(one.saving, 0.0) + 0.01 * top, k, f"{number(one.saving, 3)} {unit}", size=7.5, color=FAINT, va="center"
+        )
+    axes.set(
+        ylim=(len(shown) - 0.4, -0.75), xlim=(0.0, 1.15 * top), yticks=[],
+        xlabel=f"shadow price times tolerance [{unit}]",
+    )  # fmt: skip
+    axes.grid(axis="y", visible=False)

@@ -1,0 +1,336 @@
+"""Tolerances: how far the numbers of a built engine stand from those of its drawing, and what of it moves with them.
+
+Every tolerance is a list of independent errors, counted in their largest size: a real error lies between -1 and 1,
+an unbalance of any angle in the unit disc. A problem with given errors is a problem again, so that all that
+evaluates, bounds or decides a drawing does the same for a built engine (R2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cached_property
+from itertools import pairwise
+from typing import ClassVar, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import CRANKSHAFT, Engine, OperatingPoint, Role, Rotor, Shaft
+from laufruhe.problem.decision import Decision, RotorDrive
+
+Array = NDArray[np.float64]
+Path: TypeAlias = tuple[str | int, ...]
+
+SIGMAS = 3.0
+"""Standard deviations of a normal law that the tolerance is; what lies beyond is not built in."""
+
+
+class Law(StrEnum):
+    """How errors lie within their tolerance."""
+
+    UNIFORM = "uniform"
+    NORMAL = "normal"
+
+
+class Scope(StrEnum):
+    """Whether every piece has an error of its own, or all have the same."""
+
+    PIECE = "piece"
+    BATCH = "batch"
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What of a problem errors move."""
+
+    engine: Engine
+    points: tuple[OperatingPoint, ...]
+    decisions: tuple[Decision, ...]
+    mount_numbers: tuple[tuple[float, ...], ...]
+
+
+class ErrorDrive(Protocol):
+    """What one error moves."""
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether every load is affine in it together with all others of which the same is true."""
+
+    def moved(self, drawing: Drawing, error: complex, /) -> Drawing:
+        """The drawing with this error, in units of its largest size."""
+
+
+@dataclass(frozen=True)
+class PistonDrive:
+    """Reciprocating mass of one slider-crank += gain x error (L2, L3)."""
+
+    cylinder: int
+    gain: float
+    is_affine: ClassVar[bool] = True
+
+    def moved(self, drawing: Drawing, error: complex) -> Drawing:
+        """Of one cylinder."""
+        parts = list(drawing.engine.slider_cranks)
+        part = parts[self.cylinder]
+        mass = part.reciprocating_mass + self.gain * error.real
+        parts[self.cylinder] = replace(part, reciprocating_mass=mass)
+        return replace(drawing, engine=replace(drawing.engine, slider_cranks=tuple(parts)))
+
+
+@dataclass(frozen=True)
+class AddedDrive:
+    """An unbalance gain x error beside those of the drawing (L1)."""
+
+    name: str
+    x: float
+    gain: complex
+    shaft: Shaft = CRANKSHAFT
+    is_affine: ClassVar[bool] = True
+
+    def moved(self, drawing: Drawing, error: complex) -> Drawing:
+        """One rotor more."""
+        rotor = Rotor(self.name, self.x, self.gain * error, self.shaft, Role.THROW)
+        return replace(drawing, engine=replace(drawing.engine, rotors=(*drawing.engine.rotors, rotor)))
+
+
+@dataclass(frozen=True)
+class ShareDrive:
+    """An unbalance U and all that decides it, times 1 + share x error (R3)."""
+
+    rotor: str
+    share: float
+    is_affine: ClassVar[bool] = True
+
+    def moved(self, drawing: Drawing, error: complex) -> Drawing:
+        """Of the rotor, and of what drives it."""
+        factor = 1.0 + self.share * error.real
+        rotors = tuple(
+            replace(r, unbalance=factor * r.unbalance) if r.name == self.rotor else r for r in drawing.engine.rotors
+        )
+        decisions = tuple(
+            replace(d, drives=tuple(
+                replace(v, gain=factor * v.gain) if isinstance(v, RotorDrive) and v.rotor == self.rotor else v
+                for v in d.drives
+            ))
+            for d in drawing.decisions
+        )  # fmt: skip
+        return replace(drawing, engine=replace(drawing.engine, rotors=rotors), decisions=decisions)
+
+
+@dataclass(frozen=True)
+class FileDrive:
+    """A number of the problem file += gain x error; the problem is put together anew.
+
+    Attributes
+    ----------
+    path
+        Where the number stands.
+    number, gain
+        The drawing's and the largest error, in the unit of the file.
+    unit
+        Of the file; empty for a plain number.
+    """
+
+    path: Path
+    number: float
+    gain: float
+    unit: str
+    is_affine: ClassVar[bool] = False
+
+    def moved(self, drawing: Drawing, _: complex) -> Drawing:
+        """Nothing: files put the problem together."""
+        return drawing
+
+    def written(self, error: complex) -> str | float:
+        """The number as a file has it."""
+        value = self.number + self.gain * error.real
+        return f"{value!r} {self.unit}" if self.unit else value
+
+
+@dataclass(frozen=True)
+class Error:
+    """One independent error.
+
+    Attributes
+    ----------
+    name
+        Of what has it.
+    drives
+        All that moves with it.
+    width
+        One real number, or two for an unbalance of any angle.
+    """
+
+    name: str
+    drives: tuple[ErrorDrive, ...]
+    width: int = 1
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether every load is affine in it."""
+        return all(drive.is_affine for drive in self.drives)
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A number of the drawing and how far it may be off.
+
+    Attributes
+    ----------
+    name
+        The key of the file.
+    unit
+        SI; "" where it is a share.
+    size
+        Largest error [SI].
+    errors
+        One for each piece, or one for the batch.
+    scale
+        Times its own size that it is taken at.
+    """
+
+    name: str
+    unit: str
+    size: float
+    errors: tuple[Error, ...]
+    law: Law = Law.UNIFORM
+    scope: Scope = Scope.PIECE
+    scale: float = 1.0
+
+    def draw(self, random: np.random.Generator, count: int) -> Array:
+        """Errors of many engines, shape (count, columns): even over their interval or disc, or normal within it."""
+        parts = [self._one(random, count, error.width) for error in self.errors]
+        return np.concatenate(parts, axis=1)
+
+    def _one(self, random: np.random.Generator, count: int, width: int) -> Array:
+        if self.law is Law.NORMAL:
+            return _normal(random, count, width)
+        if width == 1:
+            return random.uniform(-1.0, 1.0, (count, 1))
+        size, angle = np.sqrt(random.uniform(0.0, 1.0, count)), random.uniform(0.0, 2.0 * np.pi, count)
+        return np.stack([size * np.cos(angle), size * np.sin(angle)], axis=1)
+
+
+def _normal(random: np.random.Generator, count: int, width: int) -> Array:
+    """Normal errors, those beyond the tolerance drawn again."""
+    found = random.normal(0.0, 1.0 / SIGMAS, (count, width))
+    while (out := np.hypot.reduce(found, axis=1) > 1.0).any():
+        found[out] = random.normal(0.0, 1.0 / SIGMAS, (int(out.sum()), width))
+    return found
+
+
+@dataclass(frozen=True)
+class Over:
+    """Of which built engines what is minimised and limited is taken.
+
+    Attributes
+    ----------
+    share
+        Of built engines that are to stay below; None for the worst that tolerances allow.
+    engines
+        Drawn where a share is minimised, or where the worst case is sought among drawn ones.
+    seed
+        Of these; those that certify have another.
+    """
+
+    share: float | None = None
+    engines: int = 1000
+    seed: int = 0
+
+    def named(self, measure: str, is_affine: bool) -> str:
+        """What is minimised, in words."""
+        if self.share is not None:
+            return f"{measure}, {100.0 * self.share:g} % of engines below"
+        return f"{measure}, worst case" if is_affine else f"{measure}, worst of {self.engines} drawn engines"
+
+
+def no_file(changes: Mapping[Path, str | float]) -> Drawing:
+    """Of a problem that was not read from a file."""
+    raise ModelError(f"{', '.join(map(str, changes))} is a number of a problem file, and there is none")
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """All tolerances of a problem, their errors side by side in one vector.
+
+    Attributes
+    ----------
+    each
+        In the order of the file.
+    rebuild
+        The problem of the file with other numbers in place of some.
+    """
+
+    each: tuple[Tolerance, ...]
+    rebuild: Callable[[Mapping[Path, str | float]], Drawing] = no_file
+
+    @property
+    def acting(self) -> Tolerances:
+        """Without those of no size."""
+        return replace(self, each=tuple(t for t in self.each if t.size * t.scale > 0.0))
+
+    @cached_property
+    def errors(self) -> tuple[Error, ...]:
+        """Of all tolerances."""
+        return tuple(error for tolerance in self.each for error in tolerance.errors)
+
+    @cached_property
+    def columns(self) -> tuple[slice, ...]:
+        """Of every error in the vector of all."""
+        ends = np.cumsum([0, *(error.width for error in self.errors)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    @property
+    def count(self) -> int:
+        """Length of the vector of all errors."""
+        return sum(error.width for error in self.errors)
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether every load is affine in all errors together."""
+        return all(error.is_affine for error in self.errors)
+
+    def columns_of(self, name: str) -> slice:
+        """Of one tolerance in the vector of all errors."""
+        start = 0
+        for tolerance in self.each:
+            width = sum(error.width for error in tolerance.errors)
+            if tolerance.name == name:
+                return slice(start, start + width)
+            start += width
+        raise KeyError(name)
+
+    def scaled(self, name: str, factor: float) -> Tolerances:
+        """One of them so many times as wide."""
+        each = tuple(replace(t, scale=factor * t.scale) if t.name == name else t for t in self.each)
+        return replace(self, each=each)
+
+    def draw(self, random: np.random.Generator, count: int) -> Array:
+        """Errors of many engines, shape (count, columns)."""
+        return np.concatenate([np.zeros((count, 0)), *(t.draw(random, count) for t in self.each)], axis=1)
+
+    def mirrored(self, random: np.random.Generator, count: int) -> Array:
+        """As many engines, half of them the others with every error turned round (R9)."""
+        half = self.draw(random, -(-count // 2))
+        return np.concatenate([half, -half])
+
+    def built(self, drawing: Drawing, errors: Array) -> Drawing:
+        """What engines with these errors are, shape (columns,)."""
+        moves: list[tuple[ErrorDrive, complex]] = []
+        at = iter(self.columns)
+        for tolerance in self.each:
+            for error in tolerance.errors:
+                own = errors[next(at)] * tolerance.scale
+                value = complex(own[0], own[1] if error.width > 1 else 0.0)
+                moves += [(drive, value) for drive in error.drives if value != 0.0]
+        written = {v.path: v.written(e) for v, e in moves if isinstance(v, FileDrive)}
+        drawing = self.rebuild(written) if written else drawing
+        for drive, value in moves:
+            drawing = drive.moved(drawing, value)
+        return drawing
+
+
+NO_TOLERANCES = Tolerances(())

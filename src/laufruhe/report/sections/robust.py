@@ -1,0 +1,61 @@
+"""The best drawing and the design decided, each under the same tolerances, and which of these to narrow first."""
+
+from __future__ import annotations
+
+from laufruhe.present.measures import objective_unit
+from laufruhe.present.numbers import figure, number, percent, price_of, with_unit
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.robust_result import CONFIDENCE, BuiltDesign, PricedTolerance, RobustResult
+
+
+def tables(result: Result) -> list[Grid]:
+    """Two designs, and a row a tolerance."""
+    found, unit = result.robust, objective_unit(result)
+    if found is None:
+        return []
+    worst = "worst case" if found.exact else "worst drawn"
+    head = (
+        "design",
+        "as drawn",
+        worst,
+        f"{100.0 * found.share:g} % of engines below",
+        f"{100.0 * CONFIDENCE:g} % sure",
+    )
+    rows = [_design(design, unit) for design in (found.nominal, found.robust)]
+    rows.append(("price", *(percent(b / a - 1.0) if a else "-" for a, b in _pairs(found)), ""))
+    told = ("tolerance, dearest first", "is", "errors", "shadow price", "costs")
+    own = [_tolerance(tolerance, unit) for tolerance in found.tolerances]
+    return [
+        Grid("Under tolerance", head, rows, note=_checked(found)),
+        Grid(
+            "Tolerances", told, own, 2, note="Costs: shadow price times tolerance, what none of it would save at first."
+        ),
+    ]
+
+
+def _design(design: BuiltDesign, unit: str) -> tuple[str, ...]:
+    low, high = (number(value, 5) for value in (design.low, design.high))
+    values = (figure(value, unit, 5) for value in (design.drawing, design.worst, design.share))
+    return (design.name, *values, f"{low} to {high}")
+
+
+def _pairs(found: RobustResult) -> list[tuple[float, float]]:
+    a, b = found.nominal, found.robust
+    return [(a.drawing, b.drawing), (a.worst, b.worst), (a.share, b.share)]
+
+
+def _tolerance(tolerance: PricedTolerance, unit: str) -> tuple[str, ...]:
+    share = not tolerance.unit
+    size = f"{100.0 * tolerance.size:.3g} %" if share else with_unit(tolerance.size, tolerance.unit)
+    price = (
+        f"{number(0.01 * tolerance.price)} {unit} per %" if share else price_of(tolerance.price, unit, tolerance.unit)
+    )
+    errors = f"{tolerance.errors}, {tolerance.law}" + (", batch" if tolerance.scope == "batch" else "")
+    return tolerance.name, f"± {size}", errors, price, figure(tolerance.saving, unit, 3)
+
+
+def _checked(found: RobustResult) -> str:
+    """What a second sample says of the objective."""
+    told = f"Checked: of {found.engines:,} other engines {found.exceeding} exceed the objective"
+    return f"{told}, so at most {100.0 * found.exceeding_at_most:.2g} % of all do ({100.0 * CONFIDENCE:g} % sure)."

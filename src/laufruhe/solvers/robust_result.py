@@ -1,0 +1,105 @@
+"""What a robust design is told of: two designs under tolerance, and what each tolerance costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from laufruhe.problem.tolerance import Over
+
+SHARE = 0.95
+"""Of built engines whose value every comparison shows, where no other share is asked for."""
+SHARES = tuple(k / 200.0 for k in range(201))
+"""Of which quantiles are kept for pictures."""
+CONFIDENCE = 0.99
+
+
+@dataclass(frozen=True)
+class BuiltDesign:
+    """One design and the engines built to it [SI].
+
+    Attributes
+    ----------
+    name
+        Which of the two.
+    decisions
+        Names and values.
+    drawing
+        The engine without any error.
+    worst
+        What no engine within the tolerances exceeds; of drawn ones the largest.
+    share, low, high
+        What the share of engines asked for stays below, and its interval of confidence.
+    quantiles
+        Of random engines, at SHARES.
+    """
+
+    name: str
+    decisions: tuple[tuple[str, float, str], ...]
+    drawing: float
+    worst: float
+    share: float
+    low: float
+    high: float
+    quantiles: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class PricedTolerance:
+    """One tolerance, and by how much the objective falls for each unit by which it is narrowed.
+
+    Attributes
+    ----------
+    price
+        Per SI unit.
+    saving
+        Price times tolerance: what it costs, in the first order.
+    """
+
+    name: str
+    size: float
+    unit: str
+    law: str
+    scope: str
+    errors: int
+    price: float
+    saving: float
+
+
+@dataclass(frozen=True)
+class RobustResult:
+    """Two designs under the same tolerances, and which tolerance to narrow first.
+
+    Attributes
+    ----------
+    over
+        Of which engines the objective was taken.
+    exact
+        Whether the worst of all engines within the tolerances is bounded; else of those drawn.
+    share
+        Of engines, that `BuiltDesign.share` is of.
+    nominal, robust
+        The best drawing, and the design decided.
+    tolerances
+        The dearest first.
+    scenarios
+        Sets of errors in the program.
+    divisions
+        Parts of the errors that the bound looked at.
+    engines, seed
+        Drawn for the comparison, other ones than those that decided.
+    exceeding, exceeding_at_most
+        How many of them exceed the objective, and the share of all that does, at most, with CONFIDENCE.
+    """
+
+    over: Over
+    exact: bool
+    share: float
+    nominal: BuiltDesign
+    robust: BuiltDesign
+    tolerances: tuple[PricedTolerance, ...]
+    scenarios: int
+    divisions: int
+    engines: int
+    seed: int
+    exceeding: int
+    exceeding_at_most: float

@@ -1,0 +1,158 @@
+"""Tolerances as a file writes them, what of the engine they move, and one line for what is wrong."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from laufruhe.errors import InputError
+from laufruhe.files.reader import load
+from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.tolerance import Law, Scope
+from problem_files import MOUNTS, shaft
+
+TEXT = """
+title = "Four in line"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+stroke = "120 mm"
+rod_ratio = 0.26
+reciprocating_mass = "1.25 kg{}"
+cylinder_spacing = "125 mm"
+firing_order = [1, 3, 4, 2]
+[[operating_points]]
+speed = "3000 rpm"
+[objective]
+minimise = "rms mount force"
+"""
+
+
+def read(folder: Path, text: str) -> Problem:
+    path = folder / "engine.toml"
+    path.write_text(text, encoding="utf-8")
+    return load(path)
+
+
+@pytest.mark.parametrize(
+    ("words", "size", "law", "scope"),
+    [
+        (" ± 2 %", 0.025, Law.UNIFORM, Scope.PIECE),
+        (" +- 2%", 0.025, Law.UNIFORM, Scope.PIECE),
+        (" +/- 25 g normal", 0.025, Law.NORMAL, Scope.PIECE),
+        (" ± 0.025 batch", 0.025, Law.UNIFORM, Scope.BATCH),
+        (" ± 1e-2 kg normal batch", 0.01, Law.NORMAL, Scope.BATCH),
+    ],
+)
+def test_forms(tmp_path: Path, words: str, size: float, law: Law, scope: Scope) -> None:
+    (told,) = read(tmp_path, TEXT.format(words) + MOUNTS).tolerances.each
+    assert told.size == pytest.approx(size)
+    assert (told.law, told.scope, told.unit) == (law, scope, "kg")
+    assert len(told.errors) == (1 if scope is Scope.BATCH else 4)
+
+
+def test_errors_move_what_they_are_of(tmp_path: Path) -> None:
+    problem = read(tmp_path, TEXT.format(" ± 25 g") + MOUNTS)
+    built = problem.built(np.array([1.0, -1.0, 0.0, 0.5]))
+    masses = [part.reciprocating_mass for part in built.engine.slider_cranks]
+    assert masses == pytest.approx([1.275, 1.225, 1.25, 1.2625])
+    batch = read(tmp_path, TEXT.format(" ± 25 g batch") + MOUNTS).built(np.array([-1.0]))
+    assert [part.reciprocating_mass for part in batch.engine.slider_cranks] == pytest.approx([1.225] * 4)
+
+
+def test_open_unbalances_are_off_by_a_share(tmp_path: Path) -> None:
+    weight = shaft(
+        "left", 2, "0 mm", 'unbalance = { between = ["0 kg m", "0.05 kg m"], tolerance = "2 %" }\nangle = 90'
+    )
+    problem = read(tmp_path, TEXT.format("") + MOUNTS + weight)
+    own = problem.built(np.array([1.0]))
+    assert own.design([0.04j]).rotors[-1].unbalance == pytest.approx(0.0408j)
+    assert problem.design([0.04j]).rotors[-1].unbalance == pytest.approx(0.04j)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "scale"),
+    [
+        ("rod_ratio = 0.26", 'rod_ratio = "0.26 ± 2 %"', 0.26 * 1.02),
+        ('stroke = "120 mm"', 'stroke = "120 mm ± 0.5 mm"', 0.1205),
+        ('"125 mm"', '"125 mm +- 1 mm"', 0.126),
+    ],
+)
+def test_numbers_of_the_file(tmp_path: Path, old: str, new: str, scale: float) -> None:
+    """An engine with an error of such a number is the engine of a file that has it."""
+    plain = TEXT.format("") + MOUNTS
+    problem = read(tmp_path, plain.replace(old, new))
+    unit = "" if "ratio" in old else " m"
+    written = f'"{scale!r}{unit}"'
+    other = read(tmp_path, plain.replace(old, f"{old.rpartition(' = ')[0]} = {written}" if " = " in old else written))
+    assert problem.built(np.array([1.0])).engine == other.engine
+    assert problem.built(np.array([0.0])).engine == problem.engine
+    assert not problem.tolerances.is_affine
+
+
+def test_angles_of_throws(tmp_path: Path) -> None:
+    text = TEXT.format("").replace("firing_order", 'throws = [0, "180 deg ± 1 deg", "180 ± 1", 0]\nfiring_order')
+    problem = read(tmp_path, text + MOUNTS)
+    throws = [math.degrees(p.throw) for p in problem.built(np.array([1.0, -0.5])).engine.slider_cranks]
+    assert throws == pytest.approx([0.0, 181.0, 179.5, 0.0])
+
+
+def test_draws_stay_within(tmp_path: Path) -> None:
+    for law in ("uniform", "normal"):
+        text = TEXT.format(f" ± 2 % {law}") + MOUNTS + f'[tolerances]\nresidual_unbalance = "10 g cm"\nlaw = "{law}"\n'
+        drawn = read(tmp_path, text).tolerances.draw(np.random.default_rng(1), 20_000)
+        sizes = np.hypot(drawn[:, 4::2], drawn[:, 5::2])
+        assert np.abs(drawn[:, :4]).max() <= 1.0
+        assert sizes.max() <= 1.0
+        assert drawn.mean(axis=0) == pytest.approx(np.zeros(8), abs=0.02)
+        # even over an interval and a disc; a third of the tolerance, what is beyond left out
+        assert drawn[:, :4].std() == pytest.approx(1 / math.sqrt(3.0) if law == "uniform" else 0.3288, rel=0.02)
+        assert np.mean(sizes**2) == pytest.approx(0.5 if law == "uniform" else 0.2107, rel=0.02)
+
+
+def test_grades(tmp_path: Path) -> None:
+    """ISO 21940-11: G 6.3 at 3000 rpm is an eccentricity of 20 um."""
+    assert grade_of("G 6.3") == pytest.approx(6.3e-3)
+    assert grade_of("g6.3") is None
+    assert permitted_unbalance(6.3e-3, 60.0, 100.0 * math.pi) == pytest.approx(60.0 * 20.05e-6, rel=1e-3)
+    text = TEXT.format("") + MOUNTS + '[tolerances]\nresidual_unbalance = "G 6.3"\nrotor_mass = "60 kg"\n'
+    problem = read(tmp_path, text)
+    (told,) = problem.tolerances.each
+    assert told.size == pytest.approx(0.5 * 60.0 * 20.05e-6, rel=1e-3)
+    built = problem.built(np.array([0.0, 1.0, -1.0, 0.0]))
+    assert [rotor.unbalance for rotor in built.engine.rotors] == pytest.approx([1j * told.size, -told.size])
+    assert [rotor.x for rotor in built.engine.rotors] == pytest.approx([0.1875, -0.1875])
+    assert objective_value(built, evaluate(built)) != objective_value(problem, evaluate(problem))
+
+
+@pytest.mark.parametrize(
+    ("words", "more", "rule"),
+    [
+        (" ±", "", "sign of a tolerance and none behind it"),
+        (" ± two", "", "no number of its kind"),
+        (" ± 2 mm", "", "no number of its kind"),
+        (" ± 120 %", "", "whole number or more"),
+        (" ± 1.3 kg", "", "whole mass or more"),
+        (" ± 2 % normal uniform", "", "two laws"),
+        (" ± -1 %", "", "negative"),
+        ("", '[robust]\nover = "worst case"\n', "has no tolerances"),
+        (" ± 1 %", '[robust]\nover = "95"\n', "neither the worst case nor a share"),
+        (" ± 1 %", '[robust]\nover = "40 %"\n', "neither the worst case nor a share"),
+        (" ± 1 %", '[robust]\nover = "99.9 %"\nengines = 100\n', "leaves none"),
+        ("", '[tolerances]\nresidual_unbalance = "G 6.3"\n', "is missing, and a grade is of a mass"),
+        ("", '[tolerances]\nresidual_unbalance = "6.3"\n', "neither a grade nor an unbalance"),
+        ("", '[tolerances]\nrotor_mass = "60 kg"\n', "goes with a grade"),
+        ("", shaft("s", 2, "0 mm", 'unbalance = { between = ["0 kg m", "1 kg m"], tolerance = "1 g" }'), "percent"),
+    ],
+)
+def test_one_line_for_what_is_wrong(tmp_path: Path, words: str, more: str, rule: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, TEXT.format(words) + MOUNTS + more)
+    (complaint,) = caught.value.complaints
+    assert rule in f"{complaint.rule} {complaint.remedy}"
+    assert complaint.remedy

@@ -1,0 +1,99 @@
+"""The worst errors of a design: against all corners and many angles, with bounds that nothing exceeds."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.numerics.norms import NORMS, Grid
+from laufruhe.prove.error_parts import Block, bounded
+from laufruhe.prove.worst_case import value_at, worst_case
+
+Array = NDArray[np.float64]
+COLUMNS = (slice(0, 1), slice(1, 2), slice(2, 3), slice(3, 5))
+
+
+def random_norm(name: str, seed: int, share: float = 0.3) -> AffineNorm:
+    """Two signals of twelve rows in a plane, and what five numbers add."""
+    random = np.random.default_rng(seed)
+    weights = random.uniform(0.5, 1.0, 24)
+    slope = share * random.normal(size=(24, 2, 5))
+    return AffineNorm(NORMS[name], random.normal(size=(24, 2)), slope, Grid(weights / weights.sum(), 12))
+
+
+def all_errors(angles: int) -> Array:
+    """Every corner of the intervals with angles all about the circle."""
+    turns = 2.0 * np.pi * np.arange(angles) / angles
+    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    return np.array([[*ends, *u] for ends in itertools.product((-1.0, 1.0), repeat=3) for u in circle])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("name", NORMS)
+def test_worst_of_corners_and_circles(name: str, seed: int) -> None:
+    terms = [(1.0, random_norm(name, seed)), (0.5, random_norm("mean", seed + 10))]
+    found = worst_case(terms, COLUMNS, 1e-4)
+    brute = max(value_at(terms, z) for z in all_errors(180))
+    assert found.value == pytest.approx(value_at(terms, found.errors), rel=1e-12)
+    assert found.bound >= brute * (1.0 - 1e-12)
+    assert found.value >= brute * (1.0 - 2e-4)
+    assert found.value <= found.bound <= found.value * (1.0 + 1.01e-4)
+    assert np.hypot(*found.errors[3:]) <= 1.0 + 1e-12
+    assert np.abs(found.errors[:3]).max() <= 1.0
+
+
+@pytest.mark.parametrize("name", NORMS)
+def test_no_errors_of_a_part_exceed_its_bound(name: str) -> None:
+    """Whole discs, arcs of them, and some intervals held."""
+    random, terms = np.random.default_rng(3), [(1.0, random_norm(name, 4, 1.0))]
+    whole = [Block(own, np.eye(own.stop - own.start)) for own in COLUMNS]
+    for centre, arc in whole[3].parts(np.zeros(5)):
+        assert arc is not None
+        for middle, narrow in arc.parts(centre):
+            assert narrow is not None
+            assert narrow.arc is not None
+            blocks = [whole[0], whole[2], narrow]
+            above = bounded(terms, middle, blocks, 0.0, [{}]).bound
+            for _ in range(40):
+                z = np.zeros(5)
+                angle = narrow.arc[0] + random.uniform(-1.0, 1.0) * narrow.arc[1]
+                z[[0, 2]] = random.choice([-1.0, 1.0], 2)
+                z[3:] = np.cos(angle), np.sin(angle)
+                assert value_at(terms, z) <= above * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("name", NORMS)
+def test_squares_lie_over_their_norm(name: str) -> None:
+    random, norm = np.random.default_rng(5), random_norm(name, 6)
+    touched = np.linalg.norm(norm.constant, axis=1)
+    squares = norm.norm.majorant(norm.grid, touched)
+    if squares is None:
+        assert name not in ("mean", "rms")
+        return
+    factors, constant = squares
+    for size in (0.0, 0.1, 1.0, 10.0):
+        rows = norm.constant + size * random.normal(size=norm.constant.shape)
+        above = constant + 0.5 * float(factors @ np.square(rows).sum(axis=1))
+        assert norm.norm.value(norm.grid, rows) <= above * (1.0 + 1e-12)
+        if size == 0.0:
+            assert norm.norm.value(norm.grid, rows) == pytest.approx(above, rel=1e-12)
+
+
+def test_no_errors_leave_the_drawing() -> None:
+    norm = random_norm("mean", 7)
+    bare = AffineNorm(norm.norm, norm.constant, norm.slope[..., :0], norm.grid)
+    found = worst_case([(2.0, bare)], (), 1e-4)
+    assert found.value == found.bound == pytest.approx(2.0 * norm.norm.value(norm.grid, norm.constant))
+
+
+def test_wider_errors_are_never_better() -> None:
+    norm, last = random_norm("mean", 8), 0.0
+    for share in (0.0, 0.5, 1.0, 2.0):
+        wider = AffineNorm(norm.norm, norm.constant, share * norm.slope, norm.grid)
+        found = worst_case([(1.0, wider)], COLUMNS, 1e-6)
+        assert found.value >= last
+        last = found.bound

@@ -1,0 +1,213 @@
+"""Balance for the engines that tolerances allow: its worst case, its share, its prices."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from laufruhe.errors import ModelError
+from laufruhe.files.reader import load
+from laufruhe.load_models.built_engines import BuiltEngines, values_of
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.tolerance import Over, Tolerances
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+from laufruhe.solvers.result import Result
+from problem_files import MOUNTS, shaft
+
+ENGINE = """
+title = "Four in line"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+stroke = "120 mm"
+rod_ratio = 0.26
+reciprocating_mass = "2 kg ± 2 %"
+cylinder_spacing = "125 mm"
+firing_order = [1, 3, 4, 2]
+[[operating_points]]
+speed = "2500 rpm"
+[objective]
+minimise = "rms mount force"
+[fidelity]
+samples = 48
+"""
+OPEN = 'unbalance = { between = ["0 kg m", "0.05 kg m"], tolerance = "± 10 %" }\nradius = "20 mm"\n'
+TEXT = (
+    ENGINE
+    + MOUNTS
+    + shaft("left", 2, "60 mm", OPEN + "angle = 180")
+    + shaft("right", -2, "-60 mm", OPEN + "angle = 180")
+)
+RESIDUAL = '[tolerances]\nresidual_unbalance = "60 g cm"\n'
+ROBUST = "[robust]\n"
+
+
+@pytest.fixture(scope="module")
+def read(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Problem]:
+    folder = tmp_path_factory.mktemp("robust")
+
+    def of(text: str) -> Problem:
+        path = Path(folder / "engine.toml")
+        path.write_text(text, encoding="utf-8")
+        return load(path)
+
+    return of
+
+
+@pytest.fixture(scope="module")
+def problem(read: Callable[[str], Problem]) -> Problem:
+    """Pistons, shafts and what balancing leaves are off."""
+    return read(TEXT + RESIDUAL + ROBUST)
+
+
+@pytest.fixture(scope="module")
+def result(problem: Problem) -> Result:
+    return solve(problem)
+
+
+def turned(sizes: Sequence[float]) -> list[complex]:
+    """Decisions of these sizes: the unbalances of the shafts point down."""
+    return [complex(-size) for size in sizes]
+
+
+def worst(found: Result) -> float:
+    assert found.objective is not None
+    return found.objective.value
+
+
+def test_worst_case_is_proven(result: Result) -> None:
+    assert result.certificate is not None
+    assert result.robust is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.kkt_residual < 1e-2
+    assert result.robust.exact
+    assert result.robust.robust.worst == worst(result)
+    assert result.robust.robust.worst < result.robust.nominal.worst
+    # the best drawing is the best drawing
+    assert result.robust.nominal.drawing <= result.robust.robust.drawing
+
+
+def test_no_built_engine_exceeds_the_worst_case(problem: Problem, result: Result) -> None:
+    """By rows of all engines at once, and some of them by the exact model alone."""
+    values = turned([d.value for d in result.decisions])
+    built = BuiltEngines(problem, values, problem.fidelity.samples)
+    errors = problem.tolerances.draw(np.random.default_rng(99), 10_000)
+    corners = np.array([[*ends, 1.0, 0.0, 0.0, 1.0] for ends in itertools.product((-1.0, 1.0), repeat=6)])
+    many = np.concatenate([errors, corners])
+    found = values_of(built.terms, many)
+    assert found.max() <= worst(result) * (1.0 + 1e-12)
+    assert found.max() > 0.97 * worst(result)
+    for k in (*range(0, 10_000, 2_000), int(np.argmax(found))):
+        own = problem.built(many[k])
+        assert objective_value(own, evaluate(own, own.design(values))) == pytest.approx(found[k], rel=1e-10)
+
+
+def test_no_other_design_is_better(read: Callable[[str], Problem]) -> None:
+    """A search by the exact model over every corner of the intervals, without cones or bounds."""
+    problem = read(TEXT + ROBUST)
+    found = solve(problem)
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))
+
+    def largest(x: np.ndarray) -> float:
+        built = BuiltEngines(problem, turned(x), problem.fidelity.samples)
+        return float(values_of(built.terms, corners).max())
+
+    start = [d.value for d in found.decisions]
+    assert largest(np.array(start)) == pytest.approx(worst(found), rel=1.1e-4)
+    searched = minimize(largest, [0.9 * v for v in start], method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-4})
+    assert searched.fun >= worst(found) * (1.0 - 1.1e-4)
+    assert searched.fun == pytest.approx(worst(found), rel=1e-3)
+
+
+def test_no_tolerance_is_the_drawing(read: Callable[[str], Problem], problem: Problem) -> None:
+    none = replace(problem, tolerances=scaled(problem.tolerances, 0.0))
+    drawing = solve(problem.changed(over=None))
+    assert worst(solve(none)) == pytest.approx(worst(drawing), rel=1e-9)
+    written = read(TEXT.replace("± 2 %", "± 0 %").replace("± 10 %", "± 0 %") + ROBUST)
+    assert worst(solve(written)) == pytest.approx(worst(drawing), rel=1e-9)
+
+
+def scaled(tolerances: Tolerances, factor: float) -> Tolerances:
+    return replace(tolerances, each=tuple(replace(t, scale=factor * t.scale) for t in tolerances.each))
+
+
+def test_more_tolerance_is_never_better(problem: Problem, result: Result) -> None:
+    half = worst(solve(replace(problem, tolerances=scaled(problem.tolerances, 0.5))))
+    drawing = worst(solve(problem.changed(over=None)))
+    assert drawing < half * (1.0 + 1e-4)
+    assert half < worst(result) * (1.0 + 1e-4)
+
+
+@pytest.mark.slow
+def test_prices_are_slopes(problem: Problem, result: Result) -> None:
+    """Against other optima: every tolerance a little wider and a little narrower."""
+    assert result.robust is not None
+    fine = replace(problem, tolerance=3e-6)
+    for told in result.robust.tolerances[1:2]:
+        wide, narrow = (
+            worst(solve(replace(fine, tolerances=problem.tolerances.scaled(told.name, 1.0 + step))))
+            for step in (0.02, -0.02)
+        )
+        assert told.saving == pytest.approx((wide - narrow) / 0.04, rel=5e-3)
+        assert told.price * told.size == pytest.approx(told.saving)
+
+
+def test_share_of_engines(problem: Problem, result: Result) -> None:
+    shared = solve(replace(problem, over=Over(0.95, 400, 3)))
+    assert shared.certificate is not None
+    assert shared.robust is not None
+    assert shared.certificate.kind in (Proof.LOCAL, Proof.GLOBAL)
+    assert shared.certificate.lower_bound <= worst(shared) < worst(result)
+    told = shared.robust
+    # another sample agrees with the one that decided
+    assert told.robust.low <= told.robust.share <= told.robust.high
+    assert told.robust.share == pytest.approx(worst(shared), rel=0.02)
+    assert told.exceeding_at_most < 0.08
+    # and no neighbour is better in the sample that decided
+    errors = problem.tolerances.mirrored(np.random.default_rng(3), 400)
+    values = [d.value for d in shared.decisions]
+
+    def level(x: list[float]) -> float:
+        built = BuiltEngines(problem, turned(x), problem.fidelity.samples)
+        return float(np.sort(values_of(built.terms, errors))[379])
+
+    assert level(values) == pytest.approx(worst(shared), rel=1e-9)
+    for k, step in itertools.product(range(2), (-2e-3, 2e-3)):
+        moved = [v * (1.0 + step * (j == k)) for j, v in enumerate(values)]
+        assert level(moved) >= worst(shared) * (1.0 - 3e-4)
+
+
+def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None:
+    limit = '[[constraints]]\nlimit = "maximum shaking force"\nmax = "{}"\noperating_points = ["2500 rpm"]\n'
+    free = read(TEXT + ROBUST)
+    built = BuiltEngines(free, turned([d.value for d in solve(free).decisions]), 48)
+    assert built.drawn is not None
+    tight = read((TEXT + ROBUST + limit.format("1900 N")).replace('operating_points = ["2500 rpm"]\n', ""))
+    found = solve(tight)
+    assert found.limits[0].value <= 1900.0 * (1.0 + 1e-5)
+    for z in itertools.product((-1.0, 1.0), repeat=6):
+        own = tight.built(np.array(z))
+        design = own.design(turned([d.value for d in found.decisions]))
+        assert evaluate(own, design).value(tight.limits[0].measure) <= 1900.0 * (1.0 + 1e-5)
+    none = solve(read((TEXT + ROBUST + limit.format("200 N")).replace('operating_points = ["2500 rpm"]\n', "")))
+    assert "no design exists" in none.message
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        (TEXT.replace("firing_order = [1, 3, 4, 2]", 'cylinders = 4\nfiring_order = "open"\nthrows = "open"'), "stars"),
+        (TEXT.replace('["60 mm", "-100 mm"]', '[{ between = ["0 mm", "60 mm"] }, "-100 mm"]'), "left.y"),
+    ],
+)
+def test_what_is_not_decided_is_refused(read: Callable[[str], Problem], text: str, word: str) -> None:
+    with pytest.raises(ModelError, match=word):
+        solve(read(text + ROBUST))
