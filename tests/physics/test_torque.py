@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +19,9 @@ from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.irregularity import irregularity, swing_of
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, least_inertia, torque_facts, work_stored
+from laufruhe.physics.torque import crank_torque, least_inertia, torque_facts, torque_parts, work_stored
 from laufruhe.physics.uneven_speed import crank_motion
+from laufruhe.plots.results.torque import applies, figure
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import MEASURES, Measure
 from problem_files import PROBLEMS
@@ -235,3 +237,23 @@ def test_a_flywheel_for_no_change_of_speed_is_refused() -> None:
     engine, point = case("tractor-single")
     with pytest.raises(ModelError, match="positive"):
         least_inertia(engine, point, 0.0)
+
+
+@pytest.mark.parametrize("name", ["tractor-four-bearings", "tractor-single", "radial-seven"])
+def test_parts_of_the_torque_add_up(name: str) -> None:
+    """Gas has the mean, pistons and rods none; a rod's inertia is what rigid rods have over two masses."""
+    engine, point = case(name)
+    parts = torque_parts(engine, point)
+    total = parts["gas"] + parts["pistons"] + parts["rods"]
+    size = float(np.abs(parts["all"].sample(720)).max())
+    assert np.abs(total.sample(720) - parts["all"].sample(720)).max() < 1e-12 * size
+    assert abs(parts["pistons"].coefficients[0]) + abs(parts["rods"].coefficients[0]) < 1e-12 * size
+    assert np.any(parts["rods"].coefficients) == any(part.rod_inertia_deficit != 0.0 for part in engine.slider_cranks)
+
+
+def test_the_diagram_is_drawn_where_it_is_asked(tmp_path: Path) -> None:
+    for name, drawn in (("diesel-70-hp-flywheel", True), ("tractor-single", False)):
+        result = laufruhe.solvers.state(laufruhe.load(PROBLEMS / f"{name}.toml"))
+        assert applies(result) is drawn
+        if drawn:
+            figure(result).savefig(tmp_path / "torque.png")

@@ -68,6 +68,18 @@ def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     return total.each(lambda wrench: wrench @ ROLL)
 
 
+def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:
+    """Torque of the gas, of pistons and rods as point masses, of what the rods' inertia adds, and of all (T1)."""
+    whole, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
+    masses = crank_torque(engine, still, fidelity)
+    points = crank_torque(engine, still, replace(fidelity, rod="mass-only"))
+    return {"gas": whole + _less(masses), "pistons": points, "rods": masses + _less(points), "all": whole}
+
+
+def _less(torque: Spectrum) -> Spectrum:
+    return torque.each(lambda values: -values)
+
+
 def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
     """Torque at unit speed of the mechanism's own crank, in the sense of the output."""
     is_rigid = fidelity.rod == "rigid"

@@ -6,6 +6,7 @@ PICTURES = {
     "polar": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
+    "torque": "Torque of gas, pistons and rods, its work and its orders, and the speed that a flywheel makes of it.",
     "bearings": "Force on each main bearing over a cycle, as block and crankshaft feel it, and where they wear.",
     "twist_modes": "How the crankshaft swings in its natural modes, and the speeds at which orders meet them.",
     "twist_response": "Torque in the crankshaft over crank speed, with the speeds at which a limit bars it.",
@@ -13,7 +14,7 @@ PICTURES = {
     "transmissibility": "Force on the elastic mounts over that on the same mounts if they gave no way.",
     "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
     "modes": "Share of each motion in the kinetic energy of each natural mode.",
-    "run_up": "Largest force and travel on any mount while the engine runs up and is shut down.",
+    "run_up": "Largest force and travel on any mount, and roll, while the engine runs up and is shut down.",
     "robust": "The best drawing and the design decided, each built many times, and what each tolerance costs.",
     "trade": "What slightly uneven firing buys.",
 }

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from laufruhe.physics.irregularity import turning_inertia
 from laufruhe.physics.torque import TorqueFacts, torque_facts
 from laufruhe.present.numbers import DASH, number
+from laufruhe.present.torque import asks_torque
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 
@@ -18,8 +18,7 @@ HEAD = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "store
 def tables(result: Result) -> list[Grid]:
     """A row an operating point, where a flywheel is told or the inside of the crankcase is asked for."""
     engine, problem = result.final.engine, result.problem
-    asked = any(measure.is_inside for measure in problem.measures)
-    if turning_inertia(engine, problem.fidelity) is None and not asked:
+    if not asks_torque(result):
         return []
     facts = ((point.name, torque_facts(engine, point, problem.fidelity)) for point in problem.points)
     return [Grid("Torque of the crankshaft", HEAD, tuple(_row(*pair) for pair in facts), note=NOTE)]

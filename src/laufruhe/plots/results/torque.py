@@ -1,0 +1,122 @@
+"""The tangential-force diagram: torque of gas, pistons and rods, the work that it stores, and the crank speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, MultipleLocator
+
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.irregularity import swing_of, turning_inertia
+from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
+from laufruhe.plots.speed_axis import RPM
+from laufruhe.plots.style import FAINT, GREEN, INK, ORANGE, PALE, SKY, entry, headed, page, series_of
+from laufruhe.present.measures import Array, has_loads
+from laufruhe.present.numbers import number
+from laufruhe.present.torque import asks_torque
+from laufruhe.solvers.result import Result
+
+STEPS, MOST_ORDERS = 1440, 12
+WIDE, HIGH = 6.8, 1.65
+COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK}
+# a part that is a smaller share of the largest is not drawn, and an order not shown
+FELT, SEEN = 1e-3, 1e-2
+
+
+def applies(result: Result) -> bool:
+    """Whether torque or flywheel are asked for."""
+    return asks_torque(result) and has_loads(result)
+
+
+def figure(result: Result) -> Figure:
+    """Torque part by part, its work about the mean, the crank speed, and what orders the torque is made of."""
+    engine, fidelity = result.final.engine, result.problem.fidelity
+    facts = [torque_facts(engine, point, fidelity) for point in result.problem.points]
+    points = result.problem.points
+    fired = [j for j, point in enumerate(points) if fidelity.gas_of(point) is not None]
+    k = max(fired or range(len(facts)), key=lambda j: facts[j].excursion)
+    parts = torque_parts(engine, points[k], fidelity)
+    whole = max(float(np.abs(part.sample(STEPS)).max()) for part in parts.values()) or 1.0
+    felt = {name: part for name, part in parts.items() if np.abs(part.sample(STEPS)).max() > FELT * whole}
+    degrees = np.linspace(0.0, math.degrees(engine.cycle.angle), STEPS + 1)
+    has_speed = facts[k].irregularity is not None
+    drawn = page(3 + has_speed, 1, (WIDE, HIGH), gap=0.35, lead=0.15)
+    large = whole >= 1e4
+    _torque(drawn.panels[0], felt, degrees, facts[k].mean, large)
+    _work(drawn.panels[1], parts["all"], degrees, facts[k])
+    if has_speed:
+        _speed(drawn.panels[2], result, k, degrees)
+    for axes in drawn.panels[:-1]:
+        axes.set(xlim=(0.0, degrees[-1]))
+        axes.xaxis.set_major_locator(MultipleLocator(90.0))
+        axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
+    drawn.panels[-2].set_xlabel("crank angle [deg]")
+    _orders(drawn.panels[-1], felt, large)
+    radii = {part.crank_radius for part in engine.slider_cranks}
+    radius = f"; over {1e3 * min(radii):.4g} mm, the tangential force" if len(radii) == 1 else ""
+    lines = f"Torque on the crankshaft at {points[k].name}{radius}."
+    legend = [entry(name, color=COLOURS[name], linewidth=2.0) for name in felt]
+    legend.append(entry(f"mean, {number(facts[k].mean, scale=whole)} N m", color=FAINT, linestyle=(0, (4, 1.6))))
+    legend += [entry("speed as given", color=one.colour) for one in series_of(result)[:-1] if has_speed]
+    return headed(drawn, result, "Torque over one working cycle", lines, legend)
+
+
+def _torque(axes: Axes, parts: Mapping[str, Spectrum], degrees: Array, mean: float, large: bool) -> None:
+    factor = 1e-3 if large else 1.0
+    for name, part in parts.items():
+        axes.plot(degrees, factor * part.values(np.radians(degrees)), color=COLOURS[name], linewidth=1.4)
+    axes.axhline(factor * mean, color=FAINT, linewidth=1.0, linestyle=(0, (4, 1.6)))
+    axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
+    axes.set_ylabel(f"torque [{'k' if large else ''}N m]")
+
+
+def _work(axes: Axes, torque: Spectrum, degrees: Array, facts: TorqueFacts) -> None:
+    work = torque.integral.values(np.radians(degrees))
+    work = work - work.min()
+    factor, unit = (1e-3, "kJ") if facts.excursion >= 1e4 else (1.0, "J")
+    axes.fill_between(degrees, 0.0, factor * work, color=PALE, linewidth=0)
+    axes.plot(degrees, factor * work, color=INK, linewidth=1.4)
+    axes.set(ylim=(0.0, 1.3 * factor * facts.excursion or 1.0), ylabel=f"work stored [{unit}]")
+    axes.text(
+        0.99, 0.94, f"at most {number(factor * facts.excursion)} {unit}", ha="right", va="top", size=8,
+        transform=axes.transAxes, color=INK,
+    )  # fmt: skip
+
+
+def _speed(axes: Axes, result: Result, k: int, degrees: Array) -> None:
+    """Of the design as given, where that keeps turning, and as decided."""
+    point, fidelity = result.problem.points[k], result.problem.fidelity
+    told = ""
+    for one in series_of(result):
+        inertia = turning_inertia(one.design.engine, fidelity)
+        swing = swing_of(one.design.engine, point, fidelity)
+        degree = swing.irregularity(inertia or 0.0)
+        if inertia is None or (degree > 1.0 and one.design is not result.final):
+            continue
+        speeds = swing.speeds(inertia)[: len(swing.work)]
+        angles = degrees[-1] * np.arange(len(speeds)) / len(speeds)
+        axes.plot(angles, RPM * speeds, color=one.colour, linewidth=1.4)
+        told = f"degree of irregularity {number(degree, 3)}" + (f" (1/{1.0 / degree:.4g})" if degree > 0.0 else "")
+    axes.axhline(RPM * point.speed, color=FAINT, linewidth=0.7, zorder=0.5)
+    axes.set_ylabel("speed [rpm]")
+    axes.margins(y=0.25)
+    axes.text(0.99, 0.94, told, ha="right", va="top", size=8, transform=axes.transAxes, color=INK)
+
+
+def _orders(axes: Axes, parts: Mapping[str, Spectrum], large: bool) -> None:
+    """Amplitudes side by side, the strongest orders of all."""
+    factor, total = 1e-3 if large else 1.0, parts.get("all", next(iter(parts.values())))
+    orders, sizes = total.orders[1:], np.abs(total.coefficients[1:])
+    top = float(sizes.max(initial=0.0))
+    chosen = sorted(k for k in np.argsort(-sizes, kind="stable")[:MOST_ORDERS].tolist() if sizes[k] > SEEN * top)
+    wide = 0.8 / len(parts)
+    for j, (name, part) in enumerate(parts.items()):
+        heights = [factor * abs(complex(part.at(float(orders[k])))) for k in chosen]
+        axes.bar(np.arange(len(chosen)) + (j + 0.5) * wide - 0.4, heights, wide, color=COLOURS[name])
+    axes.set_xticks(range(len(chosen)), [f"{orders[k]:g}" for k in chosen])
+    axes.set(xlabel="order of crank speed", ylabel=f"amplitude [{'k' if large else ''}N m]")
+    axes.grid(axis="x", visible=False)

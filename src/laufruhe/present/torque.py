@@ -1,0 +1,13 @@
+"""Whether a result shows the torque of its crankshaft."""
+
+from __future__ import annotations
+
+from laufruhe.physics.irregularity import turning_inertia
+from laufruhe.solvers.result import Result
+
+
+def asks_torque(result: Result) -> bool:
+    """Whether a flywheel is told, or the inside of the crankcase is asked for."""
+    problem = result.problem
+    asked = any(measure.is_inside for measure in problem.measures)
+    return asked or turning_inertia(result.final.engine, problem.fidelity) is not None
