@@ -110,7 +110,7 @@ class Corners:
         """Through a real linear map of values (n, ...); None where nothing bends any more."""
         k, degrees = self.jumps.shape[:2]
         flat = np.asarray(linear(self.jumps.reshape(k * degrees, *self.jumps.shape[2:])))
-        return merged(self.angles, flat.reshape(k, degrees, *flat.shape[1:]))
+        return _left(self.angles, flat.reshape(k, degrees, *flat.shape[1:]))
 
     def moved(self, by: float, degrees: int = 0) -> Self:
         """Later by an angle, and integrated as often as `degrees` says."""
@@ -140,8 +140,8 @@ class Corners:
 def joined(parts: Sequence[Corners | None]) -> Corners | None:
     """Corners of a sum of signals."""
     found = [corners for corners in parts if corners is not None]
-    if not found:
-        return None
+    if len(found) < 2:
+        return found[0] if found else None
     degrees = max(corners.jumps.shape[1] for corners in found)
     jumps = [_pad(corners.jumps, degrees) for corners in found]
     return merged(np.concatenate([corners.angles for corners in found]), np.concatenate(jumps))
@@ -158,8 +158,15 @@ def merged(angles: Array, jumps: Array) -> Corners | None:
     _, first, inverse = np.unique(np.round(angles / SAME_ANGLE), return_index=True, return_inverse=True)
     total = np.zeros((len(first), *jumps.shape[1:]))
     np.add.at(total, inverse, jumps)
-    used = np.any(total.reshape(len(total), -1) != 0.0, axis=1)
-    return Corners(angles[first][used], total[used]) if used.any() else None
+    return _left(angles[first], total)
+
+
+def _left(angles: Array, jumps: Array) -> Corners | None:
+    """Corners at which anything jumps; None where there are none."""
+    used = np.any(jumps.reshape(len(jumps), -1) != 0.0, axis=1)
+    if len(angles) and used.all():
+        return Corners(angles, jumps)
+    return Corners(angles[used], jumps[used]) if used.any() else None
 
 
 def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float) -> Corners | None:

@@ -22,6 +22,10 @@ MAX_ORDER_DENOMINATOR = 1000
 PER_ORDER = 1000
 """Orders are told apart to a thousandth of crank speed."""
 
+# The C library hands pages of every array over 128 kB back to the system, and gets them anew for the next, until one
+# of a few MB was given back: samples of a cycle take half the time after that.
+np.empty(1 << 20)
+
 
 def orders_equal(orders: ArrayLike, wanted: ArrayLike) -> NDArray[np.bool_]:
     """Which orders are one of those wanted, shape of `orders`: the one rule of what the same order is."""
@@ -122,17 +126,17 @@ class Spectrum:
             return self.smooth.sample(samples) + self.corners.values(angles, self.period)
         if len(self.coefficients) <= (samples + 1) // 2:
             # no order reaches half the number of samples, so none is folded
-            half = 0.5 * samples * self.coefficients
+            half = np.asarray(0.5 * self.coefficients, dtype=complex)
             half[:1] *= 2.0
-            return np.asarray(np.fft.irfft(half, samples, axis=0))
+            return _transformed(half, samples)
         folded = np.zeros((samples, *self.coefficients.shape[1:]), dtype=complex)
         for start in range(0, len(self.coefficients), samples):
             block = self.coefficients[start : start + samples]
             folded[: len(block)] += block
         # of a real signal half of the folded orders say all
         first = samples // 2 + 1
-        real = 0.5 * samples * (folded[:first] + folded[-np.arange(first) % samples].conj())
-        return np.asarray(np.fft.irfft(real, samples, axis=0))
+        half = folded[:first] + folded[-np.arange(first) % samples].conj()
+        return _transformed(np.asarray(0.5 * half, dtype=complex), samples)
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at any crank angles [rad], shape (len(angles), ...)."""
@@ -201,6 +205,15 @@ class Spectrum:
             out += self.corners.coefficients(count, float(self.base))
         out[: len(own)] = own
         return out
+
+
+def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float64]:
+    """c_0 + 2 Re sum_j c_j e^{i j phi} at equal steps; in memory place by place, as norms take their rows."""
+    out = np.empty((samples, *half.shape[1:]))
+    if half.ndim > 1:
+        out = np.empty((half.shape[1], samples, *half.shape[2:])).swapaxes(0, 1)
+    np.fft.irfft(half, samples, axis=0, norm="forward", out=out)
+    return out
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:

@@ -185,6 +185,7 @@ def spread(load: NDArray[np.complex128], step: int, cycle: Cycle) -> Spectrum:
 
 
 @lru_cache(maxsize=1024)
+@lru_cache(maxsize=1024)
 def order_index(cycle: Cycle, order: float) -> int:
     """Of an order of crank speed among those of a cycle."""
     return int(as_order(order) / cycle.base_order)

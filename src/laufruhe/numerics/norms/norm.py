@@ -214,11 +214,12 @@ class Norm(ABC):
 
 def lengths(rows: Array) -> Array:
     """|v_k| of each row, shape (k, d) to (k,), safe from overflow and underflow."""
-    if not np.abs(rows).max(initial=0.0) < _MOST:
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = np.sqrt((rows * rows) @ np.ones(rows.shape[-1]))
+    if not size.max(initial=0.0) < _MOST:
         return _scaled_lengths(rows)
-    size = np.sqrt(np.einsum("...d,...d->...", rows, rows))
-    small = size < _LEAST
-    if small.any():
+    if size.min(initial=_MOST) < _LEAST:
+        small = size < _LEAST
         size[small] = _scaled_lengths(rows[small])
     return np.asarray(size)
 
