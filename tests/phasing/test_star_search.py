@@ -1,6 +1,7 @@
 """Branch and bound finds what looking at every star finds, for every objective offered."""
 
 import itertools
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
 from laufruhe.machine.layouts import inline
+from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.physics.star_space import Partial, StarSpace, outside_in
 from laufruhe.solvers import star_search
 from laufruhe.solvers.star_search import enumerate_stars, search_stars
@@ -94,3 +96,30 @@ def test_a_search_out_of_time_claims_no_proof():
 def test_longest_levers_first(throws):
     x = np.abs(np.array(inline(throws, 1.0).throw_positions))[list(outside_in(throws))]
     assert np.all(np.diff(x) <= 0.0)
+
+
+@pytest.mark.parametrize("name", OBJECTIVES)
+def test_in_pieces_it_finds_the_same_whoever_works(name, monkeypatch):
+    """Rounds of pieces end at the same bits on one worker and on three, and at the proven best."""
+    monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
+    monkeypatch.setattr(star_search, "PIECES", 5)
+    space, objective = whole(8), OBJECTIVES[name]
+    with working_on(HERE):
+        one = search_stars(space, objective, 5)
+    with ThreadPoolExecutor(3) as pool, working_on(pool):
+        three = search_stars(space, objective, 5)
+    assert one.complete
+    assert three.complete
+    assert (one.stars.tobytes(), one.values.tobytes()) == (three.stars.tobytes(), three.values.tobytes())
+    assert (one.nodes, one.lower_bound) == (three.nodes, three.lower_bound)
+    every = enumerate_stars(space, objective, 5)
+    np.testing.assert_allclose(one.values, every.values, rtol=1e-9, atol=1e-9 * float(every.values.max() or 1.0))
+
+
+def test_in_pieces_it_stops_in_time(monkeypatch):
+    monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
+    space, objective = whole(9), OBJECTIVES["rms of two"]
+    with working_on(HERE):
+        found = search_stars(space, objective, 1, time_limit=0.0)
+    assert not found.complete
+    assert found.lower_bound <= enumerate_stars(space, objective).values[0] * (1.0 + 1e-12)

@@ -6,9 +6,10 @@ how long it takes, never what is found.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from contextvars import ContextVar
 from typing import Generic, ParamSpec, TypeVar
 
@@ -16,6 +17,7 @@ from laufruhe.errors import SolverError
 from laufruhe.numerics.budget import in_time, left, limited, passed
 from laufruhe.numerics.cores import processors
 from laufruhe.numerics.processes import Processes
+from laufruhe.numerics.progress import tell
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -25,6 +27,8 @@ AHEAD = 3
 """Pieces that are asked for at once, for each worker: none waits for the next one."""
 LOSSES = 3
 """Times that one piece may be lost with its worker; what ends several is the fault of the piece."""
+WORTH_PROCESSES = 4.0
+"""Seconds of work that pay for starting processes."""
 LONGEST_WAIT = 1e9
 
 _given: ContextVar[Executor | None] = ContextVar("given", default=None)
@@ -128,6 +132,35 @@ def each(
             future.cancel()
 
 
+def in_turn(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[A]:
+    """Answers in the order of the pieces, those that time allows; the first ones tell whether processes are worth it.
+
+    Parameters
+    ----------
+    what
+        They are, in words, for who listens to progress.
+    """
+    began, found = time.perf_counter(), list[A]()
+    for piece in in_time(pieces):
+        rest = len(pieces) - len(found)
+        if found and count_of() > 1 and (time.perf_counter() - began) * (rest / len(found)) > WORTH_PROCESSES:
+            break
+        tell(what, len(found), len(pieces))
+        found.append(work(piece))
+    if found and len(found) < len(pieces) and not passed():
+        later: dict[int, A] = {}
+        others = pieces[len(found) :]
+        with (
+            executor_for(min(len(others), count_of())) as executor,
+            closing(each(work, others, executor, patient=True)) as answers,
+        ):
+            for number, answer in answers:
+                later[number] = answer
+                tell(what, len(found) + len(later), len(pieces))
+        found += [later[number] for number in sorted(later)]
+    return found
+
+
 class _Asked(Generic[T, A]):
     """Pieces that an executor was asked for, their numbers, and how often each was lost."""
 
@@ -138,7 +171,7 @@ class _Asked(Generic[T, A]):
     def ask(self, number: int, piece: T, losses: int = 0) -> None:
         """Hand a piece out."""
         try:
-            future = self._executor.submit(_within, left(), self._work, piece)
+            future = self._executor.submit(worked, left(), self._work, piece)
         except (RuntimeError, OSError) as error:
             raise _nobody(self._executor, error) from None
         self.pieces[future] = (number, piece, losses)
@@ -156,7 +189,7 @@ class _Asked(Generic[T, A]):
             yield number, answer
 
 
-def _within(seconds: float, work: Callable[[T], A], piece: T) -> A:
+def worked(seconds: float, work: Callable[[T], A], piece: T) -> A:
     """A piece, where it is done: there it starts no workers of its own."""
     with limited(seconds), working_on(HERE):
         return work(piece)

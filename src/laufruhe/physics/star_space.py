@@ -70,11 +70,36 @@ class StarSpace:
         prune
             Tells which partial stars need not be grown further.
         """
+        for root in self.roots:
+            yield from self.below(root, prune)
+
+    @property
+    def roots(self) -> tuple[Partial, ...]:
+        """The first throw alone, for every pattern."""
+        order, found = outside_in(self.throws), []
         for pattern in self.patterns:
-            for block in _grown(self, pattern, prune):
-                own = np.all(self.canonical(block) == block, axis=1)
-                if own.any():
-                    yield block[own]
+            left = np.array([pattern], dtype=np.uint8)
+            left[0, 0] -= 1
+            found.append(Partial(np.zeros((1, self.throws), dtype=np.uint8), left, order[:1], order[1:]))
+        return tuple(found)
+
+    def below(self, partial: Partial, prune: Prune | None = None) -> Iterator[Stars]:
+        """All stars that some partial stars grow to, as `blocks`."""
+        for block in _grown(self, partial, prune):
+            own = np.all(self.canonical(block) == block, axis=1)
+            if own.any():
+                yield block[own]
+
+    def parted(self, pieces: int, prune: Prune) -> list[Partial]:
+        """All stars in about so many pieces for each pattern, by the throws that are placed first."""
+        found = []
+        for root in self.roots:
+            partial = root
+            while partial.open[1:] and len(partial.stars) < 2 * pieces:
+                partial = _next(self, partial, prune)
+            parts = (part for part in np.array_split(np.arange(len(partial.stars)), pieces) if len(part))
+            found += [Partial(partial.stars[k], partial.counts[k], partial.placed, partial.open) for k in parts]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,25 +129,25 @@ def outside_in(throws: int) -> tuple[int, ...]:
     return tuple(k // 2 if k % 2 == 0 else throws - 1 - k // 2 for k in range(throws))
 
 
-def _grown(space: StarSpace, pattern: tuple[int, ...], prune: Prune | None) -> Iterator[Stars]:
-    order = outside_in(space.throws)
-    first = np.zeros((1, space.throws), dtype=np.uint8)
-    left = np.array([pattern], dtype=np.uint8)
-    left[0, 0] -= 1
+def _grown(space: StarSpace, first: Partial, prune: Prune | None) -> Iterator[Stars]:
     # depth first over blocks: what waits never exceeds a block for every throw and step
-    waiting = [Partial(first, left, order[:1], order[1:])]
+    waiting = [first]
     while waiting:
         partial = waiting.pop()
         if not partial.open:
             yield partial.stars
             continue
-        child = _children(partial)
-        child = _kept(child, _first_of_images(space, child))
-        if prune is not None and child.open:
-            child = _kept(child, ~prune(child))
+        child = _next(space, partial, prune)
         for start in range(0, len(child.stars), BLOCK):
             part = slice(start, start + BLOCK)
             waiting.append(Partial(child.stars[part], child.counts[part], child.placed, child.open))
+
+
+def _next(space: StarSpace, partial: Partial, prune: Prune | None) -> Partial:
+    """One more throw placed, images and what need not be grown further left out."""
+    child = _children(partial)
+    child = _kept(child, _first_of_images(space, child))
+    return _kept(child, ~prune(child)) if prune is not None and child.open else child
 
 
 def _children(partial: Partial) -> Partial:

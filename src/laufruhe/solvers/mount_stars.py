@@ -13,13 +13,15 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
+from functools import partial
 from typing import TypeAlias
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.norms import RMS
 from laufruhe.numerics.progress import tell, within
+from laufruhe.numerics.workers import in_turn
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Measure, Term
@@ -142,15 +144,12 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> li
     """Every star and firing order with a quarter of the starts, the best first."""
     starts = problem.search.starts
     few = starts if len(stars) == 1 else min(starts, max(SHORTEST_SEARCH, starts // FEWER_STARTS))
-    began, found = time.perf_counter(), list[StarDesign]()
-    for k, (candidate, steps) in enumerate(stars):
-        if found and (passed() or time.perf_counter() - began > phasing.time_limit):
-            break
-        tell("stars on their mounts", k, len(stars), value=_least(found))
-        # a process of its own costs more than so few starts
-        own = _problem_of(problem, phasing, candidate, few)
-        with within(f"star {k + 1} of {len(stars)}"):
-            found.append(StarDesign(candidate, solve_mounts(own, 1 if len(stars) > 1 else None), steps))
+    problems = [_problem_of(problem, phasing, candidate, few) for candidate, _ in stars]
+    # stars side by side, and the starts of each in one process
+    work = partial(solve_mounts, workers=1 if len(stars) > 1 else None)
+    with limited(phasing.time_limit):
+        results = in_turn(work, problems, "stars on their mounts")
+    found = [StarDesign(star, result, steps) for (star, steps), result in zip(stars, results, strict=False)]
     return sorted(found, key=_rank)
 
 

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.budget import in_time, left, passed
 from laufruhe.numerics.progress import telling
-from laufruhe.numerics.workers import count_of, each, executor_for
+from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, each, executor_for
 
 Array = NDArray[np.float64]
 
@@ -43,8 +43,6 @@ _NEAR = 1e-6
 WORTH_EXPANDING = 3
 # seconds that a start has where time is over
 SHORTEST = 0.5
-# seconds of work that pay for starting processes
-WORTH_PROCESSES = 4.0
 _QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False, "calc_lam_p": False}
 _OPTIONS = {
     "print_level": 0,

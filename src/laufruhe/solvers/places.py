@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.foresight import foresight
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit
@@ -42,6 +43,8 @@ HALVINGS = 10
 MOST_CORNERS = 16
 # of a side, that a cut keeps from its ends
 EDGE = 0.1
+# boxes that may be wanted next
+AHEAD = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,20 +114,34 @@ def _divided(search: _Search, nothing: float) -> tuple[_Found | None, float, int
     root = search.box(*search.bounds)
     if root is None:
         return None, np.inf, seen
-    heap, best = [(root.bound, next(number), root)], search.better(None, root.middle)
-    while heap and seen < most and not passed():
-        gap = gap_of(best.value, heap[0][0], nothing)
-        # a box that left nothing out has no better design, only a bound as near as its program came
-        if gap <= NEARLY * problem.tolerance or (gap < np.inf and heap[0][2].spread.max() <= EXACT):
-            break
-        _, _, box = heapq.heappop(heap)
-        for half in search.halves(box):
-            seen += 1
-            if half is not None and half.bound < best.value:
-                heapq.heappush(heap, (half.bound, next(number), half))
-                best = search.better(best, half.middle)
-        tell("boxes of places", seen, value=best.value, bound=heap[0][0] if heap else -np.inf)
+    heap, best = [(root.bound, next(number), root)], search.better(None, search.at(root.middle))
+    with foresight(_halved) as ahead:
+        while heap and seen < most and not passed():
+            gap = gap_of(best.value, heap[0][0], nothing)
+            # a box that left nothing out has no better design, only a bound as near as its program came
+            if gap <= NEARLY * problem.tolerance or (gap < np.inf and heap[0][2].spread.max() <= EXACT):
+                break
+            _, name, box = heapq.heappop(heap)
+            step = search, box, best.value
+            others = heapq.nsmallest(AHEAD, heap)
+            ahead.likely([(name, step), *((other, (search, one, best.value)) for _, other, one in others)])
+            halves, conflict = ahead.wanted(name, step)
+            search.told(conflict)
+            for half, found in halves:
+                seen += 1
+                if half is not None and found is not None and half.bound < best.value:
+                    heapq.heappush(heap, (half.bound, next(number), half))
+                    best = search.better(best, found)
+            tell("boxes of places", seen, value=best.value, bound=heap[0][0] if heap else -np.inf)
     return (best, heap[0][0], seen) if heap else (None if best.design.rank[0] else best, np.inf, seen)
+
+
+def _halved(step: tuple[_Search, _Box, float]) -> tuple[list[tuple[_Box | None, _Found | None]], tuple[str, ...]]:
+    """Halves of a box, each with the best design at its middle if it may be better than a value; limits not met."""
+    search, box, value = step
+    halves = list(search.halves(box))
+    found = [None if half is None or half.bound >= value else search.at(half.middle) for half in halves]
+    return list(zip(halves, found, strict=True)), search.conflict
 
 
 class _Search:
@@ -142,9 +159,9 @@ class _Search:
         """Of all places."""
         return np.array([p.lower for p in self.places]), np.array([p.upper for p in self.places])
 
-    def better(self, best: _Found | None, places: Array) -> _Found:
-        """The better of the best design so far and the best with these places."""
-        found = self._at(places)
+    @staticmethod
+    def better(best: _Found | None, found: _Found) -> _Found:
+        """The better of the best design so far and another."""
         return found if best is None or found.design.rank < best.design.rank else best
 
     def halves(self, box: _Box) -> Iterator[_Box | None]:
@@ -162,13 +179,13 @@ class _Search:
         """The bound of a box, and where its program puts the places; None where no design is allowed."""
         beyond = self._beyond(lower, upper)
         if beyond:
-            self._told(beyond)
+            self.told(beyond)
             return None
         lower, upper = self._shrunk(lower, upper)
         relaxed = self.relaxation.program(lower, upper)
         result = solve_unbalances(relaxed)
         if result.status is Status.INFEASIBLE:
-            self._told(result.conflict)
+            self.told(result.conflict)
             return None
         bound = result.certificate.lower_bound if result.certificate is not None else 0.0
         middle, spread = self.relaxation.placing(relaxed, result, lower, upper)
@@ -177,7 +194,7 @@ class _Search:
         moved = upper - lower if allowed is None else np.abs(allowed - middle)
         return _Box(lower, upper, max(bound, floor), middle if allowed is None else allowed, np.maximum(spread, moved))
 
-    def _told(self, conflict: Sequence[str]) -> None:
+    def told(self, conflict: Sequence[str]) -> None:
         """What cannot be met in one box may be in another: all boxes together tell."""
         told = {*self.conflict, *conflict}
         self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in told)
@@ -240,7 +257,7 @@ class _Search:
             found += [at for at in (np.clip(pushed.x, lower, upper), start) if room(at).min() >= -REACH]
         return min(found, key=away, default=None)
 
-    def _at(self, places: Array) -> _Found:
+    def at(self, places: Array) -> _Found:
         """The best design with its places given."""
         where: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
         engine = self.problem.design(list(where.values()), self.places)

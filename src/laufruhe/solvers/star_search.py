@@ -12,18 +12,24 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import tell
+from laufruhe.numerics.workers import HERE, count_of, each, executor_for
 from laufruhe.physics.crank_stars import Array, Stars, phase_waves
 from laufruhe.physics.star_space import Partial, StarSpace
 
 SLACK = 1e-9
+WORTH_SHARING = 2_000_000_000
+"""Stars of a space that takes several seconds: thirteen throws on as many steps take two."""
+PIECES, MOST_AT_ONCE = 64, 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,32 +118,79 @@ def search_stars(
         Seconds after which the search stops; what it has then is not complete.
     """
     started = time.perf_counter()
-    best, bounds = BestStars(count, space.throws), _Bounds(space, objective)
-    for start in _good_starts(space, objective):
-        best.offer(space.canonical(start), objective.values(space, space.canonical(start)))
-    looked_at = 0
-    ended = False
-    root = bounds.root()
+    with limited(time_limit):
+        best = BestStars(count, space.throws)
+        for start in _good_starts(space, objective):
+            best.offer(space.canonical(start), objective.values(space, space.canonical(start)))
+        search = _Search(space, objective, best)
+        if space.size < WORTH_SHARING:
+            for root in space.roots:
+                search.explore(root)
+        else:
+            search.share()
+    least = float(best.values[0]) if len(best.values) else float("inf")
+    bound = least if not search.ended else search.root
+    seconds = time.perf_counter() - started
+    return StarsFound(best.stars, best.values, min(bound, least), not search.ended, search.looked_at, seconds)
 
-    def prune(partial: Partial) -> NDArray[np.bool_]:
-        nonlocal looked_at, ended
-        looked_at += len(partial.stars)
-        tell("partial stars", looked_at, value=float(best.values.min(initial=np.inf)), bound=root)
-        ended = ended or passed() or time.perf_counter() - started > time_limit
-        if ended:
+
+class _Search:
+    """The best stars of what was looked at so far."""
+
+    def __init__(self, space: StarSpace, objective: AmplitudeObjective, best: BestStars) -> None:
+        self.space, self.objective, self.best = space, objective, best
+        self.bounds = _Bounds(space, objective)
+        self.root = self.bounds.root()
+        self.looked_at, self.ended = 0, False
+
+    def explore(self, partial: Partial) -> None:
+        """All stars that some partial stars grow to, or as many as time allows."""
+        for block in self.space.below(partial, self._prune):
+            if not self.ended:
+                self.best.offer(block, self.objective.values(self.space, block))
+                self.looked_at += len(block)
+
+    def share(self) -> None:
+        """All stars in pieces, in rounds of so many: each piece knows the best of the rounds before it.
+
+        Pieces and rounds are the same whoever works, so what is found is too.
+        """
+        pieces = self.space.parted(PIECES, self._prune)
+        with ExitStack() as held:
+            executor = held.enter_context(executor_for()) if count_of() > 1 else HERE
+            start, size = 0, 1
+            while start < len(pieces):
+                asked = [(self, piece) for piece in pieces[start : start + size]]
+                # the first pieces find values that spare the others most of their work
+                start, size = start + size, min(2 * size, MOST_AT_ONCE)
+                answers = sorted(each(_explored, asked, executor, patient=True), key=lambda answer: answer[0])
+                for _, (best, looked_at, ended) in answers:
+                    self.best.offer(best.stars, best.values)
+                    self.looked_at += looked_at
+                    self.ended = self.ended or ended
+                self.ended = self.ended or len(answers) < len(asked)
+                if self.ended:
+                    return
+
+    def _prune(self, partial: Partial) -> NDArray[np.bool_]:
+        self.looked_at += len(partial.stars)
+        tell("partial stars", self.looked_at, value=float(self.best.values.min(initial=np.inf)), bound=self.root)
+        self.ended = self.ended or passed()
+        if self.ended:
             return np.ones(len(partial.stars), dtype=bool)
-        if not np.isfinite(best.cut):
+        if not np.isfinite(self.best.cut):
             return np.zeros(len(partial.stars), dtype=bool)
         # stars equal to the last one wanted are kept out: any of them will do
-        return bounds.beyond(partial, best.cut * (1.0 - SLACK))
+        return self.bounds.beyond(partial, self.best.cut * (1.0 - SLACK))
 
-    for block in space.blocks(prune):
-        if not ended:
-            best.offer(block, objective.values(space, block))
-            looked_at += len(block)
-    least = float(best.values[0]) if len(best.values) else float("inf")
-    bound = least if not ended else root
-    return StarsFound(best.stars, best.values, min(bound, least), not ended, looked_at, time.perf_counter() - started)
+
+def _explored(step: tuple[_Search, Partial]) -> tuple[BestStars, int, bool]:
+    """The best stars of a piece, how many were looked at, and whether time was over."""
+    known, piece = step
+    search = copy(known)
+    search.best, search.looked_at, search.ended = copy(known.best), 0, False
+    search.explore(piece)
+    return search.best, search.looked_at, search.ended
 
 
 class _Bounds:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from laufruhe.numerics.norms.maximum import Maximum
 from laufruhe.numerics.norms.mean import Mean
-from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, softened_lengths
+from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, only, softened_lengths
 from laufruhe.numerics.norms.peak_to_peak import PeakToPeak
 from laufruhe.numerics.norms.rms import RootMeanSquare
 from laufruhe.numerics.norms.worst_mean import WorstMean
@@ -14,6 +14,6 @@ from laufruhe.numerics.norms.worst_mean import WorstMean
 __all__ = ["MEAN", "NORMS", "RMS", "Cones", "Grid", "Norm", "SmoothProgram", "lengths", "softened_lengths"]
 
 NORMS: Mapping[str, Norm] = {
-    norm.name: norm for norm in (Mean(), Maximum(), RootMeanSquare(), PeakToPeak(), WorstMean())
+    norm.name: norm for norm in map(only, (Mean, Maximum, RootMeanSquare, PeakToPeak, WorstMean))
 }
 MEAN, RMS = NORMS["mean"], NORMS["rms"]

@@ -10,7 +10,7 @@ asks which norm it has before it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, TypeAlias
 
@@ -93,6 +93,14 @@ class SmoothProgram(Protocol):
         """Every entry at most zero."""
 
 
+_ONLY: dict[type[Norm], Norm] = {}
+
+
+def only(kind: type[Norm]) -> Norm:
+    """The one norm of a class."""
+    return _ONLY.setdefault(kind, kind())
+
+
 class Norm(ABC):
     """A norm of rows v_k, shape (k, d), on a grid.
 
@@ -128,6 +136,10 @@ class Norm(ABC):
 
     def __repr__(self) -> str:
         return f"<{self.name}>"
+
+    def __reduce__(self) -> tuple[Callable[[type[Norm]], Norm], tuple[type[Norm]]]:
+        # a norm is one and the same in every process
+        return only, (type(self),)
 
     @abstractmethod
     def value(self, grid: Grid, rows: Array) -> float:

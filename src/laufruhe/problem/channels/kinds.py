@@ -42,6 +42,14 @@ class Needs(StrEnum):
     RUN = "run-up"
 
 
+_KNOWN: dict[str, Channel] = {}
+
+
+def known(name: str) -> Channel:
+    """The channel of a name."""
+    return _KNOWN[name]
+
+
 @dataclass(frozen=True, eq=False)
 class Channel:
     """One thing that is measured.
@@ -87,6 +95,13 @@ class Channel:
     is_mounting: ClassVar[bool] = False
     is_placing: ClassVar[bool] = False
     is_checked: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        _KNOWN[self.name] = self
+
+    def __reduce__(self) -> tuple[Callable[[str], Channel], tuple[str]]:
+        # a channel is one and the same in every process
+        return known, (self.name,)
 
     def __str__(self) -> str:
         return self.name

@@ -1,0 +1,77 @@
+"""A search whose next steps are worked out before they are wanted.
+
+The one who searches decides what is wanted, one step after the other, as a single process would, and tells the best
+value with every step; who works side by side only makes answers come sooner. So answers, their order and what is proven
+are the same to the last bit, however many work.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from contextlib import ExitStack, contextmanager
+from typing import Generic, TypeVar
+
+from laufruhe.numerics.budget import left
+from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, executor_for, given, worked
+
+T = TypeVar("T")
+A = TypeVar("A")
+
+
+class Foresight(Generic[T, A]):
+    """Answers of one kind of step; processes are started once a search has taken longer than that takes."""
+
+    def __init__(self, work: Callable[[T], A], held: ExitStack) -> None:
+        self._work, self._held = work, held
+        self._began = time.perf_counter()
+        self._executor: Executor | None = None
+        self._asked: dict[Hashable, Future[A]] = {}
+        self.foreseen = self.wasted = 0
+
+    def likely(self, steps: Iterable[tuple[Hashable, T]]) -> None:
+        """Steps that may be wanted next, the likeliest first; as many are begun as can be worked at once."""
+        if self._executor is None:
+            waited = time.perf_counter() - self._began > WORTH_PROCESSES
+            if count_of() == 1 or not (waited or given() is not None):
+                return
+            self._executor = self._held.enter_context(executor_for())
+            self._held.callback(self.forget)
+        room = count_of(self._executor) - sum(not future.done() for future in self._asked.values())
+        for key, step in steps:
+            if room <= 0:
+                return
+            if key not in self._asked:
+                self._asked[key] = self._executor.submit(worked, left(), self._work, step)
+                room -= 1
+
+    def wanted(self, key: Hashable, step: T) -> A:
+        """The answer to a step: the one foreseen, or worked out now."""
+        future = self._asked.pop(key, None)
+        if future is None:
+            return self._work(step)
+        try:
+            found = future.result()
+        except (CancelledError, BrokenExecutor, *getattr(self._executor, "losses", ())):
+            # lost with its worker
+            return self._work(step)
+        self.foreseen += 1
+        return found
+
+    def forget(self) -> None:
+        """What was foreseen and is not wanted any more."""
+        self.wasted += len(self._asked)
+        for future in self._asked.values():
+            future.cancel()
+        self._asked.clear()
+        if self._executor is not None and given() is None:
+            # nobody waits for what is at work
+            self._executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def foresight(work: Callable[[T], A]) -> Iterator[Foresight[T, A]]:
+    """Of one search; workers are let go with it."""
+    with ExitStack() as held:
+        yield Foresight(work, held)

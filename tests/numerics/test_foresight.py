@@ -1,0 +1,81 @@
+"""A search with foresight: what it asks for and finds is what one process asks for and finds."""
+
+from __future__ import annotations
+
+import heapq
+import random
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, ThreadPoolExecutor
+from itertools import count
+
+import pytest
+
+from laufruhe.numerics.foresight import foresight
+from laufruhe.numerics.progress import listening
+from laufruhe.numerics.workers import HERE, in_turn, working_on
+
+
+def halves(step: tuple[int, float, float]) -> list[tuple[int, float]]:
+    """Children of a node of a random tree, each with its bound; slower than others at random."""
+    seed, bound, _ = step
+    rng = random.Random(seed)
+    time.sleep(rng.random() * 2e-3)
+    return [(rng.getrandbits(40), bound + rng.random() ** 2) for _ in range(2)]
+
+
+def searched(executor: Executor) -> tuple[list[int], int]:
+    """Nodes in the order in which the best-first search wants them; how many answers were there before."""
+    number, heap, order, best = count(), [(0.0, 0, 17)], [], 5.0
+    next(number)
+    with working_on(executor), foresight(halves) as ahead:
+        while heap and len(order) < 200 and heap[0][0] < best:
+            bound, name, seed = heapq.heappop(heap)
+            order.append(seed)
+            near = heapq.nsmallest(8, heap)
+            ahead.likely([(name, (seed, bound, best)), *((n, (s, b, best)) for b, n, s in near)])
+            for child, below in ahead.wanted(name, (seed, bound, best)):
+                heapq.heappush(heap, (below, next(number), child))
+                best = min(best, 4.0 + below)
+        found = ahead.foreseen
+    return order, found
+
+
+def test_order_and_answers_are_those_of_one_process() -> None:
+    alone, none = searched(HERE)
+    with ThreadPoolExecutor(3) as pool:
+        shared, foreseen = searched(pool)
+    assert shared == alone
+    assert none == 0
+    assert foreseen > len(alone) // 2
+
+
+def test_a_step_that_is_lost_is_done_here() -> None:
+    class Losing(ThreadPoolExecutor):
+        """Loses every call."""
+
+        def submit(self, fn: Callable[..., object], /, *args: object, **kwargs: object):  # type: ignore[override, no-untyped-def]
+            future = super().submit(time.sleep, 0.0)
+            future.result()
+            lost = type(future)()
+            lost.cancel()
+            lost.set_running_or_notify_cancel()
+            return lost
+
+    alone, _ = searched(HERE)
+    with Losing(2) as pool:
+        assert searched(pool) == (alone, 0)
+
+
+def test_an_error_is_that_of_the_step() -> None:
+    with ThreadPoolExecutor(2) as pool, working_on(pool), foresight(lambda x: 1 // x) as ahead:
+        ahead.likely([(0, 0), (1, 1)])
+        with pytest.raises(ZeroDivisionError):
+            ahead.wanted(0, 0)
+
+
+def test_in_turn_keeps_the_order_whoever_works() -> None:
+    told: list[int] = []
+    with ThreadPoolExecutor(3) as pool, working_on(pool), listening(lambda step: told.append(step.done)):
+        assert in_turn(abs, [-3, -1, -2], "numbers") == [3, 1, 2]
+    assert told == [0, 1, 2]
