@@ -1,0 +1,307 @@
+"""Studies on a cluster of this machine: bits, kills, a full disk, overhead, and growth with size and workers.
+
+Writes results/benchmarks/cluster.md and cluster.png. `python tests/benchmarks/bench_cluster.py 40 1e6 2000` kills so
+many
+runs, evaluates so many designs, and solves so many scenes; a store with random scenes that are finished, its seconds
+and
+bytes of memory may follow, and are told too.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pages import PAGES, publish
+
+from laufruhe.numerics.cluster import cluster as on_cluster
+from laufruhe.numerics.processes import Processes
+from laufruhe.numerics.workers import HERE, each
+from laufruhe.plots.picture import save_picture
+from laufruhe.studies import picture as p
+from studies import clusters
+
+OUT, PICTURE = PAGES / "cluster.md", PAGES / "cluster.png"
+WORKERS = (1, 2, 4, 7)
+TASKS = 1000
+SMALL = {"draws": 4000, "chunk": 500, "scenes": 60, "few": 3, "points": 4}
+SHARED = {"draws": 200_000, "chunk": 10_000, "scenes": 400, "few": 20, "points": 2}
+TMPFS = 120 << 10
+DAY = 86_400.0
+HEAD = """# Many designs, on this machine and on a cluster
+
+Studies of two kinds: random designs (evaluated many at once) and random scenes (each decided to a proof). Times are
+of a
+machine of {} cores that others used too (load {:.0f} at the start), with a low priority. Core-seconds are those that
+pieces
+took by the clock of their worker, so they grow with that load. What is compared bit by bit does not.
+"""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of one run: size, time by the clock and of all pieces together [s], files, bytes, peak of memory [byte]."""
+
+    size: int
+    wall: float
+    cores: float
+    files: int
+    stored: int
+    memory: int
+
+    def row(self) -> str:
+        """Of a table."""
+        each_one, sizes = 1e6 * self.cores / self.size, f"{self.stored / 1e6:.1f} | {self.memory / 1e6:.0f}"
+        return f"| {self.size:,} | {self.wall:.1f} | {self.cores:.1f} | {each_one:,.1f} | {self.files} | {sizes} |"
+
+
+COSTS = "| size | time [s] | core-seconds | µs each | files of the store | MB | peak memory of the client [MB] |"
+
+
+def timed(folder: Path, *words: str) -> tuple[float, int]:
+    """A study to its end: seconds, and most memory that a process of it had."""
+    began = time.perf_counter()
+    process = subprocess.Popen(
+        [*clusters.LAUFRUHE, "study", "s.toml", "--out", "out", *words], cwd=folder, env=clusters.environment(),
+        stdout=subprocess.DEVNULL,
+    )  # fmt: skip
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = status
+    assert status == 0, status
+    return time.perf_counter() - began, used.ru_maxrss * 1024
+
+
+def stored(root: Path, part: str) -> tuple[float, int, int, int]:
+    """Of a part in a store: core-seconds, draws done, files, bytes."""
+    import zarr
+
+    group = zarr.open_group(root, mode="r")[part]
+    done = np.asarray(group["done"][:])
+    seconds = done[..., 32:].copy().view("<f8")[..., 0]
+    pieces = int(np.any(done, axis=2).sum())
+    files = [path for path in (root / part).rglob("*") if path.is_file()]
+    draws = min(pieces * int(group.attrs["chunk"]), group["values"].shape[0] * group["values"].shape[1])
+    return float(seconds.sum()), draws, len(files), sum(path.stat().st_size for path in files)
+
+
+def overheads(own: clusters.Cluster) -> list[str]:
+    """Milliseconds of one piece that does nothing."""
+
+    def spent(executor: Executor) -> float:
+        list(each(abs, [-1] * 50, executor))
+        began = time.perf_counter()
+        list(each(abs, [-1] * TASKS, executor))
+        return 1e3 * (time.perf_counter() - began) / TASKS
+
+    with Processes(2) as pool, on_cluster(own.address) as dask:
+        rows = [("this process", spent(HERE)), ("processes, 2", spent(pool)), ("Dask, 2 workers", spent(dask))]
+    told = [f"| {name} | {milliseconds:.2f} |" for name, milliseconds in rows]
+    return ["| who works | ms a piece |", "| --- | ---: |", *told]
+
+
+def shared(folder: Path) -> tuple[list[str], list[tuple[int, float, float]]]:
+    """The same study on more and more workers, beside one process."""
+    serial = clusters.prepared(folder / "serial", **SHARED)
+    wall, _ = timed(serial, "--jobs", "1")
+
+    def cores(of: Path) -> float:
+        return sum(stored(clusters.regions_in(of / "out"), part)[0] for part in ("designs", "engines"))
+
+    rows, found = [f"| one process | {wall:.1f} | {cores(serial):.1f} | |"], []
+    for count in WORKERS:
+        with clusters.cluster(folder / f"c{count}", count) as own:
+            with on_cluster(own.address) as executor:
+                while executor.count < count:  # type: ignore[attr-defined]
+                    time.sleep(0.1)
+            here = clusters.prepared(folder / str(count), **SHARED)
+            wall, _ = timed(here, "--scheduler", own.address)
+        differ = clusters.same(serial, here)
+        found.append((count, wall, cores(here)))
+        rows.append(f"| {count} | {wall:.1f} | {cores(here):.1f} | {', '.join(differ) or 'none'} |")
+    head = ["| workers | time [s] | core-seconds | files that differ |", "| --- | ---: | ---: | --- |"]
+    return [*head, *rows], found
+
+
+def killed(folder: Path, count: int) -> list[str]:
+    """Runs with something killed at random moments, each beside one run that nothing stopped."""
+    serial = clusters.prepared(folder / "serial", **SMALL)
+    seconds, _ = timed(serial, "--jobs", "1")
+    tried, wrong = Counter[str](), []
+    with clusters.cluster(folder / "cluster", 2) as own:
+        for seed in range(count):
+            rng, here = random.Random(seed), clusters.prepared(folder / "run", **SMALL)
+            for _ in range(rng.randint(1, 3)):
+                tried[_attacked(own, here, rng, seconds)] += 1
+            said = clusters.finished(here, "--scheduler", own.address)
+            differ = [said] if said else list(clusters.same(serial, here))
+            wrong += [f"- run {seed}: {', '.join(differ)}"] if differ else []
+            shutil.rmtree(here)
+    rows = [f"| {what} | {times} |" for what, times in sorted(tried.items())]
+    return [
+        "| tried | times |",
+        "| --- | ---: |",
+        *rows,
+        "",
+        f"{count} runs. What ended otherwise:",
+        "",
+        *(wrong or ["None."]),
+    ]
+
+
+def _attacked(own: clusters.Cluster, here: Path, rng: random.Random, seconds: float) -> str:
+    """One run with one death at a random moment; says whose."""
+    running = clusters.started(here, "--scheduler", own.address)
+    until = time.monotonic() + rng.uniform(1.0, 1.5 * seconds + 1.0)
+    while time.monotonic() < until and running.poll() is None:
+        time.sleep(0.05)
+    late = " (too late)" if running.poll() is not None else ""
+    who = rng.choice(("worker", "worker", "both workers", "scheduler", "client"))
+    if who == "client":
+        running.kill()
+    elif who == "scheduler":
+        own.kill()
+        time.sleep(rng.uniform(0.0, 3.0))
+        own.start(2)
+    else:
+        for _ in range(1 if who == "worker" else 2):
+            own.kill_worker(rng.randrange(len(own.workers)))
+            own.add()
+    said = running.communicate()[1]
+    if who != "client" and running.returncode:
+        return f"{who} killed{late}: ended with {running.returncode}, {said.strip()[-200:]}"
+    return f"{who} killed by SIGKILL{late}"
+
+
+def full_disk(folder: Path) -> list[str]:
+    """A file system of so few bytes that the study fills it, then one that is large enough."""
+    serial, here = clusters.prepared(folder / "whole", **SMALL), clusters.prepared(folder / "full", **SMALL)
+    timed(serial, "--jobs", "1")
+    place = clusters.regions_in(here / "out")
+    place.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={TMPFS}", "tmpfs", str(place)], capture_output=True)
+    if mounted.returncode:
+        return [f"Not tried: a small file system cannot be mounted here ({mounted.stderr.decode().strip()})."]
+    try:
+        said = clusters.finished(here, "--jobs", "1")
+        kept = clusters.pieces_done(here)
+        subprocess.run(["mount", "-o", "remount,size=64m", str(place)], check=True)
+        again = clusters.finished(here, "--jobs", "1")
+        differ = [again] if again else list(clusters.same(serial, here))
+    finally:
+        subprocess.run(["umount", str(place)], check=False)
+    first = f"A study in a file system of {TMPFS >> 10} kB ended with exit status {said[0]} and one line:"
+    then = (
+        f"{kept} pieces were kept. With room made, the same command went on; files that differ from those of one run:"
+    )
+    return [first, "", f"    {said[3:].strip()}", "", f"{then} {', '.join(differ) or 'none'}."]
+
+
+def grown(folder: Path, evaluations: int, solves: int) -> tuple[list[Cost], list[Cost]]:
+    """Random designs and random scenes of growing numbers, in one process."""
+    found: tuple[list[Cost], list[Cost]] = [], []
+    for which, part, most in ((0, "designs", evaluations), (1, "engines", solves)):
+        for size in (most // 100, most // 10, most):
+            words = {"draws": size, "chunk": 10_000} if which == 0 else {"scenes": size, "few": min(size, 100)}
+            here = clusters.prepared(folder / f"{part}{size}", **{**{"draws": 1, "scenes": 1, "points": 2}, **words})
+            wall, memory = timed(here, "--jobs", "1")
+            cores, done, files, size_of = stored(clusters.regions_in(here / "out"), part)
+            assert done == size
+            found[which].append(Cost(size, wall, cores, files, size_of, memory))
+            shutil.rmtree(here)
+    return found
+
+
+def plan(evaluated: Cost, solved: Cost) -> list[str]:
+    """What a thousand million of each would take, from these figures."""
+    rows = []
+    for name, cost, chunk in (("evaluations", evaluated, 10_000), ("proven solves", solved, 1000)):
+        seconds, size, pieces = 1e9 * cost.cores / cost.size, 1e9 * cost.stored / cost.size, 1e9 / chunk
+        cells = [f"{seconds:.2g}", f"{seconds / 1000 / 3600:.2g} h", f"{pieces:,.0f}", f"{4e-3 * pieces / 60:.0f} min"]
+        rows.append(f"| {' | '.join([name, *cells, f'{2 * pieces:,.0f}', f'{size / 1e9:.0f} GB'])} |")
+    head = "| 1e9 | core-seconds | on 1000 cores | pieces | scheduler, at 4 ms a piece | files | store |"
+    return [head, "| --- | ---: | ---: | ---: | ---: | ---: | ---: |", *rows]
+
+
+def drawn(sizes: tuple[list[Cost], list[Cost]], more: list[Cost], counts: list[tuple[int, float, float]]) -> None:
+    """Growth with size and with workers."""
+    own = (("evaluations", "blue", sizes[0]), ("proven solves", "orange", [*sizes[1], *more]))
+    grown: list[p.Mark] = [
+        p.Line([c.size for c in costs], [c.cores for c in costs], colour, name, marker="o")
+        for name, colour, costs in own
+    ]
+    left = p.Panel(grown, p.Axis("draws", log=(1.0,)), p.Axis("core-seconds", log=(1.0,)), "Growth with size")
+    x = [count for count, _, _ in counts]
+    marks: list[p.Mark] = [
+        p.Line(x, [wall for _, wall, _ in counts], "blue", "time", marker="o"),
+        p.Line(x, [cores for _, _, cores in counts], "orange", "core-seconds", marker="s"),
+        p.Line(x, [counts[0][1] / count for count in x], "faint", "time of one worker, shared", dash=(3.0, 2.0)),
+    ]
+    across, title = p.Axis("workers", ticks=[(count, str(count)) for count in x]), f"On {os.cpu_count()} busy cores"
+    right = p.Panel(marks, across, p.Axis("seconds", (0.0, 1.1 * max(c for one in counts for c in one[1:]))), title)
+    words = "Random designs and random scenes of one cylinder; Dask workers on one machine."
+    credit = "Computed with Laufruhe."
+    save_picture(p.Picture("Many designs: what they cost", words, [left, right], credit, columns=2), PICTURE)
+
+
+def main() -> None:
+    """All of it."""
+    given = [float(word) for word in (*sys.argv[1:4], *("20", "1e6", "1000")[len(sys.argv) - 1 :])]
+    kills, evaluations, solves = map(int, given)
+    lines = [HEAD.format(os.cpu_count(), os.getloadavg()[0]), "## Overhead of a piece", ""]
+    lines += [f"Of {TASKS} pieces that do nothing.", ""]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with clusters.cluster(folder / "empty", 2) as own:
+            lines += [*overheads(own), "", "## More and more workers", ""]
+        told, counts = shared(folder / "shared")
+        lines += [SHARES.format(**SHARED), *told, "", KILLS, *killed(folder / "kills", kills)]
+        lines += ["", "## A full disk", "", *full_disk(folder / "disk"), ""]
+        sizes = grown(folder / "grown", evaluations, solves)
+    more = []
+    lines += ["## Growth with size", "", "Evaluations:", "", COSTS, BAR, *(cost.row() for cost in sizes[0]), ""]
+    lines += ["Proven solves, at 144 samples of a cycle:", "", COSTS, BAR, *(cost.row() for cost in sizes[1])]
+    if len(sys.argv) > 6:
+        cores, done, files, size = stored(Path(sys.argv[4]), "engines")
+        more = [Cost(done, float(sys.argv[5]), cores, files, size, int(float(sys.argv[6])))]
+        lines += ["", LONG, "", COSTS, BAR, more[0].row()]
+    lines += ["", "![Growth with size and workers](cluster.png)", "", "## A thousand million, on paper", ""]
+    lines += [*plan(sizes[0][-1], sizes[1][-1]), "", PAPER]
+    drawn(sizes, more, counts)
+    publish(OUT, "\n".join(lines))
+
+
+BAR = "| ---: " * 7 + "|"
+SHARES = """{draws:,} designs in pieces of {chunk:,}, and {scenes} solves in pieces of {few}. Reports, data, pictures
+and every number
+of the store beside those of one process:
+"""
+KILLS = """## Kills
+
+SIGKILL at random moments, one to three times a run; a worker or a scheduler that is killed is started again, a client
+that is killed is the same command again. Every file and number is compared with those of one process.
+"""
+LONG = """A run as long as a machine in use allowed: engines with four numbers drawn, RMS of the mount force, pieces
+of 500, on
+two Dask workers; its client was killed on the way and started again:"""
+PAPER = """A scheduler hands out a piece each 4 ms at most, so a piece must take longer than 4 ms times the number of
+workers: of
+evaluations some hundred thousand a piece on a thousand cores (`chunk`), of solves the thousand that is the rule. Who
+started the
+study writes the store, some 2 ms a piece beside the bytes. Its dataset takes 8 bytes a number at once, so a thousand
+million draws are read piece by piece from the store; and `done` is checked when the study goes on, which reads all of
+it once.
+"""
+
+
+if __name__ == "__main__":
+    main()
