@@ -92,12 +92,13 @@ def solve(
     no_plots: o.NoPlotsOption = False,
     tolerance: o.ToleranceOption = None,
     time_limit: o.LimitOption = None,
+    scheduler: o.SchedulerOption = None,
     series: o.SeriesOption = False,
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
     """Decide what the problem leaves open, and prove how good that is."""
-    with exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit):
+    with exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler):
         from laufruhe.cli.solve import Request, run, solved
 
         run(Request("solve", problem, json, out, not no_plots, tolerance, series), solved)
@@ -192,11 +193,12 @@ def trade(
     json: o.JsonOption = None,
     out: o.PagesOption = None,
     time_limit: o.StopOption = None,
+    scheduler: o.SchedulerOption = None,
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
     """Measure speed against accuracy of every fidelity, on these problems."""
-    with exit_statuses(problems[0]), spoken(quiet, verbose), in_time(time_limit):
+    with exit_statuses(problems[0]), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler):
         from laufruhe.cli.fidelity import traded
 
         with handing_out(json, *problems) as hand_out, progress() as say:

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from laufruhe.errors import Complaint, InputError
 from laufruhe.fidelity.automatic import Choice, choose
 from laufruhe.fidelity.mount_needs import needs
-from laufruhe.files.reader import load
+from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.load_models.batch import prepare
+from laufruhe.numerics.workers import each, given
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report import explain, files
 from laufruhe.report import trade as report
-from laufruhe.studies.trade import seconds, trade
+from laufruhe.studies.trade import Trade, seconds, trade
 
 
 def explained(path: Path, tolerance: float) -> tuple[str, str]:
@@ -59,10 +62,9 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     from laufruhe.plots.trade import figure, has_picture
 
     problems = [_with_objective(path) for path in paths]
-    found, data = [], []
-    for problem, path in zip(problems, paths, strict=True):
-        one = trade(problem, lambda text, name=problem.name: say(f"{name}: {text}"))  # type: ignore[misc]
-        found.append(one)
+    found: dict[int, Trade] = {}
+    for k, one in _measured(paths, problems, say):
+        problem, path, found[k] = problems[k], paths[k], one
         names = (f"{problem.name}.md", f"{problem.name}.png")
         with files.staged(files.Set(folder, "--out", "trade", names, adds=True)) as stage:
             drawn = has_picture(one)
@@ -70,12 +72,34 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
                 save(figure(one), stage / names[1])
             command = shlex.join(["laufruhe", "trade", str(path)])
             files.write(stage / names[0], report.as_page(one, names[1] if drawn else None, command))
-        data.append(report.as_json(one).strip())
-    index = report.index(found)
-    if len(found) > 1:
+    trades = [found[k] for k in range(len(problems))]
+    index, data = report.index(trades), [report.as_json(one).strip() for one in trades]
+    if len(trades) > 1:
         with files.staged(files.Set(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
             files.write(stage / "README.md", index)
     return index + f"Results: {folder}\n", "[" + ",\n".join(data) + "]\n"
+
+
+def _measured(
+    paths: Sequence[Path], problems: Sequence[Problem], say: Callable[[str], None]
+) -> Iterator[tuple[int, Trade]]:
+    """Each problem measured, here alone, or by workers that the work was given to, as they come."""
+    executor = given()
+    if executor is None:
+        for k, problem in enumerate(problems):
+            yield k, trade(problem, lambda text, name=problem.name: say(f"{name}: {text}"))  # type: ignore[misc]
+        return
+    with closing(each(_measured_there, [(path, tables_of(path)) for path in paths], executor)) as answers:
+        for k, one in answers:
+            say(f"{problems[k].name} is measured")
+            yield k, replace(one, problem=problems[k])
+
+
+def _measured_there(piece: tuple[Path, dict[str, Any]]) -> Trade:
+    """By a worker, which has no use for the file; what of the problem is no number stays there."""
+    path, tables = piece
+    one = trade(load_tables(tables, path))
+    return replace(one, problem=replace(one.problem, phasing=None))
 
 
 def _with_objective(path: Path) -> Problem:
