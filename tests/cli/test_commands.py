@@ -17,7 +17,10 @@ from laufruhe.cli import app
 from laufruhe.errors import SolverError
 from problem_files import PROBLEMS, written
 
-ALL_FILES = {".laufruhe.json", "result.json", "report.md", "polar.png", "cycle.png", "bars.png", "spectrum.png"}
+PAGES = {".laufruhe.json", "result.json", "report.md", "report.html"}
+TABLES = {"tables.xlsx", "forces.csv", "orders.csv", "measures.csv"}
+ALL_FILES = PAGES | TABLES | {"decisions.csv", "limits.csv"}
+ALL_FILES |= {f"{name}.png" for name in ("engine", "polar", "cycle", "bars", "spectrum")}
 
 
 @pytest.fixture
@@ -138,7 +141,7 @@ def test_an_interrupt_keeps_the_earlier_result(here: Path, monkeypatch: pytest.M
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("laufruhe.plots.draw", interrupt)
+    monkeypatch.setattr("laufruhe.plots.draw_and_show", interrupt)
     assert run("solve", path).exit_code == 130
     assert {name: (here / "results/scene" / name).read_bytes() for name in ALL_FILES} == before
     assert {entry.name for entry in (here / "results/scene").iterdir()} == ALL_FILES
@@ -149,7 +152,7 @@ def test_pictures_of_another_result_do_not_stay(here: Path) -> None:
     run("solve", path)
     (here / "results/scene/notes.txt").write_text("mine")
     run("solve", path, "--no-plots")
-    assert tree(here / "results/scene") == {".laufruhe.json", "result.json", "report.md", "notes.txt"}
+    assert tree(here / "results/scene") == PAGES | TABLES | {"decisions.csv", "limits.csv", "notes.txt"}
     assert tree(here / "results") == {f"scene/{name}" for name in tree(here / "results/scene")}
 
 
@@ -271,9 +274,7 @@ class TestUnwritable:
 
 def test_a_name_of_dots_stays_under_results(here: Path) -> None:
     assert run("evaluate", written(here, scenes.GIVEN, "..."), "--no-plots").exit_code == 0
-    assert tree(here / "results") == {
-        f"problem-as-given/{name}" for name in (".laufruhe.json", "result.json", "report.md")
-    }
+    assert tree(here / "results") == {f"problem-as-given/{name}" for name in PAGES | TABLES}
 
 
 def test_markup_in_a_title_is_text(here: Path) -> None:

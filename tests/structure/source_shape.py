@@ -18,13 +18,17 @@ FUNCTION_LINES = 45
 # Libraries that cost tens of milliseconds to load, and modules that load one, may be imported where they are
 # needed. The commands may import anything late, so that `--help` answers at once, and so may the package itself.
 HEAVY = {
+    "PIL",
     "casadi",
     "clarabel",
     "cvxpy",
     "distributed",
+    "jinja2",
     "matplotlib",
     "mpmath",
     "netCDF4",
+    "openpyxl",
+    "pandas",
     "pint",
     "pyscipopt",
     "scipy",

@@ -154,7 +154,8 @@ def finished(folder: Path, *words: str) -> str:
 def results(folder: Path) -> dict[str, bytes]:
     """Every file of the results, without what is a matter of time and of the command."""
     found = {path.name: path.read_bytes() for path in (folder / "out").iterdir() if path.is_file()}
-    found["report.md"] = found["report.md"].partition(TIMED.encode())[0].partition(b"Made by")[0]
+    for page in ("report.md", "report.html"):
+        found[page] = found[page].partition(b"Made by")[0]
     return found
 
 

@@ -13,7 +13,9 @@ from typer.testing import CliRunner
 from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.plots.picture import draw
-from laufruhe.report.study_report import markdown
+from laufruhe.report.document import Document
+from laufruhe.report.markdown import rendered
+from laufruhe.report.study_report import told as blocks_of
 from laufruhe.studies import run
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.free_forces import printed_agree
@@ -83,7 +85,8 @@ def part_of(folder: Path, text: str) -> xr.Dataset:
 
 
 def told(kind: str, data: xr.Dataset) -> str:
-    return "\n".join(line for text in KINDS[kind].table(data) for line in markdown(text))
+    blocks = tuple(block for text in KINDS[kind].table(data) for block in blocks_of(text))
+    return rendered(Document("part", blocks), ".png")
 
 
 @pytest.mark.slow
@@ -92,7 +95,14 @@ def test_economics_by_its_command(tmp_path: Path) -> None:
     path, out = written(tmp_path, ECONOMICS, "study"), tmp_path / "out"
     answer = CliRunner().invoke(app, ["study", str(path), "--out", str(out), "--json", str(tmp_path / "s.json")])
     assert answer.exit_code == 0, answer.output
-    assert {file.name for file in out.glob("[!.]*")} == {"report.md", "three.nc", "three.csv", "three.png"}
+    assert {file.name for file in out.glob("[!.]*")} == {
+        "report.md",
+        "report.html",
+        "tables.xlsx",
+        "three.nc",
+        "three.csv",
+        "three.png",
+    }
     data = xr.open_dataset(out / "three.nc")
     assert data["standing"].values.tolist() == ["plain", "with shafts", "more cylinders"]
     assert data["cylinders"].values.tolist() == [3, 3, 5]

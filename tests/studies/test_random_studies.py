@@ -129,7 +129,14 @@ def test_a_random_study_is_computed_told_and_drawn(seed: int, tmp_path: Path) ->
         app, ["study", str(tmp_path / "s.toml"), "--out", str(tmp_path / "out"), "--jobs", "1", "--json", "-"]
     )
     assert answer.exit_code == 0, answer.output
-    assert {path.name for path in (tmp_path / "out").glob("[!.]*")} == {"report.md", "p.nc", "p.csv", "p.png"}
+    assert {path.name for path in (tmp_path / "out").glob("[!.]*")} == {
+        "report.md",
+        "report.html",
+        "tables.xlsx",
+        "p.nc",
+        "p.csv",
+        "p.png",
+    }
     assert "nan" not in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     if part["kind"] in KINDS[:3]:
         check_a_point(part, json.loads(answer.stdout)["parts"]["p"], rng, tmp_path)

@@ -155,7 +155,14 @@ def test_map_by_its_command(tmp_path: Path) -> None:
     out = tmp_path / "out"
     answer = CliRunner().invoke(app, ["study", str(written(tmp_path, text, "study")), "--out", str(out)])
     assert answer.exit_code == 0, answer.output
-    assert {file.name for file in out.glob("[!.]*")} == {"report.md", "p.nc", "p.csv", "p.png"}
+    assert {file.name for file in out.glob("[!.]*")} == {
+        "report.md",
+        "report.html",
+        "tables.xlsx",
+        "p.nc",
+        "p.csv",
+        "p.png",
+    }
     with xr.open_dataset(out / "p.nc") as data:
         assert set(data["case"].values) == {"one", "two"}
         assert np.isnan(data["frequency"].values[data["case"].values == "two"]).all()

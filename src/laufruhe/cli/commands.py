@@ -90,6 +90,8 @@ def solve(
     json: o.JsonOption = None,
     out: o.OutOption = None,
     no_plots: o.NoPlotsOption = False,
+    kind: o.FormatOption = o.Format.PNG,
+    animate: o.AnimateOption = False,
     tolerance: o.ToleranceOption = None,
     time_limit: o.LimitOption = None,
     scheduler: o.SchedulerOption = None,
@@ -101,7 +103,7 @@ def solve(
     with exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler):
         from laufruhe.cli.solve import Request, run, solved
 
-        run(Request("solve", problem, json, out, not no_plots, tolerance, series), solved)
+        run(Request("solve", problem, json, out, () if no_plots else kind.kinds, animate, tolerance, series), solved)
 
 
 @app.command(epilog=_example("laufruhe evaluate problem.toml --series --json -"))
@@ -110,6 +112,8 @@ def evaluate(
     json: o.JsonOption = None,
     out: o.OutOption = None,
     no_plots: o.NoPlotsOption = False,
+    kind: o.FormatOption = o.Format.PNG,
+    animate: o.AnimateOption = False,
     series: o.SeriesOption = False,
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
@@ -121,7 +125,7 @@ def evaluate(
     with exit_statuses(problem), spoken(quiet, verbose):
         from laufruhe.cli.solve import Request, run, stated
 
-        run(Request("evaluate", problem, json, out, not no_plots, series=series), stated)
+        run(Request("evaluate", problem, json, out, () if no_plots else kind.kinds, animate, series=series), stated)
 
 
 @app.command(epilog=_example("laufruhe study tractor-sweeps.toml --jobs 4"))

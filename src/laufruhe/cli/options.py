@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -32,6 +33,25 @@ OUT = "Folder of the results.  [default: results/<name of the file>, of evaluate
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT)]
 PAGES = "Folder of the pages.  [default: results/trade]"
 PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=PAGES)]
+
+
+class Format(StrEnum):
+    """Kinds of picture files."""
+
+    PNG = "png"
+    SVG = "svg"
+    BOTH = "both"
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Endings of the files."""
+        return ("png", "svg") if self is Format.BOTH else (str(self),)
+
+
+FORMAT = "Files of the pictures; the HTML page holds its own."
+FormatOption = Annotated[Format, typer.Option("--format", help=FORMAT)]
+ANIMATE = "Make engine.gif: the engine turning, with the forces that it leaves free."
+AnimateOption = Annotated[bool, typer.Option("--animate", help=ANIMATE)]
 NO_PLOTS = "Draw no pictures; those of an earlier result are removed."
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help=NO_PLOTS)]
 SERIES = "Put the loads over the cycle into the JSON as well."

@@ -19,7 +19,10 @@ from laufruhe.numerics.progress import Listener
 from laufruhe.problem.problem import Problem
 from laufruhe.report import files
 from laufruhe.report.json_result import as_json
-from laufruhe.report.markdown import as_markdown
+from laufruhe.report.markdown import rendered
+from laufruhe.report.result_report import result_document
+from laufruhe.report.tables import write_tables
+from laufruhe.report.web_page import as_html
 from laufruhe.solvers.result import Result, Status
 
 # each has a folder of its own
@@ -36,7 +39,8 @@ class Request:
     problem: Path
     json: str | None
     out: Path | None
-    pictures: bool
+    kinds: tuple[str, ...]
+    animated: bool = False
     tolerance: float | None = None
     series: bool = False
 
@@ -99,15 +103,26 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
         say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
         result = answer(problem, Watched(say, problem.objective_unit or ""))
-        pictures: tuple[str, ...] = ()
-        if request.pictures:
-            from laufruhe.plots import draw
+        pictures: dict[str, str] = {}
+        if request.kinds:
+            from laufruhe.plots import draw_and_show
 
             say("drawing")
             with _timed(seconds, "plots"):
-                pictures = draw(result, stage)
+                pictures = draw_and_show(result, stage, request.kinds)
+        if request.animated:
+            from laufruhe.plots.motion import animate
+
+            say("animating")
+            with _timed(seconds, "animation"):
+                animate(result, stage / files.MOTION)
+        say("writing tables")
+        with _timed(seconds, "tables"):
+            write_tables(result, stage)
         result = replace(result, timing={**result.timing, **seconds})
-        files.write(stage / files.REPORT, as_markdown(result, pictures, request.command))
+        document = result_document(result, list(pictures), request.command)
+        files.write(stage / files.REPORT, rendered(document, f".{request.kinds[0]}" if request.kinds else ""))
+        files.write(stage / files.PAGE, as_html(document, pictures))
         for place in filter(None, (stage / files.RESULT, copy)):
             files.write(place, as_json(result, request.series))
     return result, folder

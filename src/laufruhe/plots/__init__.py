@@ -1,7 +1,8 @@
-"""Pictures, as PNG files; they read results and datasets, and never call a solver."""
+"""Pictures, as PNG and SVG; they read results and datasets, and never call a solver."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from contextlib import chdir
 from importlib import import_module
 from pathlib import Path
@@ -10,22 +11,34 @@ from pathlib import Path
 with chdir(Path(__file__).parent):
     import matplotlib  # noqa: F401
 
-from laufruhe.plots.style import save
+from matplotlib.figure import Figure
+
+from laufruhe.plots.style import as_svg, save
 from laufruhe.present.pictures import PICTURES
 from laufruhe.solvers.result import Result
 
 
-def draw(result: Result, folder: Path) -> tuple[str, ...]:
-    """Every picture that this result fills, in the order of a report.
-
-    Returns
-    -------
-    File names in `folder`.
-    """
-    drawn = []
+def figures(result: Result) -> Iterator[tuple[str, Figure]]:
+    """Every picture that this result fills, by its name, in the order of a report."""
     for name in PICTURES:
         picture = import_module(f"{__name__}.results.{name}")
         if picture.applies(result):
-            drawn.append(f"{name}.png")
-            save(picture.figure(result), folder / drawn[-1])
-    return tuple(drawn)
+            yield name, picture.figure(result)
+
+
+def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple[str, ...]:
+    """Picture files of these kinds, png or svg, into a folder; returns their names."""
+    return tuple(name for _, figure_names, _ in _drawn(result, folder, kinds) for name in figure_names)
+
+
+def draw_and_show(result: Result, folder: Path, kinds: Sequence[str]) -> dict[str, str]:
+    """As `draw`, and what stands in a page: SVG by the names of the pictures."""
+    return {name: as_svg(figure) for name, _, figure in _drawn(result, folder, kinds)}
+
+
+def _drawn(result: Result, folder: Path, kinds: Sequence[str]) -> Iterator[tuple[str, list[str], Figure]]:
+    for name, figure in figures(result):
+        files = [f"{name}.{kind}" for kind in kinds]
+        for file in files:
+            save(figure, folder / file)
+        yield name, files, figure

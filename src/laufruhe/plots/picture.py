@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.plots import style
-from laufruhe.plots.style import heading, page, save
+from laufruhe.plots.style import as_svg, heading, page, save
 from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
@@ -44,9 +44,11 @@ def draw(picture: Picture) -> Figure:
     return drawn.figure
 
 
-def save_picture(picture: Picture, path: Path) -> None:
-    """Write the picture as a PNG file."""
-    save(draw(picture), path)
+def save_picture(picture: Picture, path: Path) -> str:
+    """Write the picture as a PNG file; the same as SVG."""
+    drawn = draw(picture)
+    save(drawn, path)
+    return as_svg(drawn)
 
 
 def hue(colour: Colour) -> str:

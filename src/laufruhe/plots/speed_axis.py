@@ -8,24 +8,16 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from laufruhe.plots.style import FAINT, VERMILION, entry
-from laufruhe.present.mounting import MountingFacts, critical_speed, driven, facts_of, main_order
+from laufruhe.present.mounting import MountingFacts
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
 RPM = readable("rad/s")[1]
-REACH = 1.25
 LIMIT = VERMILION
 # styles tell orders apart in print as well
 STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
-
-
-def fastest(result: Result) -> float:
-    """End of the axis: past the highest operating point and the isolation of the strongest order [rad/s]."""
-    facts = facts_of(result.final)
-    highest = max(point.speed for point in result.problem.points)
-    return REACH * max(highest, 2.0 * critical_speed(max(driven(facts)), main_order(facts)))
 
 
 def order_entries(facts: MountingFacts, colour: str) -> list[Artist]:

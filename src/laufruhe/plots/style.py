@@ -6,8 +6,10 @@ that a picture takes.
 
 from __future__ import annotations
 
+import io
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -162,11 +164,28 @@ def entry_of_dots(label: str, **look: Any) -> Line2D:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG."""
-    with mpl.rc_context(_SETTINGS), warnings.catch_warnings():
+    """Write a PNG or an SVG, as the ending says."""
+    if path.suffix == ".svg":
+        path.write_text(as_svg(figure), encoding="utf-8", newline="\n")
+        return
+    with _drawing({}):
+        figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 4})
+
+
+def as_svg(figure: Figure) -> str:
+    """The picture as SVG, letters as outlines, the same every time."""
+    drawn = io.StringIO()
+    with _drawing({"svg.hashsalt": "laufruhe"}):
+        figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+    return drawn.getvalue()
+
+
+@contextmanager
+def _drawing(more: Any) -> Iterator[None]:
+    with mpl.rc_context({**_SETTINGS, **more}), warnings.catch_warnings():
         # a name in a script that the font lacks shows boxes; the tables have it right
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 4})
+        yield
 
 
 def thin(values: Iterable[float]) -> float:

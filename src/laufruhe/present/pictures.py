@@ -1,6 +1,7 @@
 """Pictures of a result in the order of a report, a line each: `plots.results` has a file of that name to draw it."""
 
 PICTURES = {
+    "engine": "The engine to scale, from the front and from the left, with what was decided marked.",
     "star": "The best crank stars, from the front and from the side.",
     "firings": "Firing orders of the best stars over one working cycle.",
     "polar": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",
@@ -18,4 +19,8 @@ PICTURES = {
     "robust": "The best drawing and the design decided, each built many times, and what each tolerance costs.",
     "trade": "What slightly uneven firing buys.",
 }
-CAPTIONS = {f"{name}.png": caption for name, caption in PICTURES.items()}
+
+SHEETS = (
+    "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "run-up", "rankings",
+)  # fmt: skip
+"""Tables and curves of a result as files: `report.tables` fills them."""

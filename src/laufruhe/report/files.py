@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from laufruhe.errors import Complaint, InputError
-from laufruhe.present.pictures import CAPTIONS
+from laufruhe.present.pictures import PICTURES, SHEETS
 
 try:
     import fcntl
@@ -25,7 +25,15 @@ except ImportError:
 
 RESULT = "result.json"
 REPORT = "report.md"
-RESULT_FILES = (RESULT, REPORT, *CAPTIONS)
+PAGE, BOOK = "report.html", "tables.xlsx"
+MOTION = "engine.gif"
+KINDS = ("png", "svg")
+"""Of picture files."""
+RESULT_FILES = (
+    RESULT, REPORT, PAGE, BOOK, MOTION,
+    *(f"{name}.{kind}" for name in PICTURES for kind in KINDS),
+    *(f"{name}.csv" for name in SHEETS),
+)  # fmt: skip
 MADE = ".laufruhe.json"
 """What stands in a folder of results beside them: the command that made them, and their names."""
 _NEXT = f"{MADE}-next"

@@ -9,18 +9,29 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Grid:
-    """A table: the first `left` columns are text, the others numbers."""
+    """A table: the first `left` columns are text, the others numbers.
+
+    Attributes
+    ----------
+    title
+        Empty where the table follows words of its own.
+    marked
+        Whether code and emphasis in the cells are marked as Markdown does.
+    """
 
     title: str
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
     left: int = 1
     note: str = ""
+    marked: bool = False
 
     def as_markdown(self) -> str:
         """Title, table and note, in which the user's names mean nothing to Markdown."""
-        rows = [[escaped(cell) for cell in row] for row in self.rows]
-        parts = [f"## {escaped(self.title)}", piped([escaped(cell) for cell in self.head], rows, self.left)]
+        shown = str if self.marked else escaped
+        rows = [[shown(cell) for cell in row] for row in self.rows]
+        parts = [f"## {escaped(self.title)}"] if self.title else []
+        parts.append(piped([shown(cell) for cell in self.head], rows, self.left))
         return "\n\n".join([*parts, escaped(self.note)] if self.note else parts)
 
 

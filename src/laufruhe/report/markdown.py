@@ -1,58 +1,63 @@
-"""`report.md`: a result that explains itself."""
+"""`report.md`: a report as Markdown."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import singledispatch
+from pathlib import PurePath
 
-from laufruhe.present.pictures import CAPTIONS
-from laufruhe.report.grid import escaped
-from laufruhe.report.sections import tables_of
-from laufruhe.report.versions import versions
-from laufruhe.report.wording import accuracy, explained, fired_together, headline
+from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
+from laufruhe.report.grid import Grid, escaped
+from laufruhe.report.result_report import result_document
 from laufruhe.solvers.result import Result
 
 
 def as_markdown(result: Result, pictures: Sequence[str], command: str) -> str:
-    """The report as Markdown.
-
-    Parameters
-    ----------
-    pictures
-        File names beside the report.
-    command
-        What makes the same result again.
-    """
-    problem = result.problem
-    sections = [
-        f"# {escaped(problem.title)}",
-        f"Source: {escaped(problem.source)}." if problem.source else "",
-        "Assumptions:\n\n" + _listed(problem.assumptions) if problem.assumptions else "",
-        "## Result",
-        escaped(headline(result)),
-        escaped(fired_together(result)),
-        *(f"![{CAPTIONS[name]}]({name})\n\n*{CAPTIONS[name]}*" for name in pictures),
-        *(grid.as_markdown() for grid in tables_of(result)),
-        "## Proof",
-        escaped(explained(result)),
-        "## Fidelity",
-        _fidelity(result),
-        "## Reproduce",
-        f"```sh\n{' '.join(command.split())}\n```",
-        "Made with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".",
-    ]
-    return "\n\n".join(section for section in sections if section) + "\n"
+    """The report of a result, with the names of picture files beside it; `command` makes the same result again."""
+    ending = PurePath(pictures[0]).suffix if pictures else ""
+    return rendered(result_document(result, [PurePath(name).stem for name in pictures], command), ending)
 
 
-def _listed(texts: Sequence[str]) -> str:
-    return "\n".join(f"- {escaped(text)}" for text in texts)
+def rendered(document: Document, ending: str) -> str:
+    """A report as Markdown; `ending` is that of the picture files beside it."""
+    parts = (_with_ending(block, ending) for block in document.blocks)
+    return "\n\n".join([f"# {escaped(document.title)}", *parts]) + "\n"
 
 
-def _fidelity(result: Result) -> str:
-    f = result.problem.fidelity
-    text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
-    if result.objective is None:
-        return text
-    error = accuracy(result)
-    if f.tolerance is not None:
-        return f"{text} Chosen for an error of {f.tolerance:g}; {error}."
-    return f"{text} {error[:1].upper()}{error[1:]}, of the physics that is kept."
+def _with_ending(block: Block, ending: str) -> str:
+    return _picture(block, ending) if isinstance(block, Illustration) else _markdown(block)
+
+
+def _picture(picture: Illustration, ending: str) -> str:
+    shown = f"![{escaped(picture.caption)}]({picture.name}{ending})"
+    return f"{shown}\n\n*{picture.caption}*" if picture.is_captioned else shown
+
+
+@singledispatch
+def _markdown(block: Block) -> str:
+    raise TypeError(f"no page has a {type(block).__name__}")
+
+
+@_markdown.register
+def _(heading: Heading) -> str:
+    return f"## {escaped(heading.text)}"
+
+
+@_markdown.register
+def _(paragraph: Paragraph) -> str:
+    return paragraph.text if paragraph.marked else escaped(paragraph.text)
+
+
+@_markdown.register
+def _(bullets: Bullets) -> str:
+    return f"{bullets.lead}\n\n" + "\n".join(f"- {escaped(text)}" for text in bullets.items)
+
+
+@_markdown.register
+def _(code: Code) -> str:
+    return f"```sh\n{code.text}\n```"
+
+
+@_markdown.register
+def _(grid: Grid) -> str:
+    return grid.as_markdown()

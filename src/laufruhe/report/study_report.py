@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from laufruhe.report import files
+from laufruhe.report import files, tables
+from laufruhe.report.document import Block, Bullets, Document, Heading, Illustration, Paragraph
+from laufruhe.report.grid import Grid
+from laufruhe.report.markdown import rendered
 from laufruhe.report.strict_json import strict
+from laufruhe.report.tables import Sheet
+from laufruhe.report.web_page import as_html
 from laufruhe.studies.part import Part
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import StudyFile
@@ -19,7 +24,8 @@ from laufruhe.studies.text import Rows, Text
 
 def file_names(study: StudyFile) -> list[str]:
     """Everything that `write_study` makes."""
-    return [files.REPORT, *(f"{part.name}.{end}" for part in study.study.parts for end in part.ends)]
+    common = (files.REPORT, files.PAGE, files.BOOK)
+    return [*common, *(f"{part.name}.{end}" for part in study.study.parts for end in part.ends)]
 
 
 def write_study(
@@ -29,56 +35,76 @@ def write_study(
     folder: Path,
     command: str,
     say: Callable[[str], None],
-    draw: Callable[[Picture, Path], None],
+    draw: Callable[[Picture, Path], str],
 ) -> None:
-    """Datasets, pictures and the report into a folder that exists.
+    """Datasets, tables, pictures and the report into a folder that exists.
 
     Parameters
     ----------
     seconds
         What each part took.
     draw
-        Makes a PNG file of a picture.
+        Makes a PNG file of a picture, and returns it as SVG.
     """
-    lines = [f"# {study.title}", ""]
-    lines += [f"Source: {study.source}", ""] if study.source else []
-    lines += [f"Made by `{command}`.", ""]
-    if study.assumptions:
-        lines += ["Assumptions:", "", *(f"- {text}" for text in study.assumptions), ""]
-    found = counted(datasets.values())
-    lines += [found, ""] if found else []
+    pictures, sheets = {}, {}
     for part in study.study.parts:
         say(f"writing {part.name}")
-        lines += _part(part, datasets[part.name], folder, draw)
+        name, data = part.name, datasets[part.name]
+        # a name with a space cannot be marked as a coordinate there
+        spaced = {str(coord): str(coord).replace(" ", "_") for coord in data.coords if " " in str(coord)}
+        data.rename(spaced).to_netcdf(folder / f"{name}.nc")
+        if "csv" in part.ends:
+            rows = _flat(data)
+            rows.to_csv(folder / f"{name}.csv")
+            sheets[name] = Sheet([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
+        if "png" in part.ends:
+            pictures[name] = draw(part.picture(data), folder / f"{name}.png")
+    if sheets:
+        tables.write_book(sheets, folder / files.BOOK)
+    document = study_document(study, datasets, seconds, command)
+    files.write(folder / files.REPORT, rendered(document, ".png"))
+    files.write(folder / files.PAGE, as_html(document, pictures))
+
+
+def study_document(
+    study: StudyFile, datasets: Mapping[str, xr.Dataset], seconds: Mapping[str, float], command: str
+) -> Document:
+    """The report of a study."""
+    blocks: list[Block] = [Paragraph(f"Source: {study.source}", marked=True)] if study.source else []
+    blocks.append(Paragraph(f"Made by `{command}`.", marked=True))
+    if study.assumptions:
+        blocks.append(Bullets("Assumptions:", study.assumptions))
+    if found := counted(datasets.values()):
+        blocks.append(Paragraph(found, marked=True))
+    for part in study.study.parts:
+        blocks += _part(part, datasets[part.name])
     if datasets:
-        spent = [f"| {name} | {duration:.1f} |" for name, duration in seconds.items()]
-        lines += ["## Where the time went", "", "Seconds on one core.", "", "| part | s |", "| --- | ---: |", *spent,
-                  f"| all | {sum(seconds.values()):.1f} |", ""]  # fmt: skip
-    files.write(folder / files.REPORT, "\n".join(lines))
+        spent = [(name, f"{duration:.1f}") for name, duration in seconds.items()]
+        rows = [*spent, ("all", f"{sum(seconds.values()):.1f}")]
+        blocks += [Heading("Where the time went"), Paragraph("Seconds on one core."), Grid("", ("part", "s"), rows)]
+    return Document(study.title, tuple(blocks))
 
 
-def _part(part: Part, data: xr.Dataset, folder: Path, draw: Callable[[Picture, Path], None]) -> list[str]:
-    name, title, source = part.name, data.attrs["title"], data.attrs["source"]
-    # a name with a space cannot be marked as a coordinate there
-    spaced = {str(coord): str(coord).replace(" ", "_") for coord in data.coords if " " in str(coord)}
-    data.rename(spaced).to_netcdf(folder / f"{name}.nc")
-    if "csv" in part.ends:
-        _flat(data).to_csv(folder / f"{name}.csv")
+def _part(part: Part, data: xr.Dataset) -> Iterator[Block]:
+    title, source = data.attrs["title"], data.attrs["source"]
+    yield Heading(title)
+    kind = data.attrs["kind"].capitalize()
+    yield Paragraph(f"{kind}." + (f" Source: {source}" if source else ""), marked=True)
+    for text in part.table(data):
+        yield from told(text)
     if "png" in part.ends:
-        draw(part.picture(data), folder / f"{name}.png")
-    words = data.attrs["kind"].capitalize() + "." + (f" Source: {source}" if source else "")
-    told = [line for text in part.table(data) for line in (*markdown(text), "")]
-    return [f"## {title}", "", words, "", *told, *([f"![{title}]({name}.png)", ""] if "png" in part.ends else [])]
+        yield Illustration(part.name, title, is_captioned=False)
 
 
-def markdown(text: Text) -> list[str]:
-    """Lines of a paragraph or a table; how many rows stand in the CSV file only."""
+def told(text: Text) -> Iterator[Block]:
+    """A paragraph or a table; how many rows stand in the CSV file only."""
     if not isinstance(text, Rows):
-        return [text]
-    head, rows = text.head, text.rows
-    lines = ["| " + " | ".join(cells) + " |" for cells in (head, ["---"] * len(head), *rows)]
-    rest = text.whole - len(rows)
-    return [*lines, "", f"{rest} more rows are in the CSV file."] if rest > 0 else lines
+        yield Paragraph(text, marked=True)
+        return
+    yield Grid("", text.head, text.rows, left=len(text.head), marked=True)
+    rest = text.whole - len(text.rows)
+    if rest > 0:
+        yield Paragraph(f"{rest} more rows are in the CSV file.")
 
 
 def _flat(data: xr.Dataset) -> Any:

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import html
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
+from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.ranking import PhasingResult
 from laufruhe.solvers.robust_result import RobustResult
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+AS_GIVEN, AS_DECIDED = "as given", "as decided"
 
 
 class Status(StrEnum):
@@ -129,6 +137,39 @@ class Result:
     timing: dict[str, float] = field(default_factory=dict)
     phasing: PhasingResult | None = None
     robust: RobustResult | None = None
+
+    @property
+    def designs(self) -> dict[str, Evaluation]:
+        """As given and as decided, by these names; one where nothing was decided."""
+        if self.final is self.initial:
+            return {AS_GIVEN: self.initial}
+        return {AS_GIVEN: self.initial, AS_DECIDED: self.final}
+
+    def forces(self, steps: int = STEPS) -> xr.Dataset:
+        """Loads on block, mounts and bearings over the crank angle, and how far mounts move, with units [xarray]."""
+        return forces_of(self._with_loads, steps).dataset()
+
+    def orders(self) -> xr.Dataset:
+        """Amplitudes by order of the same loads, with units [xarray]."""
+        return orders_of(self._with_loads).dataset()
+
+    def modes(self) -> xr.Dataset:
+        """Natural frequencies, loss and energy of a block on elastic mounts [xarray]; `ModelError` on rigid ones."""
+        return modes_of(self.designs).dataset()
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """What was decided: a row a decision, in SI [pandas]."""
+        import pandas as pd
+
+        names = [field.name for field in fields(DecisionValue)]
+        return pd.DataFrame([[getattr(d, name) for name in names] for d in self.decisions], columns=names).set_index(
+            "name"
+        )
+
+    @property
+    def _with_loads(self) -> dict[str, Evaluation]:
+        """Designs that have loads: one on an undamped resonance has none."""
+        return {name: design for name, design in self.designs.items() if not design.resonance}
 
     @property
     def prices(self) -> dict[Side, float]:

@@ -10,11 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, fastest, limits_on, mark_points, order_entries
+from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, limits_on, mark_points, order_entries
 from laufruhe.plots.style import AFTER, FAINT, INK, entry, entry_of_dots, headed, page
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import number
+from laufruhe.present.speed_curves import fastest
 from laufruhe.problem import channels
 from laufruhe.solvers.result import Result
 

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from laufruhe.errors import ModelError
-from laufruhe.machine import OperatingPoint
-from laufruhe.numerics.spectrum import orders_equal
-from laufruhe.physics.speed_map import speed_map, split_loads
-from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, fastest, limits_on, mark_points, order_entries
+from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, limits_on, mark_points, order_entries
 from laufruhe.plots.style import FAINT, INK, entry, headed, page, series_of
-from laufruhe.present.measures import Array, hardest_point
+from laufruhe.present.measures import hardest_point
 from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.present.speed_curves import fastest, speeds_of, transmissibility_of
 from laufruhe.problem import channels
-from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
 
-SPEEDS = 400
 applies = is_elastic
 
 
@@ -31,12 +22,12 @@ def figure(result: Result) -> Figure:
     """Foundation over exciting force by order and speed, with limits and operating points."""
     facts, series = facts_of(result.final), series_of(result, loads=True)
     point, top = result.problem.points[hardest_point(result)], fastest(result)
-    speeds = np.linspace(top / SPEEDS, top, SPEEDS)
+    speeds = speeds_of(result)
     drawn = page(1, 1, (6.8, 4.0))
     axes = drawn.panels[0]
     highest = 1.0
     for one in series:
-        for k, curve in _curves(one.design, point, speeds, facts.orders):
+        for k, curve in transmissibility_of(one.design, point, speeds, facts.orders):
             highest = max(highest, float(curve.max(initial=0.0)))
             axes.plot(speeds * RPM, curve, color=one.colour, linestyle=STYLES[k], linewidth=1.6)
     legend = [*(one.entry() for one in series), *order_entries(facts, INK), *_limits(axes, result, top * RPM)]
@@ -49,19 +40,6 @@ def figure(result: Result) -> Figure:
     axes.set(xlim=(0.0, top * RPM), ylim=(1e-2, 1.6 * highest), xlabel="crank speed [rpm]", ylabel="transmissibility")
     lines = f"Force on the mounts over that on mounts that give no way; loads of {point.name}."
     return headed(drawn, result, "Transmissibility over speed", lines, legend)
-
-
-def _curves(
-    design: Evaluation, point: OperatingPoint, speeds: Array, orders: tuple[float, ...]
-) -> Iterator[tuple[int, Array]]:
-    try:
-        field = speed_map(mounting_in(design.engine), *split_loads(design.engine, point, design.fidelity), speeds)
-    except ModelError:
-        # an undamped resonance has no height to draw
-        return
-    for k, order in enumerate(orders):
-        for column in np.flatnonzero(orders_equal(field.orders, order))[:1]:
-            yield k, field.transmissibility[:, column]
 
 
 def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:

@@ -1,0 +1,72 @@
+"""The engine turning, with the forces that it leaves free and those on its mounts, as an animated GIF."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from laufruhe.plots.machine_view import Scene, framed, front_view, legend_of, reaches, side_view
+from laufruhe.plots.style import Series, headed, page, point_name, series_of
+from laufruhe.present.measures import Array, hardest_point, has_loads
+from laufruhe.present.numbers import figure as words
+from laufruhe.problem.curves import forces_of
+from laufruhe.solvers.result import Result
+
+FRAMES = 48
+"""Over the working cycle."""
+SECONDS = 4.0
+DPI = 80
+# of the height of the picture, for the largest force
+REACH = 0.35
+
+
+def animate(result: Result, path: Path) -> None:
+    """One working cycle; arrows are the shaking force at the crank, and the force on each mount."""
+    from PIL import Image
+
+    scene = Scene.of(result.final.engine, result.problem)
+    k, series = hardest_point(result) if result.problem.points else 0, series_of(result, loads=True)
+    loads = [_loads(one, k) for one in series] if has_loads(result) else []
+    largest = max((float(np.abs(one[:, :, 1:]).max()) for one in loads), default=0.0)
+    frames = []
+    for step in range(FRAMES):
+        drawn = page(1, 2, (5.2, 4.6), across=0.75)
+        phi = result.final.engine.cycle.angle * step / FRAMES
+        front_view(drawn.panels[0], scene, phi)
+        side_view(drawn.panels[1], scene, phi)
+        for axes, points, backwards in zip(drawn.panels, reaches(scene), (False, True), strict=True):
+            framed(axes, points, backwards)
+        for one, forces in zip(series, loads, strict=False):
+            _arrows(drawn.panels[0], scene, forces[step], largest, one.colour)
+        shown = f"{math.degrees(phi):5.1f} deg after cylinder 1 fires"
+        scale = f"; longest arrow {words(largest, 'N', 3)}" if largest else ""
+        at = f", at {point_name(result, k)}" if loads else ""
+        legend = [*legend_of(scene), *(one.entry(": forces") for one in series[: len(loads)])]
+        headed(drawn, result, f"The engine turning{at}", f"{shown}{scale}.", legend)
+        drawn.figure.set_dpi(DPI)
+        drawn.figure.canvas.draw()
+        pixels = np.asarray(drawn.figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
+        frames.append(Image.fromarray(pixels).convert("RGB").quantize(64, dither=Image.Dither.NONE))
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=int(1e3 * SECONDS / FRAMES), loop=0)
+
+
+def _loads(one: Series, k: int) -> Array:
+    """Shaking force, then the force on every mount, at every frame, shape (frames, 1 + mounts, 3) [N]."""
+    found = {field.name: field.values[0, k] for field in forces_of({one.name: one.design}, FRAMES).fields}
+    shaking = found["shaking_force"][:, None]
+    return np.concatenate([shaking, found["mount_force"]], axis=1) if "mount_force" in found else shaking
+
+
+def _arrows(axes: Axes, scene: Scene, forces: Array, largest: float, colour: str) -> None:
+    if not largest:
+        return
+    low, high = axes.get_ylim()
+    scale = REACH * (high - low) / largest
+    places = [(0.0, 0.0), *((1e3 * mount.position[1], 1e3 * mount.position[2]) for mount in scene.engine.mounts)]
+    for (y, z), (_, across, up) in zip(places, forces, strict=False):
+        look: Any = {"color": colour, "width": 0.006, "scale": 1.0, "zorder": 8}
+        axes.quiver(y, z, scale * across, scale * up, angles="xy", scale_units="xy", **look)

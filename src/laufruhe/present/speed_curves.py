@@ -1,0 +1,49 @@
+"""Curves over crank speed of a block on elastic mounts: the transmissibility of each order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.spectrum import orders_equal
+from laufruhe.physics.speed_map import speed_map, split_loads
+from laufruhe.present.measures import Array
+from laufruhe.present.mounting import critical_speed, driven, facts_of, main_order
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.solvers.result import Result
+
+REACH = 1.25
+SPEEDS = 400
+
+
+def fastest(result: Result) -> float:
+    """End of the axis: past the highest operating point and the isolation of the strongest order [rad/s]."""
+    facts = facts_of(result.final)
+    highest = max(point.speed for point in result.problem.points)
+    return REACH * max(highest, 2.0 * critical_speed(max(driven(facts)), main_order(facts)))
+
+
+def speeds_of(result: Result) -> Array:
+    """Where transmissibility is shown [rad/s]."""
+    top = fastest(result)
+    return np.linspace(top / SPEEDS, top, SPEEDS)
+
+
+def transmissibility_of(
+    design: Evaluation, point: OperatingPoint, speeds: Array, orders: tuple[float, ...]
+) -> Iterator[tuple[int, Array]]:
+    """Force on the mounts over that on mounts that give no way, of those orders that the loads have: which, and values.
+
+    None of a design on a resonance that nothing damps.
+    """
+    try:
+        field = speed_map(mounting_in(design.engine), *split_loads(design.engine, point, design.fidelity), speeds)
+    except ModelError:
+        return
+    for k, order in enumerate(orders):
+        for column in np.flatnonzero(orders_equal(field.orders, order))[:1]:
+            yield k, field.transmissibility[:, column]

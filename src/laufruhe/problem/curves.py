@@ -1,0 +1,197 @@
+"""What a design does, as labelled arrays: loads over the crank angle and by order, and the modes of its mounting.
+
+Scripts get them as xarray datasets, files as columns; both from the same fields.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.numerics.spectrum import Spectrum, common_base, order_amplitude
+from laufruhe.physics.bearing_loads import has_bearing_loads
+from laufruhe.physics.modes import MOTIONS
+from laufruhe.problem.channels import MAIN_BEARING_FORCE, MOUNT_FORCE, MOUNT_TRAVEL, mounting_in
+from laufruhe.problem.channels.kinds import LoadChannel
+from laufruhe.problem.evaluation import Evaluation, over
+from laufruhe.problem.loads import PointLoads
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+STEPS = 720
+"""Over the cycle; what is sampled is known at every angle."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One dimension: its name, labels, and their unit."""
+
+    name: str
+    labels: tuple[Any, ...]
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """One quantity along the axes that all fields share, and its own."""
+
+    name: str
+    words: str
+    unit: str
+    own: tuple[Axis, ...]
+    values: Array
+
+    def columns(self) -> Iterator[tuple[str, tuple[int, ...]]]:
+        """A heading for each place on its own axes."""
+        for place in itertools.product(*(range(len(axis.labels)) for axis in self.own)):
+            labels = [_shown(axis, k) for axis, k in zip(self.own, place, strict=True)]
+            yield f"{' '.join([self.words, *labels])} [{self.unit or '-'}]", place
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """Fields on common axes: the designs, and what else stands in rows."""
+
+    title: str
+    designs: Axis
+    rows: tuple[Axis, ...]
+    fields: tuple[Field, ...]
+
+    def dataset(self) -> xr.Dataset:
+        """As xarray has it, with units and words as attributes."""
+        import xarray as xr
+
+        shared = (self.designs, *self.rows)
+        variables = {
+            field.name: (
+                [axis.name for axis in (*shared, *field.own)],
+                field.values,
+                {"units": field.unit or "1", "long_name": field.words},
+            )
+            for field in self.fields
+        }
+        axes = {axis.name: axis for axis in (*shared, *(own for field in self.fields for own in field.own))}
+        units = {name: {"units": axis.unit} if axis.unit else {} for name, axis in axes.items()}
+        coords = {name: ([name], list(axis.labels), units[name]) for name, axis in axes.items()}
+        return xr.Dataset(variables, coords, {"title": self.title})
+
+    def table(self) -> tuple[list[str], Iterator[list[Any]]]:
+        """Heads and rows: the designs side by side, a row for each place on the other axes."""
+        named = len(self.designs.labels) > 1
+        columns = [
+            (f"{design}: {head}" if named else head, field.values[k][..., *place])
+            for field in self.fields
+            for head, place in field.columns()
+            for k, design in enumerate(self.designs.labels)
+        ]
+        heads = [f"{axis.name} [{axis.unit}]" if axis.unit else axis.name for axis in self.rows]
+        flat = [values.reshape(-1).tolist() for _, values in columns]
+        leads = itertools.product(*(axis.labels for axis in self.rows))
+        rows = ([*lead, *cells] for lead, *cells in zip(leads, *flat, strict=True))
+        return [*heads, *(head for head, _ in columns)], rows
+
+
+def _shown(axis: Axis, k: int) -> str:
+    label = axis.labels[k]
+    return f"{axis.name} {label}" if isinstance(label, int | float) else str(label)
+
+
+def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
+    """Loads on the block, the mounts and the bearings, and how far the mounts move, over the cycle (C7)."""
+    first = next(iter(designs.values()))
+    whole = first.engine.cycle.angle
+    angles = Axis("angle", tuple(float(k) for k in np.degrees(whole) * np.arange(steps) / steps), "deg")
+    axes, names = ("x", "y", "z"), [loads.point.name for loads in first.loads]
+
+    def sampled(signals: list[list[Spectrum]]) -> Array:
+        base = first.engine.cycle.base_order
+        return np.array([[over(base, [one])[0].sample(steps) for one in of_design] for of_design in signals])
+
+    wrenches = sampled([[loads.wrench for loads in design.loads] for design in designs.values()])
+    direction = Axis("direction", axes)
+    fields = [
+        Field("shaking_force", "shaking force", "N", (direction,), wrenches[..., :3]),
+        Field("shaking_moment", "shaking moment", "N m", (direction,), wrenches[..., 3:]),
+    ]
+    for name, words, place, channel in _places(first):
+        values = sampled([[channel.signal(loads) for loads in design.loads] for design in designs.values()])
+        own = (Axis(place, tuple(channel.places(first.engine))), Axis("direction", axes[-values.shape[-1] :]))
+        fields.append(Field(name, words, channel.unit, own, values))
+    rows = (Axis("point", tuple(names)), angles)
+    return Fields("Loads over the crank angle", _axis_of(designs), rows, tuple(fields))
+
+
+def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
+    """Amplitudes by order of the loads on block and mounts (C8)."""
+    first = next(iter(designs.values()))
+    base = common_base([loads.wrench.base for design in designs.values() for loads in design.loads])
+    signals: dict[str, tuple[str, str, tuple[Axis, ...], Callable[[PointLoads], Spectrum]]] = {
+        "shaking_force": ("shaking force", "N", (), lambda one: one.wrench.each(lambda c: c[..., :3])),
+        "shaking_moment": ("shaking moment", "N m", (), lambda one: one.wrench.each(lambda c: c[..., 3:])),
+    }
+    for name, words, place, channel in _places(first):
+        own = (Axis(place, tuple(channel.places(first.engine))),)
+        signals[name] = (words, channel.unit, own, channel.signal)
+    found = {
+        name: [[of(loads).rebased(base) for loads in design.loads] for design in designs.values()]
+        for name, (_, _, _, of) in signals.items()
+    }
+    count = max(len(one.coefficients) for rows in found.values() for row in rows for one in row)
+    fields = [
+        Field(name, words, unit, own, np.array([[_amplitudes(one, count) for one in row] for row in found[name]]))
+        for name, (words, unit, own, _) in signals.items()
+    ]
+    orders = Axis("order", tuple(float(k * base) for k in range(count)))
+    points = Axis("point", tuple(loads.point.name for loads in first.loads))
+    return Fields("Amplitudes by order", _axis_of(designs), (points, orders), tuple(fields))
+
+
+def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
+    """Natural frequencies, loss factors and shares of kinetic energy of a block on elastic mounts.
+
+    Raises
+    ------
+    ModelError
+        If the engine stands on rigid mounts, or on none.
+    """
+    if any(design.engine.block is None or not design.engine.mounts for design in designs.values()):
+        raise ModelError("has no natural modes; give [block] and elastic [mounts]", "mounts")
+    modes = [mounting_in(design.engine).modes for design in designs.values()]
+    motion = Axis("motion", tuple(MOTIONS))
+    fields = (
+        Field("frequency", "natural frequency", "Hz", (), np.array([one.frequencies for one in modes])),
+        Field("loss_factor", "loss factor", "", (), np.array([one.loss for one in modes])),
+        Field("energy", "share of kinetic energy", "", (motion,), np.array([one.energy.T for one in modes])),
+    )
+    return Fields("Natural modes", _axis_of(designs), (Axis("mode", tuple(range(1, 7))),), fields)
+
+
+def _axis_of(designs: Mapping[str, Evaluation]) -> Axis:
+    return Axis("design", tuple(designs))
+
+
+def _places(design: Evaluation) -> Iterator[tuple[str, str, str, LoadChannel]]:
+    """Loads that are felt place by place: name, words, axis, channel."""
+    if design.engine.mounts:
+        yield "mount_force", "force on", "mount", MOUNT_FORCE
+    if design.engine.mounts and design.engine.block is not None:
+        yield "mount_travel", "travel at", "mount", MOUNT_TRAVEL
+    if design.engine.bearings and has_bearing_loads(design.engine, design.fidelity):
+        yield "main_bearing_force", "force on", "bearing", MAIN_BEARING_FORCE
+
+
+def _amplitudes(spectrum: Spectrum, count: int) -> Array:
+    # on a resonance there is none
+    with np.errstate(invalid="ignore"):
+        found = order_amplitude(spectrum.coefficients)
+    missing = [(0, count - len(found))] + [(0, 0)] * (found.ndim - 1)
+    return np.where(np.isfinite(found := np.pad(found, missing)), found, math.inf)

@@ -1,0 +1,58 @@
+"""What the report of a result says, in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from laufruhe.present.pictures import PICTURES
+from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
+from laufruhe.report.sections import tables_of
+from laufruhe.report.versions import versions
+from laufruhe.report.wording import accuracy, explained, fired_together, headline
+from laufruhe.solvers.result import Result
+
+
+def result_document(result: Result, pictures: Sequence[str], command: str) -> Document:
+    """The report of a result.
+
+    Parameters
+    ----------
+    pictures
+        Names without endings, of those that were drawn.
+    command
+        What makes the same result again.
+    """
+    return Document(result.problem.title, tuple(_blocks(result, pictures, command)))
+
+
+def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[Block]:
+    problem = result.problem
+    if problem.source:
+        yield Paragraph(f"Source: {problem.source}.")
+    if problem.assumptions:
+        yield Bullets("Assumptions:", problem.assumptions)
+    yield Heading("Result")
+    yield Paragraph(headline(result))
+    if together := fired_together(result):
+        yield Paragraph(together)
+    yield from (Illustration(name, PICTURES[name]) for name in pictures)
+    yield from tables_of(result)
+    yield Heading("Proof")
+    yield Paragraph(explained(result))
+    yield Heading("Fidelity")
+    yield Paragraph(_fidelity(result))
+    yield Heading("Reproduce")
+    yield Code(" ".join(command.split()))
+    made = ", ".join(f"{name} {version}" for name, version in versions().items())
+    yield Paragraph(f"Made with {made}.", marked=True)
+
+
+def _fidelity(result: Result) -> str:
+    f = result.problem.fidelity
+    text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
+    if result.objective is None:
+        return text
+    error = accuracy(result)
+    if f.tolerance is not None:
+        return f"{text} Chosen for an error of {f.tolerance:g}; {error}."
+    return f"{text} {error[:1].upper()}{error[1:]}, of the physics that is kept."

@@ -1,0 +1,206 @@
+"""Every table and curve of a result as numbers: a CSV file each, and a workbook of them all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+from typing import Any, TypeAlias
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+from laufruhe.physics.run_up import RunUp
+from laufruhe.present.measures import has_loads, has_ranking, limits_of, load_designs, places_of, ranking_of
+from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.present.pictures import SHEETS
+from laufruhe.present.run_up import shown_runs
+from laufruhe.present.speed_curves import speeds_of, transmissibility_of
+from laufruhe.problem.curves import STEPS, Fields, forces_of, modes_of, orders_of
+from laufruhe.problem.evaluation import Evaluation, measured
+from laufruhe.report import files
+from laufruhe.solvers.result import DecisionValue, LimitValue, Result
+from laufruhe.units import readable
+
+Cells: TypeAlias = list[Any]
+RPM, DEGREE = readable("rad/s")[1], readable("rad")[1]
+MOST_ROWS = 20 * STEPS
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Heads with their units, and rows of numbers and names."""
+
+    head: Sequence[str]
+    rows: Sequence[Cells]
+
+    @classmethod
+    def of(cls, found: Fields) -> Sheet:
+        """Of labelled fields."""
+        head, rows = found.table()
+        return cls(head, list(rows))
+
+
+def sheets_of(result: Result) -> dict[str, Sheet]:
+    """All sheets that a result fills, by name: SI, but for degrees and rpm where their heads say so."""
+    return {name: sheet for name, of in _SHEETS.items() if (sheet := of(result)) is not None}
+
+
+def _decisions(result: Result) -> Sheet | None:
+    names = [field.name for field in fields(DecisionValue)]
+    return Sheet(names, [list(astuple(one)) for one in result.decisions]) if result.decisions else None
+
+
+def _limits(result: Result) -> Sheet | None:
+    names, found = [field.name for field in fields(LimitValue)], limits_of(result)
+    return Sheet(names, [list(astuple(one)) for one in found]) if found else None
+
+
+def _measures(result: Result) -> Sheet | None:
+    """Mean, maximum and RMS of every place, before and after."""
+    rows = [
+        [places.title, point.name, design, name, each.mean, each.max, each.rms, places.channel.unit]
+        for places in places_of(result)
+        for k, point in enumerate(result.problem.points)
+        for design, found in _loaded(result).items()
+        for name, each in zip(
+            places.channel.places(found.engine), measured(found, k, places.channel), strict=True
+        )
+    ]  # fmt: skip
+    head = ["quantity", "point", "design", "place", "mean", "maximum", "rms", "unit"]
+    return Sheet(head, rows) if rows else None
+
+
+def _forces(result: Result) -> Sheet | None:
+    if not has_loads(result):
+        return None
+    steps = max(min(STEPS, MOST_ROWS // len(result.problem.points)), 36)
+    return Sheet.of(forces_of(_loaded(result), steps))
+
+
+def _orders(result: Result) -> Sheet | None:
+    return Sheet.of(orders_of(_loaded(result))) if has_loads(result) else None
+
+
+def _modes(result: Result) -> Sheet | None:
+    return Sheet.of(modes_of(result.designs)) if is_elastic(result) else None
+
+
+def _transmissibility(result: Result) -> Sheet | None:
+    if not is_elastic(result):
+        return None
+    speeds, orders = speeds_of(result), facts_of(result.final).orders
+    columns = [
+        (f"{design}, {point.name}: order {orders[k]:g}", curve.tolist())
+        for design, found in _loaded(result).items()
+        for point in result.problem.points
+        for k, curve in transmissibility_of(found, point, speeds, orders)
+    ]
+    rows = zip((RPM * speeds).tolist(), *(values for _, values in columns), strict=True)
+    return Sheet(["speed [rpm]", *(head for head, _ in columns)], [list(row) for row in rows]) if columns else None
+
+
+def _run_up(result: Result) -> Sheet | None:
+    if not is_elastic(result) or not has_loads(result):
+        return None
+    rows = [
+        [design, way, RPM * speed, force, travel, DEGREE * twist]
+        for design, found in _loaded(result).items()
+        for way, run in zip(("run-up", "shut-down"), shown_runs(result, found), strict=True)
+        for speed, force, travel, twist in _columns(run)
+    ]
+    return Sheet(
+        ["design", "way", "speed [rpm]", "largest mount force [N]", "largest mount travel [m]", "largest roll [deg]"],
+        rows,
+    )
+
+
+def _columns(run: RunUp) -> Iterator[tuple[float, ...]]:
+    return zip(*(part.tolist() for part in (run.speeds, run.force, run.travel, run.twist)), strict=True)
+
+
+def _rankings(result: Result) -> Sheet | None:
+    if not has_ranking(result):
+        return None
+    rows = [
+        [rank, star.value, star.lower_bound, star.proven, _degrees(star.throws), ", ".join(star.shafts),
+         "-".join(map(str, order.order)), _degrees(order.intervals), order.neighbours, order.roll_content]
+        for rank, star in enumerate(ranking_of(result).ranking, 1)
+        for order in star.firing_orders
+    ]  # fmt: skip
+    unit = result.objective.unit if result.objective else ""
+    head = ["rank", f"objective [{unit or '-'}]", f"not under [{unit or '-'}]", "proven", "throws [deg]", "shafts",
+            "firing order", "intervals [deg]", "neighbours", "roll content"]  # fmt: skip
+    return Sheet(head, rows)
+
+
+def _degrees(angles: Iterable[float]) -> str:
+    return " ".join(f"{math.degrees(angle):.6g}" for angle in angles)
+
+
+def _loaded(result: Result) -> Mapping[str, Evaluation]:
+    """Designs whose loads are finite, by name."""
+    shown = load_designs(result)
+    return {name: design for name, design in result.designs.items() if design in shown}
+
+
+_FILLED = (
+    _decisions, _limits, _measures, _forces, _orders, _modes, _transmissibility, _run_up, _rankings,
+)  # fmt: skip
+_SHEETS = dict(zip(SHEETS, _FILLED, strict=True))
+
+
+def write_tables(result: Result, folder: Path) -> None:
+    """A CSV file for every sheet, and all of them as one workbook, into a folder that exists."""
+    sheets = sheets_of(result)
+    for name, sheet in sheets.items():
+        write_csv(sheet, folder / f"{name}.csv")
+    if sheets:
+        write_book(sheets, folder / files.BOOK)
+
+
+def write_csv(sheet: Sheet, path: Path) -> None:
+    """One sheet as comma-separated values, numbers in full precision."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(sheet.head)
+        writer.writerows([_plain(cell) for cell in row] for row in sheet.rows)
+
+
+def write_book(sheets: Mapping[str, Sheet], path: Path) -> None:
+    """All sheets as one workbook, heads held in view."""
+    from openpyxl import Workbook
+
+    book = Workbook(write_only=True)
+    for name, sheet in sheets.items():
+        page = book.create_sheet(name[:31])
+        page.freeze_panes = "A2"
+        for row in _table(sheet):
+            page.append(row)
+    book.save(drawn := io.BytesIO())
+    with ZipFile(drawn) as given, ZipFile(path, "w", ZIP_DEFLATED) as kept:
+        for entry in given.infolist():
+            # the same numbers make the same file, whenever they are written
+            content = re.sub(rb">\d{4}-\d\d-\d\dT[^<]*<", b">2000-01-01T00:00:00Z<", given.read(entry))
+            kept.writestr(ZipInfo(entry.filename), content, ZIP_DEFLATED)
+
+
+def _table(sheet: Sheet) -> Iterator[Cells]:
+    yield [_text(head) for head in sheet.head]
+    yield from ([_cell(cell) for cell in row] for row in sheet.rows)
+
+
+def _plain(value: Any) -> Any:
+    return "" if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _cell(value: Any) -> Any:
+    plain = _plain(value)
+    return _text(plain) if isinstance(plain, str) else plain
+
+
+def _text(text: str) -> str:
+    """A text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text[:1] in "=+-@" and text[:1] else text

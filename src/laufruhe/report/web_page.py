@@ -1,0 +1,45 @@
+"""`report.html`: a report as one page that needs nothing beside it, for screens, paper and readers aloud."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+
+from markupsafe import Markup, escape
+
+from laufruhe.report.document import Document
+
+PAGE = "page.html"
+
+
+def as_html(document: Document, pictures: Mapping[str, str]) -> str:
+    """A report as HTML.
+
+    Parameters
+    ----------
+    pictures
+        SVG by name; they stand in the page, which loads nothing.
+    """
+    import jinja2
+
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["marked"] = _marked
+    template = environment.from_string((files("laufruhe.report") / PAGE).read_text(encoding="utf-8"))
+    inline = {name: _inline(svg) for name, svg in pictures.items()}
+    return template.render(document=document, pictures=inline) + "\n"
+
+
+def _inline(svg: str) -> str:
+    """A picture as an address that holds it: names within it cannot meet those of another."""
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode("utf-8")).decode("ascii")
+
+
+def _marked(text: str, marked: bool) -> Markup:
+    """Text with code and emphasis as they are marked; nothing else in it means anything."""
+    safe = str(escape(re.sub(r"\\(.)", r"\1", text) if marked else text))
+    if marked:
+        safe = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", safe)
+        safe = re.sub(r"`(.+?)`", r"<code>\1</code>", safe)
+    return Markup(safe)

@@ -1,0 +1,69 @@
+"""The drawing of the engine is to scale, and turns as the engine does."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cli import scenes
+from laufruhe.files.reader import load
+from laufruhe.plots import motion
+from laufruhe.plots.machine_view import STEEL, THICKNESS, Scene, _Pose, half_disc, reaches
+from laufruhe.plots.motion import animate
+from laufruhe.plots.results import engine
+from problem_files import PROBLEMS
+
+
+@pytest.mark.parametrize("name", ["vee-six-60", "radial-seven", "boxer-four"])
+def test_pistons_go_through_their_stroke_on_their_axes(name: str) -> None:
+    for part in load(PROBLEMS / f"{name}.toml").engine.slider_cranks:
+        poses = [_Pose.of(part, phi) for phi in np.linspace(0.0, math.tau, 361)]
+        along = np.array([(pose.piston - pose.crank) * cmath.exp(-1j * part.bank) for pose in poses])
+        assert np.ptp(along.real) == pytest.approx(part.stroke, rel=0.02)
+        assert np.abs(along.imag - part.offset).max() < 1e-9
+        rods = [abs(pose.piston - pose.pin) for pose in poses]
+        if name != "radial-seven":
+            assert rods == pytest.approx([part.rod_length] * len(rods))
+
+
+def test_pins_turn_clockwise_seen_from_the_front() -> None:
+    """C3: a pin at (y, z) = r (sin phi, cos phi)."""
+    part = load(PROBLEMS / "tractor-single.toml").engine.slider_cranks[0]
+    pin = _Pose.of(part, 0.25 * math.pi).pin
+    assert (pin.imag, pin.real) == pytest.approx((part.crank_radius * math.sqrt(0.5),) * 2)
+
+
+def test_a_half_disc_has_the_unbalance_that_it_stands_for() -> None:
+    radius = half_disc(0.03)
+    r, a = np.meshgrid((np.arange(2000) + 0.5) / 2000 * radius, (np.arange(400) + 0.5) / 400 * math.pi)
+    moment = (r * np.sin(a) * r).mean() * radius * math.pi * STEEL * THICKNESS
+    assert moment == pytest.approx(0.03, rel=1e-4)
+
+
+def test_what_was_decided_is_marked() -> None:
+    result = scenes.solved(scenes.TIGHT)
+    scene = Scene.of(result.final.engine, result.problem)
+    assert scene.rotors == {rotor.name for rotor in result.final.engine.rotors}
+    assert not scene.throws
+    labels = [text.get_text() for text in engine.figure(result).legends[0].get_texts()]
+    assert "weight, decided" in labels
+    front, side = reaches(scene)
+    assert front
+    assert side
+
+
+def test_the_engine_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion, "FRAMES", 4)
+    animate(scenes.solved(scenes.TIGHT), tmp_path / "engine.gif")
+    with Image.open(tmp_path / "engine.gif") as picture:
+        assert picture.n_frames == 4
+        frames = []
+        for k in range(4):
+            picture.seek(k)
+            frames.append(np.asarray(picture.convert("RGB"), dtype=int))
+    assert all(np.abs(frames[k] - frames[0]).max() > 50 for k in (1, 3))

@@ -1,0 +1,112 @@
+"""Tables and curves as CSV and as a workbook: the numbers of the result, and nothing else."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pandas as pd
+import pytest
+
+from cli import scenes
+from laufruhe.present.pictures import SHEETS
+from laufruhe.problem.evaluation import measured
+from laufruhe.report.tables import sheets_of, write_tables
+from laufruhe.solvers import Result, solve, state
+from problem_files import PROBLEMS, loaded
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return scenes.solved(scenes.TWO_POINTS)
+
+
+@pytest.fixture(scope="module")
+def folder(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("tables")
+    write_tables(result, place)
+    return place
+
+
+def test_forces_over_the_crank_angle_have_the_measures_of_the_result(result: Result, folder: Path) -> None:
+    table = pd.read_csv(folder / "forces.csv")
+    assert list(table.columns[:2]) == ["point", "angle [deg]"]
+    for design, found in result.designs.items():
+        for k, point in enumerate(result.problem.points):
+            rows = table[table["point"] == point.name]
+            assert rows["angle [deg]"].tolist() == np.arange(720.0).tolist()
+            for name, own in zip(found.mount_names, measured(found, k), strict=True):
+                sizes = np.linalg.norm([rows[f"{design}: force on {name} {axis} [N]"] for axis in "xyz"], axis=0)
+                assert math.sqrt((sizes**2).mean()) == pytest.approx(own.rms, rel=1e-6)
+                assert sizes.max() == pytest.approx(own.max, rel=1e-3)
+
+
+def test_orders_are_those_of_the_curves(result: Result, folder: Path) -> None:
+    """Amplitudes by order against a Fourier transform of the forces in the other file, one axis at a time."""
+    curves, orders = (pd.read_csv(folder / f"{name}.csv") for name in ("forces", "orders"))
+    point = result.problem.points[1].name
+    force = curves[curves["point"] == point]["as given: shaking force z [N]"].to_numpy()
+    found = 2.0 * np.abs(np.fft.rfft(force)) / len(force)
+    own = orders[orders["point"] == point].set_index("order")["as given: shaking force [N]"]
+    for order in (2.0, 4.0):
+        # two turns are transformed
+        assert own[order] == pytest.approx(found[int(2 * order)], rel=1e-6)
+
+
+def test_decisions_are_in_full_precision(result: Result, folder: Path) -> None:
+    with (folder / "decisions.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [(row["name"], float(row["value"])) for row in rows] == [(d.name, d.value) for d in result.decisions]
+
+
+def test_the_workbook_has_a_sheet_for_every_file(result: Result, folder: Path) -> None:
+    book = openpyxl.load_workbook(folder / "tables.xlsx", read_only=True)
+    assert set(book.sheetnames) == {path.stem for path in folder.glob("*.csv")} == set(sheets_of(result))
+    rows = list(book["orders"].iter_rows(values_only=True))
+    table = pd.read_csv(folder / "orders.csv")
+    assert list(rows[0]) == list(table.columns)
+    for row, (_, own) in zip(rows[1:], table.iterrows(), strict=True):
+        assert row[0] == own.iloc[0]
+        assert list(row[1:]) == pytest.approx(own.tolist()[1:])
+
+
+def test_the_same_numbers_make_the_same_files(result: Result, folder: Path, tmp_path: Path) -> None:
+    write_tables(result, tmp_path)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == {
+        path.name: path.read_bytes() for path in tmp_path.iterdir()
+    }
+
+
+@pytest.mark.slow
+def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) -> None:
+    from laufruhe.files.reader import load
+
+    found = sheets_of(state(load(PROBLEMS / "study-soft-mounts.toml")))
+    assert {"modes", "transmissibility", "run-up", "forces"} <= set(found)
+    assert any(head.startswith("travel at front left") for head in found["forces"].head)
+    assert len(found["modes"].rows) == 6
+
+
+@pytest.mark.slow
+def test_ranked_stars_are_a_sheet() -> None:
+    from laufruhe.files.reader import load
+
+    found = sheets_of(solve(load(PROBLEMS / "inline-five-open.toml")))
+    assert found["rankings"].rows[0][0] == 1
+    assert found["rankings"].rows[0][3] is True
+
+
+def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
+    text = scenes.GIVEN.replace("positions", 'names = ["=1+1", "b", "c", "d"]\npositions')
+    write_tables(state(loaded(tmp_path, text)), tmp_path)
+    book = openpyxl.load_workbook(tmp_path / "tables.xlsx")
+    cells = [cell for row in book["measures"].iter_rows() for cell in row if cell.value and "1+1" in str(cell.value)]
+    assert cells
+    assert all(cell.data_type != "f" for cell in cells)
+
+
+def test_names_are_known_before_anything_is_made(result: Result) -> None:
+    assert set(sheets_of(result)) <= set(SHEETS)
