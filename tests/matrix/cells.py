@@ -248,6 +248,7 @@ DECISIONS: Mapping[str, LeaveOpen] = {
     "firing order": _order_open,
     "bank angle": _angle_open("bank_angle", 50.0, 125.0),
     "split pin angle": _angle_open("split_pin_angle", 0.0, 65.0),
+    "reciprocating mass": _engine(reciprocating_mass=Open("reciprocating mass", 0.3, 1.5, "kg")),
     "flywheel inertia": _wheel(inertia=Open("flywheel.inertia", 0.2, 3.0, "kg m^2")),
     "flywheel rim": _wheel(
         width=Open("flywheel.width", 0.03, 0.12, "m"), height=Open("flywheel.height", 0.02, 0.06, "m")

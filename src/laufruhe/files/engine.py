@@ -106,7 +106,9 @@ class EngineTable(Table):
     rod_ratio: f.NonNegative | None = f.told("Crank radius over rod length; 0 is a Scotch yoke.")
     rod_length: f.PositiveLength | None = None
     offset: f.Length = f.told("Of the pin's path from the crank axis.", 0.0)
-    reciprocating_mass: f.Mass = Field(description="Per cylinder, with the rod's share unless [engine.rod] is given.")
+    reciprocating_mass: f.OpenMass = Field(
+        description="Per cylinder, with the rod's share unless [engine.rod] is given."
+    )
     rotating_mass: f.Mass = f.told("Per throw, at the crank radius.", 0.0)
     rod: RodTable | None = None
     big_end: BigEndTable | None = f.told("Needed for the pressure on crank pins.")
@@ -115,6 +117,11 @@ class EngineTable(Table):
     firing_order: FiringOrder | None = None
     shafts: list[ShaftTable] = Field(default_factory=list)
     slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
+
+    @property
+    def piston_mass(self) -> Open:
+        """Reciprocating mass without a share of the rod, which may be open."""
+        return Open.of(self.reciprocating_mass)
 
     @property
     def given_throws(self) -> list[float] | None:
@@ -173,7 +180,7 @@ def _asked(table: EngineTable, gas: bool = False) -> Asked:
     rods = {name: value.model_dump() for name, value in own.items() if isinstance(value, RodTable)}
     order = None if table.given_order is None else tuple(table.given_order)
     count, (mechanism, rod) = _cylinders(table), _mechanism(table)
-    return Asked(cycle_of(table), count, mechanism, own | rods, order, table.reciprocating_mass, rod, gas)
+    return Asked(cycle_of(table), count, mechanism, own | rods, order, table.piston_mass.start, rod, gas)
 
 
 def _cylinders(table: EngineTable) -> int:
@@ -226,7 +233,7 @@ def _mechanism(table: EngineTable) -> tuple[Mechanism, Rod | None]:
     mechanism = Mechanism(
         crank_radius=radius,
         rod_length=rod_length,
-        reciprocating_mass=table.reciprocating_mass + (rod.reciprocating_mass if rod else 0.0),
+        reciprocating_mass=table.piston_mass.start + (rod.reciprocating_mass if rod else 0.0),
         rotating_mass=table.rotating_mass,
         rod_rotating_mass=rod.rotating_mass if rod else 0.0,
         rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit,

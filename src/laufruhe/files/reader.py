@@ -33,8 +33,9 @@ from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbe
 from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
-from laufruhe.problem.decision import Decision
+from laufruhe.problem.decision import Decision, MassDrive
 from laufruhe.problem.problem import Problem, Search
+from laufruhe.problem.sets import Interval
 from laufruhe.problem.tolerance import Drawing, Tolerances
 from laufruhe.problem.tolerance import Path as Place
 
@@ -208,7 +209,10 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke, brake)
     run = run_of(file.run_up, found.block, [point.name for point in points])
     engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run)
-    scene, decisions = Scene(engine, points), (*collected.decisions, *found.decisions, *of_wheel)
+    scene, decisions = (
+        Scene(engine, points),
+        (*_of_pistons(file, table, cylinders), *collected.decisions, *found.decisions, *of_wheel),
+    )
     objective = objective_of(file.objective, scene)
     _check_decided(decisions)
     if decisions and not objective:
@@ -228,6 +232,25 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         search=Search(**file.search.model_dump()),
     )
     return at_fidelity(problem, file.fidelity)
+
+
+def _of_pistons(file: ProblemFile, table: EngineTable, parts: Sequence[SliderCrank]) -> list[Decision]:
+    """The decision about the reciprocating mass of all that give none of their own, if it is open."""
+    mass = table.piston_mass
+    if not mass.is_open:
+        return []
+    factors = [k for k, weight in enumerate(file.counterweights, 1) if weight.factor_key is not None]
+    if factors:
+        rule, remedy = (
+            "counts the reciprocating mass, which is open",
+            "give the counterweights a mass, or fix the other",
+        )
+        raise Refused(
+            f"counterweights[{factors[0]}].{file.counterweights[factors[0] - 1].factor_key}", None, rule, remedy
+        )
+    own = [row.reciprocating_mass is None for row in table.slider_cranks] or [True] * len(parts)
+    drives = tuple(MassDrive(part.name) for part, follows in zip(parts, own, strict=True) if follows)
+    return [Decision("reciprocating mass", "kg", Interval(*mass.bounds), mass.start, drives)]
 
 
 def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:

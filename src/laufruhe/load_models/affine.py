@@ -16,7 +16,7 @@ from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics.norms import MEAN, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
-from laufruhe.physics.shaking_loads import added_rotor_loads
+from laufruhe.physics.shaking_loads import added_rotor_loads, shaking_loads
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.decision import Decision, Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
@@ -187,9 +187,9 @@ class AffineModel:
         mounting = mounting_of(problem.engine, problem.fidelity)
         changes = [_change(problem, d.decision, direction) for d in self.domains for direction in d.set.directions]
         self.bare, self._changes = bare, changes
-        orders = [as_order(abs(r.shaft.ratio)) for rotors in changes for r in rotors]
+        orders = [as_order(abs(r.shaft.ratio)) for change in changes for r in change.rotors]
         # loads of every column alone, at every operating point
-        alone = [_alone(problem.engine, rotors) for rotors in changes]
+        alone = [_alone(problem.engine, change) for change in changes]
         self._slopes = [[_loads(each, point, problem, mounting) for each in alone] for point in problem.points]
         self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
 
@@ -237,7 +237,7 @@ class AffineModel:
             return _stacked(only, [np.zeros((1, 1))] * len(self._changes), self._keep_all)
         if not isinstance(channel, LoadChannel):
             bare = mass_rows(measure, self.bare.engine.rotors)
-            slopes = [mass_rows(measure, _only(self.bare.engine, rotors)).vectors for rotors in self._changes]
+            slopes = [mass_rows(measure, _only(self.bare.engine, change.rotors)).vectors for change in self._changes]
             return _stacked(bare, slopes, self._keep_all)
         averaged = averaged and measure.norm.averages
         known = self.bare.signals(channel)
@@ -270,10 +270,21 @@ class AffineModel:
         return load_rows(measure, self.problem.points, period, self.problem.engine, samples, bends)
 
 
-def _change(problem: Problem, decision: Decision, direction: complex) -> tuple[Rotor, ...]:
-    """The rotors that one unit of one column makes, others left out."""
+@dataclass(frozen=True)
+class _Change:
+    """What one unit of one column adds: rotors, and slider-cranks with one more kilogram of reciprocating mass."""
+
+    rotors: tuple[Rotor, ...]
+    pistons: tuple[str, ...]
+
+
+def _change(problem: Problem, decision: Decision, direction: complex) -> _Change:
     by_name = {rotor.name: rotor for rotor in problem.engine.rotors}
-    return tuple(replace(by_name[d.rotor], unbalance=d.of(direction)) for d in decision.rotor_drives)
+    rotors = tuple(replace(by_name[d.rotor], unbalance=d.of(direction)) for d in decision.rotor_drives)
+    if decision.pistons and problem.fidelity.is_uneven:
+        rule = "reciprocating masses are decided for a crank that turns evenly"
+        raise ModelError(f"{rule}; leave fidelity.crank_inertia out, or fix the mass")
+    return _Change(rotors, decision.pistons)
 
 
 def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
@@ -282,19 +293,21 @@ def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
     return tuple(replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors)
 
 
-def _alone(engine: Engine, rotors: Sequence[Rotor]) -> Engine:
-    """What these rotors load by themselves: the engine without any other mass."""
-    parts = (replace(part, reciprocating_mass=0.0, rotating_mass=0.0, rod_inertia_deficit=0.0)
-             for part in engine.slider_cranks)  # fmt: skip
-    return replace(engine, slider_cranks=tuple(parts), rotors=tuple(rotors))
+def _alone(engine: Engine, change: _Change) -> Engine:
+    """What these rotors and pistons load by themselves: the engine without any other mass."""
+    parts = (replace(part, reciprocating_mass=float(part.name in change.pistons), rotating_mass=0.0,
+                     rod_inertia_deficit=0.0) for part in engine.slider_cranks)  # fmt: skip
+    return replace(engine, slider_cranks=tuple(parts), rotors=change.rotors)
 
 
 def _loads(alone: Engine, point: OperatingPoint, problem: Problem, mounting: Mounting | None) -> PointLoads:
-    """What some rotors alone make at an operating point; an uneven speed is that of the whole engine."""
+    """What these alone make at an operating point; an uneven speed is that of the whole engine."""
+    without_gas = replace(problem.fidelity, gas=False, gas_orders=None)
     wrench = added_rotor_loads(alone.rotors, problem.engine, point, problem.fidelity)
+    if any(part.reciprocating_mass for part in alone.slider_cranks):
+        wrench = shaking_loads(alone, point, without_gas)
     forces = mounting.forces(wrench, point.speed) if mounting else None
     travel = travel_of(problem.engine, mounting, wrench, point.speed)
-    without_gas = replace(problem.fidelity, gas=False, gas_orders=None)
     return PointLoads(point, wrench, forces, travel, alone, without_gas)
 
 

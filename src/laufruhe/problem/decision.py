@@ -1,8 +1,7 @@
 """Decisions: open numbers, the sets they lie in, and what of the engine they drive.
 
-A decision knows its set and its drives; which method decides it follows from the kinds of
-drives. Of a convex set a bound needs the least value of a linear function, a method the
-nearest point (P4).
+A decision knows its set and its drives; which method decides it follows from their kinds. Of a convex
+set a bound needs the least value of a linear function, a method the nearest point (P4).
 """
 
 from __future__ import annotations
@@ -40,6 +39,8 @@ class Kind(IntEnum):
     """Of the phasing: no number."""
     FLYWHEEL = 6
     """Nothing but the flywheel and how evenly the crank turns feels it."""
+    PISTON = 7
+    """Every load is affine in it, not so the inertia that turns."""
 
 
 @dataclass
@@ -54,14 +55,15 @@ class Numbers:
         Of the rotors by name: x, and y and z of their shafts [m] (C2).
     mounts
         Of every mount thirteen: stiffness, loss factor, damping, position, turned angles (E13).
-    flywheel
-        Inertia of the rest; mean diameter, width and height of the rim. Empty without a flywheel.
+    flywheel, pistons
+        Inertia of the rest, mean diameter, width and height of a rim; changes of reciprocating masses by name [kg].
     """
 
     unbalances: dict[str, Any] = field(default_factory=dict)
     places: dict[str, list[Any]] = field(default_factory=dict)
     mounts: list[list[Any]] = field(default_factory=list)
     flywheel: list[Any] = field(default_factory=list)
+    pistons: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
@@ -81,8 +83,12 @@ class Numbers:
         mounts = given.mounts
         if self.mounts:
             mounts = tuple(mount_of(mount, row) for mount, row in zip(given.mounts, self.mounts, strict=True))
-        flywheel = given.flywheel.moved(self.flywheel) if given.flywheel else None
-        return replace(given, rotors=rotors, mounts=mounts, flywheel=flywheel)
+        flywheel, parts = given.flywheel.moved(self.flywheel) if given.flywheel else None, given.slider_cranks
+        if self.pistons:
+            # a sum of changes may leave a bound of zero by a rounding
+            masses = (max(part.reciprocating_mass + float(self.pistons.get(part.name, 0.0)), 0.0) for part in parts)
+            parts = tuple(replace(part, reciprocating_mass=mass) for part, mass in zip(parts, masses, strict=True))
+        return replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel)
 
 
 class Drive(Protocol):
@@ -174,6 +180,19 @@ class FlywheelDrive:
 
 
 @dataclass(frozen=True)
+class MassDrive:
+    """Reciprocating mass of one slider-crank += change."""
+
+    part: str
+    kind: ClassVar[Kind] = Kind.PISTON
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the slider-crank."""
+        numbers.pistons[self.part] = numbers.pistons.get(self.part, 0.0) + change.real
+
+
+@dataclass(frozen=True)
 class Decision:
     """An open number, and what follows it.
 
@@ -220,7 +239,7 @@ class Decision:
     @property
     def is_affine(self) -> bool:
         """Whether every load is affine in it."""
-        return self.kind is Kind.UNBALANCE
+        return self.kind in (Kind.UNBALANCE, Kind.PISTON)
 
     @property
     def rotor_drives(self) -> tuple[RotorDrive, ...]:
@@ -228,19 +247,24 @@ class Decision:
         return tuple(drive for drive in self.drives if isinstance(drive, RotorDrive))
 
     @property
+    def pistons(self) -> tuple[str, ...]:
+        """Slider-cranks whose reciprocating masses follow."""
+        return tuple(drive.part for drive in self.drives if isinstance(drive, MassDrive))
+
+    @property
     def place_drives(self) -> tuple[PlaceDrive, ...]:
         """Places of rotors that follow."""
         return tuple(drive for drive in self.drives if isinstance(drive, PlaceDrive))
 
     @property
-    def mount_drives(self) -> tuple[MountDrive, ...]:
-        """Numbers of mounts that follow."""
-        return tuple(drive for drive in self.drives if isinstance(drive, MountDrive))
-
-    @property
     def is_stiffness(self) -> bool:
         """Whether nothing but stiffness of mounts follows."""
         return self.kind is Kind.STIFFNESS
+
+    @property
+    def mount_drives(self) -> tuple[MountDrive, ...]:
+        """Numbers of mounts that follow."""
+        return tuple(drive for drive in self.drives if isinstance(drive, MountDrive))
 
 
 def without_rotors(decisions: Sequence[Decision], gone: Collection[str]) -> tuple[Decision, ...]:

@@ -109,6 +109,13 @@ def _apart(problem: Problem) -> Result:
     return solve_apart(problem, _decided)
 
 
+def _is_apart(problem: Problem) -> bool:
+    """Whether a flywheel is open, and nothing open beside it moves what is asked of it."""
+    others = kinds_of(problem) - {Kind.FLYWHEEL}
+    wheel = [measure for measure in problem.measures if measure.channel.is_flywheel]
+    return Kind.FLYWHEEL in kinds_of(problem) and not any(measure.channel.is_moved_by(others) for measure in wheel)
+
+
 def _asks_flywheel(problem: Problem) -> bool:
     return all(measure.channel.is_flywheel for measure in problem.measures)
 
@@ -137,6 +144,12 @@ def _is_inside(measure: Measure) -> bool:
     return measure.is_inside or measure.channel.is_flywheel
 
 
+def _feels_pistons(problem: Problem) -> bool:
+    """Whether nothing is asked but masses and loads that are affine in the masses of the pistons."""
+    channels = [measure.channel for measure in problem.measures]
+    return not any(channel.feels_inertia or channel.is_number for channel in channels)
+
+
 def _asks_loads(problem: Problem) -> bool:
     """Whether nothing that is asked of the mounts depends on loads: it holds for every design, or for none."""
     return not any(measure.channel.of_loads for measure in problem.measures)
@@ -148,12 +161,14 @@ METHODS: tuple[Method, ...] = (
     Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_unbalances)),
+    Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,
+           lambda problem: solve_within(problem, solve_unbalances)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_block, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _smooth),
-    Method("flywheel and the rest apart", frozenset(Kind) - {_S}, lambda problem: bool(problem.flywheel_decisions),
+    Method("flywheel and the rest apart", frozenset(Kind) - {_S}, _is_apart,
            Reach.ASIDE, _apart),
     Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _nothing_inside, Reach.ASIDE,
            _stars_on_mounts),

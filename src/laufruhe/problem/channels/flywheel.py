@@ -26,7 +26,7 @@ class FlywheelChannel(NumberChannel):
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """The flywheel, and all that moves the torque where that counts."""
-        return Kind.FLYWHEEL in kinds or (self.of_torque and Kind.STAR in kinds)
+        return Kind.FLYWHEEL in kinds or (self.of_torque and bool({Kind.STAR, Kind.PISTON} & set(kinds)))
 
 
 def _found(

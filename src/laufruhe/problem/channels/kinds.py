@@ -95,6 +95,7 @@ class Channel:
     is_mounting: ClassVar[bool] = False
     is_placing: ClassVar[bool] = False
     is_checked: ClassVar[bool] = False
+    feels_inertia: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         _KNOWN[self.name] = self
@@ -179,10 +180,11 @@ class TwistChannel(LoadChannel):
     needs: Needs = Needs.TORSION
     is_inside: bool = True
     feels_unbalances: ClassVar[bool] = False
+    feels_inertia: ClassVar[bool] = True
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Throws and firing order."""
-        return Kind.STAR in kinds
+        """Throws and firing order, and the inertia of the pistons."""
+        return Kind.STAR in kinds or Kind.PISTON in kinds
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,8 +234,8 @@ class TorsionChannel(NumberChannel):
     minimised: bool = False
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """What excites them is a matter of throws and firing order, all else of discs and shafts alone."""
-        return self.of_loads and Kind.STAR in kinds
+        """What excites them is a matter of throws and firing order, all else of discs, shafts and pistons."""
+        return Kind.PISTON in kinds or (self.of_loads and Kind.STAR in kinds)
 
 
 @dataclass(frozen=True, eq=False)
