@@ -36,6 +36,10 @@ def _stated(norm: AffineNorm, x: Any) -> Any:
     weights, steps = norm.grid.weights, norm.grid.steps
     if norm.norm is NORMS["mean"]:
         return weights @ cp.norm(rows, axis=1)
+    if norm.norm is NORMS["worst mean"]:
+        # points stand one behind another, and the weight of a point does not count
+        blocks = np.split(np.arange(k), norm.grid.points)
+        return cp.max(cp.hstack([weights[own] / weights[own].sum() @ cp.norm(rows[own], axis=1) for own in blocks]))
     if norm.norm is NORMS["rms"]:
         return cp.norm(cp.multiply(np.sqrt(weights)[:, None], rows), "fro")
     if norm.norm is NORMS["peak to peak"]:
