@@ -46,9 +46,8 @@ def test_slightly_uneven_angles_cut_the_couple(name):
     assert trade[0].value == pytest.approx(result.phasing.even_value, rel=1e-12)
     assert all(point.deviation <= point.allowed + 1e-7 for point in trade)
     assert all(point.kkt_residual < 1e-6 for point in trade)
-    assert result.certificate.kind in (Proof.LOCAL, Proof.GLOBAL)
-    if result.certificate.kind is Proof.GLOBAL:
-        assert result.objective.value <= 1e-6 * result.phasing.even_value
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.gap <= 1e-4
 
 
 @pytest.mark.slow

@@ -123,6 +123,50 @@ class Bound:
     multipliers: Multipliers
 
 
+@dataclass(frozen=True, eq=False)
+class Minorant:
+    """An affine function of the decision vector that the objective of no allowed design lies under.
+
+    Attributes
+    ----------
+    constant, gradient
+        Of it.
+    multipliers
+        That it is made of.
+    """
+
+    constant: float
+    gradient: Array
+    multipliers: Multipliers
+
+
+def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
+    """What these multipliers say of every decision vector, whatever set it lies in (P4).
+
+    Parameters
+    ----------
+    problem
+        Rows on the grid on which it is to hold.
+    multipliers
+        Any dual rows on that grid; terms are scaled into the dual unit ball.
+    """
+    norms = [norm for _, norm in (*problem.terms, *problem.limits)]
+    gradient, constant = np.zeros(norms[0].slope.shape[-1] if norms else problem.size), 0.0
+    terms = []
+    for (weight, norm), given in zip(problem.terms, multipliers.terms, strict=True):
+        # a term that nothing open acts on is its own bound
+        z = norm.dual_feasible(given) if norm.slope.any() else norm.subgradient(np.zeros(len(gradient)))
+        terms.append(z)
+        constant += weight * float(np.vdot(z, norm.constant))
+        gradient += weight * norm.pulled(z)
+    held = [norm.norm.balanced(norm.grid, z) for (_, norm), z in zip(problem.limits, multipliers.limits, strict=True)]
+    for (maximum, norm), z in zip(problem.limits, held, strict=True):
+        price = norm.dual_norm(z)
+        constant += float(np.vdot(z, norm.constant)) - price * maximum
+        gradient += norm.pulled(z)
+    return Minorant(constant, gradient, Multipliers(tuple(terms), tuple(held)))
+
+
 def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
     """Least objective that these multipliers leave possible (P4).
 
@@ -133,22 +177,10 @@ def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
     multipliers
         Any dual rows on that grid; terms are scaled into the dual unit ball.
     """
-    gradient, constant = np.zeros(problem.size), 0.0
-    terms = []
-    for (weight, norm), given in zip(problem.terms, multipliers.terms, strict=True):
-        # a term that nothing open acts on is its own bound
-        z = norm.dual_feasible(given) if norm.slope.any() else norm.subgradient(np.zeros(problem.size))
-        terms.append(z)
-        constant += weight * float(np.vdot(z, norm.constant))
-        gradient += weight * np.einsum("kd,kdn->n", z, norm.slope)
-    held = [norm.norm.balanced(norm.grid, z) for (_, norm), z in zip(problem.limits, multipliers.limits, strict=True)]
-    for (maximum, norm), z in zip(problem.limits, held, strict=True):
-        price = norm.dual_norm(z)
-        constant += float(np.vdot(z, norm.constant)) - price * maximum
-        gradient += np.einsum("kd,kdn->n", z, norm.slope)
-    least = constant + sum(domain.least(gradient) for domain in problem.domains)
+    under = minorant(problem, multipliers)
+    least = under.constant + sum(domain.least(under.gradient) for domain in problem.domains)
     # every term is a norm, so nothing lies under zero
-    return Bound(max(least, 0.0), gradient, Multipliers(tuple(terms), tuple(held)))
+    return Bound(max(least, 0.0), under.gradient, under.multipliers)
 
 
 def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import heapq
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import count, islice, product
+from itertools import islice, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.budget import passed
-from laufruhe.numerics.foresight import foresight
-from laufruhe.numerics.progress import tell
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Reach, gap_of
+from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.box_search import divided
 from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, none_within
 from laufruhe.solvers.mount_starts import unbalances_of
 from laufruhe.solvers.place_boxes import Relaxation
@@ -31,8 +28,6 @@ Array = NDArray[np.float64]
 MOST_BOXES = 300
 # of the tolerance that the programs of the boxes may use up
 SHARE = 0.25
-# of the tolerance that counts as met
-NEARLY = 0.99
 # [m]
 EXACT = 1e-6
 # [m], by which a limit on a distance may be missed, and by which it is kept where places are moved for it
@@ -43,8 +38,6 @@ HALVINGS = 10
 MOST_CORNERS = 16
 # of a side, that a cut keeps from its ends
 EDGE = 0.1
-# boxes that may be wanted next
-AHEAD = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +55,11 @@ class _Box:
     bound: float
     middle: Array
     spread: Array
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether it left nothing out: no part of it has more than a bound as near as its program came."""
+        return bool(self.spread.max() <= EXACT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,43 +107,20 @@ def _divided(search: _Search, nothing: float) -> tuple[_Found | None, float, int
     -------
     That design, None where no place allows one; what bounds the boxes that are left; and how many there were.
     """
-    problem, number, seen = search.problem, count(), 1
+    problem = search.problem
     most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
     root = search.box(*search.bounds)
     if root is None:
-        return None, np.inf, seen
-    heap, best = [(root.bound, next(number), root)], search.better(None, search.at(root.middle))
-    with foresight(_halved) as ahead:
-        while heap and seen < most and not passed():
-            gap = gap_of(best.value, heap[0][0], nothing)
-            # a box that left nothing out has no better design, only a bound as near as its program came
-            if gap <= NEARLY * problem.tolerance or (gap < np.inf and heap[0][2].spread.max() <= EXACT):
-                break
-            _, name, box = heapq.heappop(heap)
-            step = search, box, best.value
-            others = heapq.nsmallest(AHEAD, heap)
-            ahead.likely([(name, step), *((other, (search, one, best.value)) for _, other, one in others)])
-            halves, conflict = ahead.wanted(name, step)
-            search.told(conflict)
-            for half, found in halves:
-                seen += 1
-                if half is not None and found is not None and half.bound < best.value:
-                    heapq.heappush(heap, (half.bound, next(number), half))
-                    best = search.better(best, found)
-            tell("boxes of places", seen, value=best.value, bound=heap[0][0] if heap else -np.inf)
-    return (best, heap[0][0], seen) if heap else (None if best.design.rank[0] else best, np.inf, seen)
-
-
-def _halved(step: tuple[_Search, _Box, float]) -> tuple[list[tuple[_Box | None, _Found | None]], tuple[str, ...]]:
-    """Halves of a box, each with the best design at its middle if it may be better than a value; limits not met."""
-    search, box, value = step
-    halves = list(search.halves(box))
-    found = [None if half is None or half.bound >= value else search.at(half.middle) for half in halves]
-    return list(zip(halves, found, strict=True)), search.conflict
+        return None, np.inf, 1
+    first = search.at(root.middle)
+    best, bound, seen = divided(search, root, first, nothing, problem.tolerance, most, "boxes of places")
+    return None if np.isinf(bound) and best.design.rank[0] else best, bound, seen
 
 
 class _Search:
     """Boxes of the places of a problem."""
+
+    is_shared = True
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -160,11 +135,16 @@ class _Search:
         return np.array([p.lower for p in self.places]), np.array([p.upper for p in self.places])
 
     @staticmethod
-    def better(best: _Found | None, found: _Found) -> _Found:
+    def better(best: _Found, found: _Found) -> _Found:
         """The better of the best design so far and another."""
-        return found if best is None or found.design.rank < best.design.rank else best
+        return found if found.design.rank < best.design.rank else best
 
-    def halves(self, box: _Box) -> Iterator[_Box | None]:
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | None, _Found | None]]:
+        """Halves of a box, each with the best design at its middle if it may be better than a value."""
+        for half in self._halves(box):
+            yield half, None if half is None or half.bound >= value else self.at(half.middle)
+
+    def _halves(self, box: _Box) -> Iterator[_Box | None]:
         """A box cut where what was left out pulls most."""
         width, whole = box.upper - box.lower, self.bounds[1] - self.bounds[0]
         pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole

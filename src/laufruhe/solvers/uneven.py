@@ -34,6 +34,7 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth_program import TURN, SmoothProgram
 from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.star_families import families_of
+from laufruhe.solvers.throw_search import Searched, search_throws
 from laufruhe.solvers.uneven_starts import firing_intervals, none_fires, starts_of
 
 Array = NDArray[np.float64]
@@ -64,7 +65,8 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     starts = starts_of(phasing, even, problem.feels_gas)
     if not starts:
         why, proven = none_fires(phasing)
-        return no_star(problem, why, Status.INFEASIBLE if proven else Status.FAILED)
+        if proven:
+            return no_star(problem, why)
     steps = TRADE_STEPS if even is not None and phasing.intervals.most < math.inf else (1.0,)
     found: list[StarDesign] = []
     trade = []
@@ -77,9 +79,22 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         found = sorted(answers, key=lambda answer: answer.value)
         if found and len(steps) > 1:
             trade.append(_trade_point(problem, phasing, allowed, found[0]))
+    floor, source = _bound(problem, phasing, phasing.intervals)
+    searched = search_throws(
+        problem, phasing, found[0] if found else None, floor,
+        lambda candidate: local_optimum(phasing, candidate, phasing.intervals),
+    )  # fmt: skip
+    if searched is not None:
+        floor, source = max(floor, searched.bound), f"{searched.boxes} boxes of throws"
+        if searched.best is not None and searched.best not in found:
+            found = [searched.best, *found]
+            trade = [*trade[:-1], _trade_point(problem, phasing, phasing.intervals, found[0])] if trade else []
+    if not found and not starts and searched is None:
+        return no_star(problem, why, Status.FAILED)
     if not found:
-        return _none(problem, phasing)
-    return _result(problem, phasing, even, found, tuple(trade))
+        return _none(problem, phasing, searched)
+    trade = [replace(point, lower_bound=max(point.lower_bound, min(floor, point.value))) for point in trade]
+    return _result(problem, phasing, even, found, tuple(trade), floor, source)
 
 
 def _narrowed(phasing: Phasing, share: float) -> Intervals:
@@ -97,8 +112,11 @@ def _trade_point(problem: Problem, phasing: Phasing, allowed: Intervals, best: S
     return TradePoint(freedom, deviation, best.value, best.candidate.throws, best.kkt_residual, bound)
 
 
-def _none(problem: Problem, phasing: Phasing) -> Result:
-    """No start led to a design: infeasible only where a bound of what is limited proves it."""
+def _none(problem: Problem, phasing: Phasing, searched: Searched | None) -> Result:
+    """No start led to a design: infeasible only where boxes, or a bound of what is limited, prove it."""
+    if searched is not None and searched.bound == math.inf:
+        told = " and ".join(f"'{name}'" for name in searched.told) or "the bounds on firing intervals"
+        return no_star(problem, f"no crank keeps {told}, whatever else is decided", conflict=searched.told)
     for limit in problem.load_limits:
         alone = replace(problem, objective=(Term(limit.measure),))
         if _bound(alone, phasing, phasing.intervals)[0] > limit.maximum * (1.0 + KEPT):
@@ -192,14 +210,14 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
 
 
 def _result(
-    problem: Problem, phasing: Phasing, even: Result | None, found: Sequence[StarDesign], trade: tuple[TradePoint, ...]
-) -> Result:
+    problem: Problem, phasing: Phasing, even: Result | None, found: Sequence[StarDesign],
+    trade: tuple[TradePoint, ...], bound: float, source: str,
+) -> Result:  # fmt: skip
     best = found[0]
-    bound, source = _bound(problem, phasing, phasing.intervals)
     method = f"IPOPT from {len(found)} start(s), firing orders kept; bound from {source}"
     # no norm lies under zero: who reaches it is done
     certificate = certified(
-        best.value, bound, nothing_of(problem), problem.tolerance, Reach.ASIDE, best.kkt_residual, method
+        best.value, bound, nothing_of(problem), problem.tolerance, Reach.NEAR, best.kkt_residual, method
     )
     ranking = [
         ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)

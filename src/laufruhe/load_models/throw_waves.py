@@ -1,0 +1,212 @@
+"""Loads of throws as sums of waves of their angles, with coefficients from the exact model (S26).
+
+Whatever turns with a throw loads by order h as c_h e^{i h theta}: its slider-cranks, their gas and the unbalances
+that ride on it. A norm of loads is then one of rows that are affine in cos(h theta) and sin(h theta) of
+every throw, and in the unbalances.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.machine import Engine
+from laufruhe.machine.firing_windows import lateness
+from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.spectrum import Spectrum, as_order, common_base, orders_equal
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Measure, load_rows, mass_rows, selected
+from laufruhe.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+_LEFT_OUT, _NOTHING, _FEW = 1e-4, 1e-10, 24
+"""Share of the moving parts' root mean square that the orders left out may hold, of the first few next to nothing;
+bounds are lowered by it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """What turns with one throw and fires once, or rides on it.
+
+    Attributes
+    ----------
+    pin
+        Its throw.
+    cylinder
+        Its number from 0; None of unbalances.
+    angle, lap
+        Angle of the throw and whole turns of the firing in the engine that its loads are taken from.
+    """
+
+    pin: int
+    cylinder: int | None
+    engine: Engine
+    angle: float
+    lap: int
+
+
+@dataclass(frozen=True, eq=False)
+class WaveNorm:
+    """N(V0 + B x + sum_p Re sum_h W_ph e^{i h theta_p}), and how far orders left out may move it.
+
+    Attributes
+    ----------
+    fixed
+        V0 and B.
+    waves
+        W of every moving part, shape (parts, orders, k, d), at theta = 0 and no whole turns.
+    left_out
+        What the orders that are left out amount to at most [SI].
+    """
+
+    fixed: AffineNorm
+    waves: NDArray[np.complex128]
+    left_out: float
+
+
+class ThrowWaves:
+    """Norms of a problem as waves of its throws.
+
+    Parameters
+    ----------
+    problem
+        Nothing of its phasing open, its throws anywhere; unbalances that are open ride on no throw.
+    layout
+        Of its engine.
+    rides
+        Throw that every rotor turns with; rotors left out stand still.
+    """
+
+    def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
+        self.problem, self.layout = problem, layout
+        engine = problem.engine
+        self.throws = len(layout.throw_positions)
+        still = tuple(replace(rotor, unbalance=0.0j) if rotor.name in rides else rotor for rotor in engine.rotors)
+        self.parts = _moving(engine, layout, rides)
+        self._alone = [evaluate(problem, part.engine) for part in self.parts]
+        self.rest = AffineModel(replace(problem, engine=replace(engine, slider_cranks=(), rotors=still)), keep_all=True)
+        self.orders = self._kept()
+        self.numbers = np.array([float(order) for order in self.orders])
+        self._turning = [as_order(abs(rotor.shaft.ratio)) for rotor in still]
+        self.base = common_base([order for order in (*self.orders, *self._turning, Fraction(1)) if order])
+        self.rest.base = self.base
+
+    @property
+    def _loads(self) -> list[Measure]:
+        return [measure for measure in self.problem.measures if measure.is_load]
+
+    def _signals(self, measure: Measure, k: int) -> list[Spectrum]:
+        """What counts of one moving part's loads at every operating point that counts."""
+        found, engine = self._alone[k], self.problem.engine
+        shares = measure.shares(self.problem.points)
+        return [
+            selected(measure, signal.series, engine)
+            for signal, share in zip(found.signals(measure.load), shares, strict=True)
+            if share > 0.0
+        ]
+
+    def _kept(self) -> tuple[Fraction, ...]:
+        """The lowest orders, up to where what follows is next to nothing for every measure."""
+        # what rides on a throw turns once a turn
+        kept = {Fraction(1)}
+        for measure in self._loads:
+            squares: dict[Fraction, float] = {}
+            for signal in (one for k in range(len(self.parts)) for one in self._signals(measure, k)):
+                sizes = np.square(np.abs(signal.coefficients)).reshape(len(signal.coefficients), -1).sum(axis=1)
+                for j in np.flatnonzero(sizes):
+                    order = int(j) * signal.base
+                    squares[order] = squares.get(order, 0.0) + float(sizes[j])
+            ordered = sorted(squares)
+            tail = np.cumsum([squares[order] for order in ordered[::-1]])[::-1]
+            shares = [_NOTHING if k < _FEW else _LEFT_OUT for k in range(len(ordered))]
+            told = zip(ordered, tail, shares, strict=True)
+            kept |= {order for order, rest, share in told if rest > share**2 * tail[0]}
+        return tuple(sorted(kept))
+
+    def _left_out(self, measure: Measure, k: int) -> float:
+        """What the orders of a part that are left out amount to at most, wherever its throw stands."""
+        total = 0.0
+        for signal in self._signals(measure, k):
+            sizes = np.linalg.norm(signal.coefficients[~orders_equal(signal.orders, self.numbers)], axis=-1)
+            if measure.norm.is_euclidean or measure.norm.averages:
+                # neither is more than the root mean square, at the place where that is largest
+                total = max(total, float(np.sqrt(np.square(sizes).sum(axis=0)).max(initial=0.0)))
+            else:
+                # no peak, nor any peak to peak, is more than twice the sum of the lengths
+                total = max(total, 2.0 * float(sizes.sum(axis=0).max(initial=0.0)))
+        return total
+
+    def norm(self, measure: Measure, samples: int) -> WaveNorm:
+        """A measure at equal steps over the period, means averaged about them so that bounds hold between (P7)."""
+        fixed = self.rest.norm(measure, samples, averaged=True)
+        waves = np.zeros((len(self.parts), len(self.orders), *fixed.constant.shape), complex)
+        left_out = 0.0
+        for k, part in enumerate(self.parts):
+            if measure.is_mass and part.cylinder is None:
+                h = self.orders.index(Fraction(1))
+                waves[k, h] = self._weights(measure, part) * self._turned(part)[h]
+            if not measure.is_load:
+                continue
+            waves[k] = self._waves(measure, self._alone[k].signals(measure.load), samples) * self._turned(part)
+            left_out += self._left_out(measure, k)
+        return WaveNorm(fixed, waves, left_out)
+
+    def _weights(self, measure: Measure, part: Moving) -> NDArray[np.complex128]:
+        """Rows of the masses that ride on a throw, which turn with it."""
+        engine = self.problem.engine
+        riding = {rotor.name: rotor.unbalance for rotor in part.engine.rotors}
+        rows = [
+            mass_rows(measure, [replace(r, unbalance=turn * riding.get(r.name, 0.0)) for r in engine.rotors]).vectors
+            for turn in (1.0, 1.0j)
+        ]
+        return np.asarray(rows[0] - 1j * rows[1])
+
+    def _waves(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> NDArray[np.complex128]:
+        """Rows of every order of a part: the real part as it is, and turned by a quarter of its wave."""
+        places = [round(order / self.base) for order in self.orders]
+        own = [np.array([signal.at(order) for order in self.numbers]) for signal in signals]
+        nowhere, found = [np.zeros(0)] * len(signals), []
+        for h, j in enumerate(places):
+            rows = []
+            for turn in (1.0, -1.0j):
+                alone = []
+                for values in own:
+                    coefficients = np.zeros((j + 1, *values.shape[1:]), complex)
+                    coefficients[j] = turn * values[h]
+                    one = Spectrum(self.base, coefficients)
+                    alone.append(one.averaged(one.period / samples) if measure.norm.averages else one)
+                engine = self.problem.engine
+                rows.append(load_rows(measure, self.problem.points, alone, engine, samples, nowhere).vectors)
+            found.append(rows[0] + 1j * rows[1])
+        return np.array(found)
+
+    def _turned(self, part: Moving) -> NDArray[np.complex128]:
+        """Every order back to theta = 0 and no whole turns, shape (orders, 1, 1)."""
+        return np.asarray(np.exp(-1j * self.numbers * (part.angle - math.tau * part.lap))[:, None, None])
+
+    def samples(self, measure: Measure, wanted: int) -> int:
+        """Steps at which squares are exact, or as many as wanted."""
+        turning = (*self.orders, *self._turning)
+        highest = max((order for order in turning if measure.counted([float(order)])[0]), default=Fraction(1))
+        return 2 * int(highest / self.base) + 2 if measure.norm.is_euclidean else wanted
+
+
+def _moving(engine: Engine, layout: Layout, rides: dict[str, int]) -> list[Moving]:
+    """Every cylinder, and what rides on every throw."""
+    out, angles, late = [], {}, lateness(layout)
+    for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
+        angles[pin] = part.throw - layout.pin_offsets[k]
+        lap = round((part.firing_angle + late[k] + angles[pin]) / math.tau)
+        out.append(Moving(pin, k, replace(engine, slider_cranks=(part,), rotors=()), angles[pin], lap))
+    for pin in sorted(set(rides.values())):
+        riding = tuple(rotor for rotor in engine.rotors if rides.get(rotor.name) == pin and rotor.unbalance)
+        if riding:
+            out.append(Moving(pin, None, replace(engine, slider_cranks=(), rotors=riding), angles[pin], 0))
+    return out

@@ -1,0 +1,320 @@
+"""Branch and bound over throws that leave the even steps: firing windows first, then boxes of angles (S29)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.amplitudes import amplitude_objective
+from laufruhe.load_models.throw_waves import ThrowWaves
+from laufruhe.load_models.uneven_model import rides_of
+from laufruhe.machine.firing_windows import FiringBounds, FiringWindow
+from laufruhe.problem.evaluation import over
+from laufruhe.problem.measure import Measure, Term, load_rows
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.phasing import Candidate, Intervals
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.solvers.box_search import divided
+from laufruhe.solvers.ranking import ranked_orders
+from laufruhe.solvers.star_design import StarDesign
+from laufruhe.solvers.throw_boxes import ThrowBox, ThrowPrograms
+from laufruhe.solvers.throw_riders import Riders
+
+Array = NDArray[np.float64]
+Improve = Callable[[Candidate], StarDesign | None]
+"""The best design near a candidate, and only the allowed one."""
+
+MOST_WINDOWS = 6_000
+MOST_BOXES = 400
+FEWEST_SAMPLES, MOST_SAMPLES = 96, 384
+# of the best design, that steps over the period may cost
+STEPS_COST = 1e-3
+# of the tolerance by which a design has to be better, for a box to be looked at
+SHARE = 0.5
+# windows that are tried for a crank that can be evaluated
+_MOST_REALISED = 50
+# boxes whose middle is tried: the first few, and one of so many
+_TRIED_FIRST, _TRIED_EACH, _MOST_TRIED = 2, 100, 5
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What boxes of throws told.
+
+    Attributes
+    ----------
+    bound
+        Of every design; infinite where none is allowed.
+    best
+        The best design, None where none was found.
+    boxes
+        How many were looked at.
+    told
+        Limits that no throws keep together, where none is allowed.
+    """
+
+    bound: float
+    best: StarDesign | None
+    boxes: int
+    told: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A box, and the set of shafts that it is of; all throws where it has no box."""
+
+    bound: float
+    box: ThrowBox | None = None
+    programs: ThrowPrograms | None = None
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether there is nothing left to cut."""
+        return self.box is not None and self.box.is_exact
+
+
+@dataclass(frozen=True, eq=False)
+class _Best:
+    design: StarDesign | None
+
+    @property
+    def value(self) -> float:
+        """Infinite where none was found."""
+        return math.inf if self.design is None else self.design.value
+
+
+def search_throws(
+    problem: Problem, phasing: Phasing, best: StarDesign | None, floor: float, improve: Improve
+) -> Searched | None:
+    """What no throws go under, and the best that was found on the way; None where boxes say nothing.
+
+    Parameters
+    ----------
+    best
+        The best design known.
+    floor
+        A bound that holds.
+    improve
+        Told of throws that look good.
+    """
+    if not _suits(problem, phasing):
+        return None
+    windows = windows_of(problem, phasing)
+    if windows is None:
+        return None
+    if not windows:
+        return None if best is not None else Searched(math.inf, None, 0, ())
+    try:
+        search = _Search(problem, phasing, windows, improve, best)
+    except ModelError:
+        # a throw alone may drive what no mount carries
+        return None
+    most = len(search.roots) + (MOST_BOXES if problem.search.boxes is None else problem.search.boxes)
+    found, bound, boxes = divided(
+        search, _Part(floor), _Best(best), nothing_of(problem), problem.tolerance + search.cost, most,
+        "boxes of throws",
+    )  # fmt: skip
+    return Searched(min(bound, search.cut(found.value)), found.design, boxes, search.conflict)
+
+
+def _suits(problem: Problem, phasing: Phasing) -> bool:
+    """Whether banks and pins are given, and waves know what is asked."""
+    if any(pair is not None and pair[0] < pair[1] for pair in (phasing.bank, phasing.split)):
+        return False
+    if problem.feels_gas and any(r.shaft.ratio != round(r.shaft.ratio) for r in problem.engine.rotors):
+        return False
+    return bool(problem.objective) and all(_is_known(problem, term.measure) for term in problem.objective)
+
+
+def _is_known(problem: Problem, measure: Measure) -> bool:
+    """Whether its orders are all there is of it: a peak of the gas has more."""
+    return not (problem.feels_gas and measure.feels_gas and measure.norm.refinement > 1)
+
+
+def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
+    """Every way to fire within the bounds, one of images that are worth the same; None if there are too many."""
+    layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
+    firing = firing_of(phasing)
+    free = allowed.least <= 0.0 and allowed.most >= phasing.cycle.angle
+    if phasing.throw_bounds is not None and free and phasing.firing_order is None and not problem.feels_gas:
+        # in which order they fire makes no difference
+        return [firing.anywhere]
+    found = list(itertools.islice(firing.windows(), 4 * MOST_WINDOWS + 1))
+    if len(found) <= 4 * MOST_WINDOWS and _has_images(problem, phasing):
+        found = _without_images(found, len(layout.positions))
+    if len(found) > MOST_WINDOWS:
+        return [firing.anywhere] if phasing.throw_bounds is not None and not problem.feels_gas else None
+    return found
+
+
+def firing_of(phasing: Phasing) -> FiringBounds:
+    """What firing has to keep."""
+    layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
+    return FiringBounds(
+        phasing.cycle, layout, max(allowed.least, 0.0), allowed.most, phasing.throw_bounds, phasing.firing_order
+    )
+
+
+def _has_images(problem: Problem, phasing: Phasing) -> bool:
+    """Whether swapping front and back, or turning the other way, changes nothing (S2)."""
+    if phasing.throw_bounds is not None or phasing.firing_order is not None or phasing.bank is not None:
+        return False
+    layout = phasing.layout(None, None)
+    places = sorted(layout.throw_positions)
+    if any(abs(a + b) > 1e-9 * places[-1] for a, b in zip(places, places[::-1], strict=True)):
+        return False
+    asked = [Term(limit.measure) for limit in problem.limits]
+    alone = replace(problem, phasing=None, objective=(*problem.objective, *asked), limits=())
+    return amplitude_objective(alone, phasing, layout) is not None
+
+
+def _without_images(windows: Sequence[FiringWindow], count: int) -> list[FiringWindow]:
+    kept = []
+    for window in windows:
+        mirrored = tuple(count + 1 - number for number in window.order)
+        images = [_from_one(order) for own in (window.order, mirrored) for order in (own, own[::-1])]
+        if window.order == min(images):
+            kept.append(window)
+    return kept
+
+
+def _from_one(order: tuple[int, ...]) -> tuple[int, ...]:
+    first = order.index(1)
+    return (*order[first:], *order[:first])
+
+
+class _Search:
+    """Windows and boxes of the throws of a problem."""
+
+    is_shared = False
+
+    def __init__(
+        self, problem: Problem, phasing: Phasing, windows: Sequence[FiringWindow], improve: Improve,
+        best: StarDesign | None,
+    ) -> None:  # fmt: skip
+        self._problem, self._phasing, self._improve = problem, phasing, improve
+        self._seen = self._tried = 0
+        self._best, self._not_met = _Best(best), set[str]()
+        # share of the best design that no bound gets back: steps over the period, orders left out
+        self.cost, self._samples = 0.0, FEWEST_SAMPLES
+        while best is not None and self._steps_cost(best) > STEPS_COST and 2 * self._samples <= MOST_SAMPLES:
+            self._samples *= 2
+        self.roots: list[tuple[ThrowPrograms, FiringWindow, tuple[str, ...]]] = []
+        free = all(decision.set.lower <= 0.0 for decision in problem.unbalances)
+        for built in phasing.shafts.largest if free else phasing.shafts.allowed:
+            left_out = phasing.without(built)
+            programs = self._programs(windows, left_out)
+            self.roots += [(programs, window, left_out) for window in windows]
+            if best is not None and best.value > 0.0:
+                self.cost = max(self.cost, self._steps_cost(best) + programs.left_out / best.value)
+
+    def _steps_cost(self, best: StarDesign) -> float:
+        """Share of a design's value that means averaged about the steps lose (P7)."""
+        problem, found = best.result.problem, best.result.final
+        lost = 0.0
+        for term in problem.objective:
+            if term.measure.is_load and term.measure.norm.averages:
+                signals = over(problem.engine.cycle.base_order, found.signals(term.measure.load))
+                averaged = [signal.averaged(signal.period / self._samples) for signal in signals]
+                rows = load_rows(term.measure, problem.points, averaged, found.engine, 4 * self._samples)
+                lost += term.weight * max(found.value(term.measure) - rows.value, 0.0)
+        return lost / best.value if best.value > 0.0 else 0.0
+
+    def _programs(self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]) -> ThrowPrograms:
+        phasing, layout = self._phasing, self._phasing.layout(*self._phasing.least_geometry)
+        for k, window in enumerate(windows):
+            candidate = replace(self.candidate(window, amid(window)), left_out=left_out)
+            try:
+                realised = replace(phasing.realise(candidate), phasing=None)
+            except ModelError:
+                # what fires all but at once has no order
+                if k + 1 < min(len(windows), _MOST_REALISED):
+                    continue
+                raise
+            limits = tuple(limit for limit in realised.load_limits if _is_known(realised, limit.measure))
+            rides = rides_of(phasing, candidate)
+            riders = Riders(replace(realised, limits=limits), rides, candidate.throws)
+            waves = ThrowWaves(riders.problem, layout, rides)
+            return ThrowPrograms(waves, riders, firing_of(phasing), self._samples)
+        raise ModelError("no crank fires")
+
+    def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
+        """A design with these throws, and with a firing order that they keep."""
+        told = tuple(float(angle) % math.tau for angle in throws)
+        found = Candidate(told, window.order or None, *self._phasing.least_geometry)
+        if window.order:
+            return found
+        orders = ranked_orders(replace(self._phasing, intervals=Intervals(0.0, math.inf)), found)
+        return replace(found, firing_order=orders[0].order if orders else None)
+
+    @property
+    def conflict(self) -> tuple[str, ...]:
+        """Limits that were not met in boxes."""
+        return tuple(limit.name for limit in self._problem.limits if limit.name in self._not_met)
+
+    def told(self, conflict: Sequence[str]) -> None:
+        """Of boxes that another divided: there is no other."""
+
+    def cut(self, value: float) -> float:
+        """What a design has to be better than."""
+        return value * (1.0 - SHARE * self._problem.tolerance)
+
+    def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | None, _Best | None]]:
+        """Windows of all throws, halves of a box."""
+        if part.box is not None and part.programs is not None:
+            for half in part.programs.parts(part.box, self.cut(value)):
+                yield self._looked(part.programs, half, part.left_out)
+            return
+        for programs, window, left_out in self.roots:
+            cut = self.cut(min(value, self._best.value))
+            found = programs.box(programs.program(window), *window.box, part.bound, cut, is_new=True)
+            yield self._looked(programs, found, left_out)
+
+    def _looked(
+        self, programs: ThrowPrograms, found: ThrowBox | None, left_out: tuple[str, ...]
+    ) -> tuple[_Part | None, _Best | None]:
+        """A box, and a better design near its middle."""
+        self._not_met |= programs.told
+        if found is None:
+            return None, None
+        self._seen += 1
+        tried = self._tried < _MOST_TRIED and (self._seen <= _TRIED_FIRST or self._seen % _TRIED_EACH == 0)
+        if tried:
+            self._tried += 1
+            window = found.program.window
+            candidate = replace(self.candidate(window, nearest(window, found.middle)), left_out=left_out)
+            improved = self._improve(candidate) if candidate.firing_order is not None else None
+            self._best = self.better(self._best, _Best(improved))
+        return _Part(found.bound, found, programs, left_out), self._best if tried else None
+
+    @staticmethod
+    def better(best: _Best, found: _Best) -> _Best:
+        """The better of two designs."""
+        return found if found.value < best.value else best
+
+
+def amid(window: FiringWindow) -> Array:
+    """Throws inside a window, each in the middle of what those before it leave to it."""
+    low, high = window.box
+    for k in range(len(low)):
+        here = np.arange(len(low)) == k
+        at = 0.5 * (low[k] + high[k])
+        low, high = window.within(np.where(here, at, low), np.where(here, at, high)) or (low, high)
+    return np.asarray(0.5 * (low + high))
+
+
+def nearest(window: FiringWindow, throws: Array) -> Array:
+    """Throws that keep a window, each as near as those before it let it come."""
+    low, high = window.box
+    for k, angle in enumerate(throws):
+        at = float(np.clip(angle, low[k], high[k]))
+        here = np.arange(len(low)) == k
+        low, high = window.within(np.where(here, at, low), np.where(here, at, high)) or (low, high)
+    return np.asarray(0.5 * (low + high))
