@@ -51,16 +51,18 @@ class Search(Protocol[B, F]):
     ----------
     is_shared
         Whether other processes may divide its boxes.
-    conflict
-        Limits that were not met in boxes.
     """
 
     is_shared: bool
-    conflict: tuple[str, ...]
+
+    @property
+    def conflict(self) -> tuple[str, ...]:
+        """Limits that were not met in boxes."""
 
     def parts(self, box: B, value: float) -> Iterator[tuple[B | None, F | None]]:
-        """Boxes that cover one together, None for each in which no design is allowed, or none better than a value;
-        and a design from each, None where none was sought.
+        """Boxes that cover one together, and a design from each, None where none was sought.
+
+        Of a box in which no design is allowed, or none better than a value, there is None.
         """
 
     def better(self, best: F, found: F) -> F:
