@@ -92,7 +92,9 @@ class Evaluation:
 
     def standing(self, limit: Limit) -> Standing:
         """How this design stands to a limit (E15)."""
-        pairs = ((value, *limit.room(value)) for value in self.values(limit.measure))
+        # of a shaft that was left out there is no place to limit
+        nothing = math.inf if limit.maximum == math.inf else max(limit.minimum, 0.0)
+        pairs = ((value, *limit.room(value)) for value in self.values(limit.measure) or (nothing,))
         value, room, edge, side = min(pairs, key=lambda found: found[1])
         return Standing(value, edge, side, -room)
 
