@@ -1,4 +1,4 @@
-"""Laufruhe: the balance of piston engines, designed by optimisation and proven.
+"""Laufruhe: the balance of piston engines, designed by optimisation and proven (docs/reference.md).
 
 >>> import laufruhe
 >>> problem = laufruhe.load("problems/tractor-four-lanchester.toml")
@@ -7,64 +7,139 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias, Union
+
+from laufruhe.errors import InputError, LaufruheError, ModelError, SolverError
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem.problem import Problem
     from laufruhe.solvers.result import Result
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "evaluate", "load", "solve"]
+__all__ = [
+    "InputError",
+    "LaufruheError",
+    "ModelError",
+    "SolverError",
+    "__version__",
+    "evaluate",
+    "load",
+    "solve",
+    "study",
+]
+
+Source: TypeAlias = Union[str, Path, Mapping[str, Any]]  # noqa: UP007
+"""A file, its text, or its tables."""
 
 
-def load(path: str | Path) -> Problem:
-    """Read and check a problem file.
+def load(source: Source) -> Problem:
+    """Read and check a problem.
+
+    Parameters
+    ----------
+    source
+        Path of a problem file, its text, or its tables as a dictionary.
 
     Raises
     ------
-    laufruhe.errors.InputError
+    InputError
         With one line for everything wrong: file, key, value, rule, remedy.
     """
     from laufruhe.files.reader import load as read
 
-    return read(path)
+    return read(source)
 
 
-def solve(problem: Problem, time_limit: float | None = None) -> Result:
+def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
     """Decide what a problem leaves open; the result says what of it is proven.
 
     Parameters
     ----------
     problem
-        As `load` reads it.
+        As `load` reads it, or what `load` takes.
     time_limit
         Seconds after which the search ends with the best design that it has, and with its bound.
+
+    Raises
+    ------
+    InputError
+        If the problem is wrong.
+    ModelError
+        If the engine cannot be evaluated as given.
+    SolverError
+        If a solver stops without an answer.
     """
     from laufruhe.solvers import solve as decide
 
-    return decide(problem, time_limit=time_limit)
+    return decide(_problem(problem), time_limit=time_limit)
 
 
-def evaluate(design: Problem | Engine, points: Sequence[OperatingPoint] = ()) -> Result:
+def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint] = ()) -> Result:
     """Evaluate a design as given.
 
     Parameters
     ----------
     design
-        A problem, or an engine with the operating points beside it.
+        A problem, what `load` takes, or an engine with the operating points beside it.
     points
         Of an engine that stands in no problem.
+
+    Raises
+    ------
+    InputError
+        If the problem is wrong.
+    ModelError
+        If the engine cannot be evaluated, or has no operating point.
     """
+    from laufruhe.machine import Engine
     from laufruhe.problem import channels
     from laufruhe.problem.measure import Measure, Term
     from laufruhe.problem.problem import Problem
     from laufruhe.solvers import state
 
-    if isinstance(design, Problem):
-        return state(design)
+    if not isinstance(design, Engine):
+        return state(_problem(design))
+    if not points:
+        raise ModelError(f"'{design.name}' has no operating point; give points")
     channel = channels.MOUNT_FORCE if design.mounts else channels.SHAKING_FORCE
     wanted = (Term(Measure(channel)),)
     return state(Problem(design.name, design.name, design, tuple(points), objective=wanted))
+
+
+def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:
+    """Run the sweeps and comparisons of a study; one dataset a part, by its name.
+
+    Parameters
+    ----------
+    source
+        Path of a study file, its text, or its tables. Problems that it names lie beside it, or in the working folder.
+    jobs
+        Processes that may be used.
+
+    Raises
+    ------
+    InputError
+        If the study or one of its problems is wrong.
+    """
+    from tempfile import TemporaryDirectory
+
+    from laufruhe.files.reader import given
+    from laufruhe.studies.kept_points import KEPT
+    from laufruhe.studies.reader import load_study
+    from laufruhe.studies.runner import run
+
+    _, path = given(source)
+    with TemporaryDirectory() as folder:
+        datasets, _ = run(load_study(source), path.parent, Path(folder) / KEPT, jobs=jobs)
+    return datasets
+
+
+def _problem(given: Problem | Source) -> Problem:
+    from laufruhe.problem.problem import Problem
+
+    return given if isinstance(given, Problem) else load(given)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import copy
+import os
 import re
 import sys
 import tomllib
 from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from laufruhe.errors import Complaint, InputError, ModelError
+from laufruhe.errors import Complaint, InputError, ModelError, printed
+from laufruhe.files import edits
 from laufruhe.files.asked import Scene, limits_of, objective_of
 from laufruhe.files.bearings import bearings_of
 from laufruhe.files.catalogue import with_catalogue
@@ -42,22 +45,34 @@ from laufruhe.problem.tolerance import Path as Place
 DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 10_000_000
 """Of a file: tables within tables, entries of one list or table, and bytes."""
 LARGEST = 2**63 - 1
-STDIN = Path("-")
+STDIN, UNNAMED = Path("-"), Path("problem")
 MOST_OPEN = 200
 # control characters but tab and line feed, and those that turn the direction of reading
 _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 
 
-def load(path: str | Path) -> Problem:
-    """Read and check a problem file.
+def load(source: str | Path | Mapping[str, Any]) -> Problem:
+    """Read and check a problem: a file, its text, or its tables.
 
     Raises
     ------
     InputError
         With one line for everything wrong: file, key, value, rule, remedy.
     """
-    path = Path(path)
-    return load_tables(tables_of(path), shown_as(path))
+    return load_tables(*given(source))
+
+
+def given(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]:
+    """Tables of a file, of a text or as they are, and by what name they are spoken of."""
+    if isinstance(source, Mapping):
+        return _whole(copy.deepcopy(dict(source)), UNNAMED), UNNAMED
+    if isinstance(source, str) and ("\n" in source or "=" in source):
+        return _whole(_parsed(source.encode("utf-8"), UNNAMED), UNNAMED), UNNAMED
+    if not isinstance(source, str | os.PathLike):
+        rule, remedy = f"is a {type(source).__name__}", "give a path, the text of a problem file, or its tables"
+        raise InputError("laufruhe", (Complaint("problem", printed(repr(source), 60), rule, remedy),))
+    path = Path(source)
+    return tables_of(path), shown_as(path)
 
 
 def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
@@ -76,7 +91,9 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
         problem = _of_file(file, path)
         each = tolerances_of(written, file.tolerances, problem, plain)
         over = over_of(file.robust, each)
-        return problem.changed(tolerances=Tolerances(each, _Rebuilt(plain, path)), over=over) if each else problem
+        if each:
+            problem = problem.changed(tolerances=Tolerances(each, _Rebuilt(plain, path)), over=over)
+        return replace(problem, origin=_Origin(tables, path))
     except Refused as refused:
         raise InputError(str(path), (refused.complaint,)) from None
     except ModelError as error:
@@ -94,6 +111,35 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
         return _assembled(file, file.engine, path=path)
     closed = partial(_assembled, file, path=path)
     return opened(file.engine, file.balancer_shafts, file.phasing, closed)
+
+
+@dataclass(frozen=True)
+class _Origin:
+    """The file of a problem, for other problems that differ in some of its numbers."""
+
+    tables: Mapping[str, Any]
+    path: Path
+
+    def with_values(self, values: Mapping[str, Any]) -> Problem:
+        """Numbers at other values."""
+        return self._edited(*(partial(edits.with_value, name=name, value=value) for name, value in values.items()))
+
+    def opened(self, name: str, low: Any, high: Any, start: Any) -> Problem:
+        """A number left open."""
+        return self._edited(partial(edits.opened, name=name, low=low, high=high, start=start))
+
+    def fixed(self, name: str, value: Any) -> Problem:
+        """A number fixed."""
+        return self._edited(partial(edits.fixed, name=name, value=value))
+
+    def _edited(self, *each: Callable[[Mapping[str, Any]], dict[str, Any]]) -> Problem:
+        tables: Mapping[str, Any] = self.tables
+        try:
+            for edit in each:
+                tables = edit(tables)
+        except Refused as refused:
+            raise InputError(str(self.path), (refused.complaint,)) from None
+        return load_tables(tables, self.path)
 
 
 @dataclass(frozen=True)
@@ -119,7 +165,11 @@ def tables_of(path: Path) -> dict[str, Any]:
     `-` is read from standard input. An engine of the catalogue is written out in the tables.
     """
     content, path = (_typed(), shown_as(path)) if path == STDIN else (_content(path), path)
-    tables = _parsed(content, path)
+    return _whole(_parsed(content, path), path)
+
+
+def _whole(tables: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Tables as a user gave them, looked through, an engine of the catalogue written out."""
     _check_shape(tables, path)
     try:
         return with_catalogue(tables)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol, TypeAlias
 
+from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.decision import Decision, Kind, Numbers, moved_numbers
@@ -31,6 +32,19 @@ class Search:
     starts: int = 16
     seed: int = 0
     boxes: int | None = None
+
+
+class Origin(Protocol):
+    """The file of a problem, in which numbers may be changed by name."""
+
+    def with_values(self, values: Mapping[str, Any]) -> Problem:
+        """Numbers at other values."""
+
+    def opened(self, name: str, low: Any, high: Any, start: Any) -> Problem:
+        """A number left open."""
+
+    def fixed(self, name: str, value: Any) -> Problem:
+        """A number fixed."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -67,6 +81,8 @@ class Problem:
         How far built engines stand from the drawing.
     over
         Of which of them what is minimised and limited is taken; None for the drawing.
+    origin
+        The file that it was read from; None where it was made or changed in code.
     """
 
     name: str
@@ -85,6 +101,7 @@ class Problem:
     phasing: Phasing | None = None
     tolerances: Tolerances = NO_TOLERANCES
     over: Over | None = None
+    origin: Origin | None = field(default=None, compare=False, repr=False)
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"
@@ -199,8 +216,40 @@ class Problem:
             return None
         return units.pop() if len(units) == 1 else ""
 
+    def with_values(self, values: Mapping[str, Any]) -> Problem:
+        """The problem with other numbers, by the names that results show, or by paths as studies have them.
+
+        A number that is open starts there and stays open.
+
+        Parameters
+        ----------
+        values
+            As a file has them: `{"front web.mass": "1.2 kg", "engine.rod_ratio": 0.28}`.
+
+        Raises
+        ------
+        laufruhe.errors.InputError
+            In the words of a file with that number.
+        """
+        return self._origin.with_values(values)
+
+    def open(self, name: str, low: Any, high: Any, start: Any = None) -> Problem:
+        """The problem with one more number open between two bounds; it starts where it stands unless told."""
+        return self._origin.opened(name, low, high, start)
+
+    def fix(self, name: str, value: Any = None) -> Problem:
+        """The problem with one number fixed, at a value or where it starts."""
+        return self._origin.fixed(name, value)
+
+    @property
+    def _origin(self) -> Origin:
+        if self.origin is None:
+            raise ModelError(f"{self.name} was made or changed in code; change numbers of what was loaded, before that")
+        return self.origin
+
     def changed(self, **changes: Any) -> Problem:
         """The same problem with other attributes, every design of an open star included."""
+        changes = {"origin": None, **changes}
         if self.phasing is not None:
             realise = self.phasing.realise
             phasing = replace(self.phasing, realise=lambda candidate: realise(candidate).changed(**changes))

@@ -15,7 +15,7 @@ from laufruhe.errors import Complaint, InputError
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
 from laufruhe.files.problem_file import schema_text
-from laufruhe.files.reader import shown_as, tables_of
+from laufruhe.files.reader import given
 from laufruhe.files.study_tables import MOST_POINTS, joined
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.part import Part
@@ -65,9 +65,12 @@ def _once(found: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple[Compla
     return tuple(kept.values())
 
 
-def load_study(path: Path) -> StudyFile:
-    """Read and check a study file; `InputError` with one line for everything wrong: file, key, value, rule, remedy."""
-    tables, path = tables_of(path), shown_as(path)
+def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
+    """Read and check a study, a file, its text or its tables.
+
+    `InputError` with one line for everything wrong: file, key, value, rule, remedy.
+    """
+    tables, path = given(source)
     if "study" not in tables:
         raise _refused(path, "study", "", "is missing, so this is no study file", "use laufruhe solve for a problem")
     try:

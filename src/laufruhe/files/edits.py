@@ -1,0 +1,136 @@
+"""Numbers of a problem changed by the names that results show: given another value, left open, or fixed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, TypeAlias
+
+from laufruhe import units
+from laufruhe.files.complaints import Refused, nearest
+from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.study_tables import keys_of
+
+Keys: TypeAlias = tuple[Any, ...]
+_AXES = {"x": 0, "y": 1, "z": 2}
+_SIZES = ("mass", "unbalance", "balance_factor")
+_ACROSS = {"y": 0, "z": 1}
+_NUMBER = re.compile(r"\s*-\s*(?=[\d.])")
+
+
+def with_value(tables: Mapping[str, Any], name: str, value: Any) -> dict[str, Any]:
+    """The number at another value; where it is open, it starts there and stays open."""
+    keys = keys_by_name(tables, name)
+    now = _at(tables, keys)
+    return _put(tables, keys, {**now, "start": value} if _is_open(now) else value)
+
+
+def opened(tables: Mapping[str, Any], name: str, low: Any, high: Any, start: Any = None) -> dict[str, Any]:
+    """The number left open between two bounds; it starts where it stands unless told."""
+    keys = keys_by_name(tables, name)
+    now = _at(tables, keys)
+    given = start if start is not None else now.get("start") if _is_open(now) else now
+    return _put(tables, keys, {"between": [low, high], **({} if given is None else {"start": given})})
+
+
+def fixed(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[str, Any]:
+    """The number no longer open: at a value, or where it starts."""
+    keys = keys_by_name(tables, name)
+    now = _at(tables, keys)
+    if value is None:
+        if not _is_open(now):
+            raise Refused(name, now, "is not open", "give the value that it is to have")
+        value = now.get("start", _start(*now["between"]))
+    found = _put(tables, keys, value)
+    # an angle is open with its size, or not at all
+    if keys[-1] in _SIZES and _is_open(_at(found, (*keys[:-1], "angle"))):
+        return fixed(found, f"{name.rpartition('.')[0]}.angle")
+    return found
+
+
+def _start(low: Any, high: Any) -> Any:
+    """Where a number that is open stands if the file does not say: at zero, or the bound that is nearest."""
+    if not _is_negative(low):
+        return low
+    if _is_negative(high):
+        return high
+    unit = units.unit_of(low) if isinstance(low, str) else ""
+    return f"0 {unit}".rstrip() if isinstance(low, str) else 0
+
+
+def _is_negative(value: Any) -> bool:
+    return _NUMBER.match(value) is not None if isinstance(value, str) else value < 0
+
+
+def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
+    """Keys and places that lead to a number: by the name that a result shows, or by a path as studies have it."""
+    first, _, rest = name.partition(".")
+    if first in ProblemFile.model_fields and rest:
+        parent, _, last = name.rpartition(".")
+        keys = keys_of(dict(tables), parent)
+        here = _at(tables, keys)
+        return (*keys, last) if isinstance(here, dict) else keys_of(dict(tables), name)
+    named = list(_named(tables))
+    known = [(label, keys) for label, keys in named if name.startswith(f"{label}.")]
+    for label, keys in sorted(known, key=lambda pair: -len(pair[0])):
+        found = _below(_at(tables, keys), name.removeprefix(f"{label}.").split("."))
+        if found is not None:
+            return (*keys, *found)
+    raise Refused(name, None, "is no number of this problem", nearest(name, _examples(tables, named)))
+
+
+def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
+    """Weights, unbalances of shafts, shafts and mounts by the names that results show."""
+    for k, weight in enumerate(tables.get("counterweights", ())):
+        yield weight.get("name", ""), ("counterweights", k)
+    for k, shaft in enumerate(tables.get("balancer_shafts", ())):
+        unbalances = shaft.get("unbalances", ())
+        single = len(unbalances) == 1 and "name" not in unbalances[0]
+        for j, unbalance in enumerate(unbalances):
+            label = shaft.get("name", "") if single else f"{shaft.get('name', '')}.{unbalance.get('name', j + 1)}"
+            yield label, ("balancer_shafts", k, "unbalances", j)
+        yield shaft.get("name", ""), ("balancer_shafts", k)
+    for k, place in enumerate(tables.get("mounts", {}).get("places", ())):
+        yield place.get("name", str(k + 1)), ("mounts", "places", k)
+
+
+def _below(here: Mapping[str, Any], words: list[str]) -> Keys | None:
+    """What a name says after that of its table; None where it says nothing of it."""
+    if len(words) == 2 and words[1] in _AXES and isinstance(here.get(words[0]), list):
+        return words[0], _AXES[words[1]]
+    if len(words) == 1 and words[0] in _ACROSS and "ratio" in here:
+        return "position", _ACROSS[words[0]]
+    others = (*_SIZES, "angle", "x", "radius", "loss_factor")
+    return (words[0],) if len(words) == 1 and (words[0] in here or words[0] in others) else None
+
+
+def _examples(tables: Mapping[str, Any], named: Sequence[tuple[str, Keys]]) -> list[str]:
+    numbers = (int, float, str, dict)
+    return [
+        f"{label}.{key}"
+        for label, keys in named
+        for key, value in _at(tables, keys).items()
+        if key not in ("name", "mirror_of") and isinstance(value, numbers) and not isinstance(value, bool)
+    ] or ["engine.stroke"]
+
+
+def _is_open(value: Any) -> bool:
+    return isinstance(value, dict) and "between" in value
+
+
+def _at(tables: Mapping[str, Any], keys: Keys) -> Any:
+    here: Any = tables
+    for key in keys:
+        here = here.get(key) if isinstance(here, dict) else here[key]
+    return here
+
+
+def _put(tables: Mapping[str, Any], keys: Keys, value: Any) -> dict[str, Any]:
+    """Tables with another value at a place; the rest is shared with those given."""
+    whole: Any = dict(tables)
+    here = whole
+    for key in keys[:-1]:
+        here[key] = here[key].copy()
+        here = here[key]
+    here[keys[-1]] = value
+    return whole  # type: ignore[no-any-return]

@@ -1,0 +1,35 @@
+"""The Python reference says what is so: every call in it is made."""
+
+from __future__ import annotations
+
+import doctest
+import re
+from pathlib import Path
+
+import pytest
+
+import laufruhe
+from laufruhe.files.ready import copies
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.result import Result
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference.md"
+
+
+def test_answers_are_those_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tractor-single.toml").write_text(copies(["tractor-single"])["tractor-single.toml"], encoding="utf-8")
+    text = "\n".join(re.findall(r"```pycon\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL))
+    test = doctest.DocTestParser().get_doctest(text, {}, "reference", str(PAGE), 0)
+    told: list[str] = []
+    assert doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(test, out=told.append).failed == 0, told
+
+
+def test_everything_public_is_on_the_page() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    for name in set(laufruhe.__all__) - {"__version__"}:
+        assert re.search(rf"\b{name}\b", text), name
+    for owner, names in ((Problem, ("with_values", "open", "fix")), (Result, ("forces", "orders", "modes"))):
+        for name in names:
+            assert getattr(owner, name).__doc__
+            assert re.search(rf"\b{name}\(", text), name

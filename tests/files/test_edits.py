@@ -1,0 +1,124 @@
+"""Numbers of a problem changed by name are those of a file that has them so."""
+
+from __future__ import annotations
+
+import pickle
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import laufruhe
+from laufruhe.errors import InputError, LaufruheError, ModelError
+from laufruhe.problem.problem import Problem
+from problem_files import PROBLEMS
+
+LANCHESTER = PROBLEMS / "tractor-four-lanchester.toml"
+ELASTIC = PROBLEMS / "tractor-four-elastic.toml"
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return laufruhe.load(LANCHESTER)
+
+
+def test_path_text_and_tables_are_one_problem(problem: Problem) -> None:
+    text = LANCHESTER.read_text(encoding="utf-8")
+    for source in (str(LANCHESTER), text, tomllib.loads(text)):
+        found = laufruhe.load(source)
+        assert found.engine == problem.engine
+        assert found.decisions == problem.decisions
+
+
+def test_tables_that_were_given_stay_as_they_are() -> None:
+    tables = tomllib.loads(LANCHESTER.read_text(encoding="utf-8"))
+    before = pickle.dumps(tables)
+    laufruhe.load(tables).with_values({"front web.mass": "1 kg"})
+    assert pickle.dumps(tables) == before
+
+
+def test_a_value_by_name_is_that_of_a_file(problem: Problem) -> None:
+    text = LANCHESTER.read_text(encoding="utf-8")
+    changed = text.replace("rod_ratio = 0.26", "rod_ratio = 0.28").replace(
+        'mass  = { between = ["0 kg", "3 kg"] }', 'mass  = { between = ["0 kg", "3 kg"], start = "1.2 kg" }', 1
+    )
+    found = problem.with_values({"front web.mass": "1.2 kg", "engine.rod_ratio": 0.28})
+    assert found.engine == laufruhe.load(changed).engine
+    assert found.decisions == laufruhe.load(changed).decisions
+    assert found.decisions != problem.decisions
+    assert problem.decisions[0].start == 0.0
+
+
+def test_every_decision_is_found_by_the_name_that_results_show() -> None:
+    for path in (LANCHESTER, ELASTIC, PROBLEMS / "tractor-four-shaft-heights.toml", PROBLEMS / "vee-six-60.toml"):
+        problem = laufruhe.load(path)
+        # a weight of nothing has no place to decide
+        sizes = {d.name: "0.001 kg m" for d in problem.decisions if d.unit == "kg m" and d.place_drives == ()}
+        for decision in problem.decisions:
+            fixed = problem.fix(decision.name, sizes.get(decision.name) if decision.unit == "kg m" else None)
+            assert decision.name not in {other.name for other in fixed.decisions}
+
+
+def test_fixed_where_it_starts_is_the_design_as_given(problem: Problem) -> None:
+    fixed = problem
+    for decision in problem.decisions:
+        fixed = fixed.fix(decision.name)
+    assert fixed.decisions == ()
+    one, other = laufruhe.evaluate(fixed), laufruhe.evaluate(problem)
+    assert one.objective is not None
+    assert other.objective is not None
+    assert one.objective.value == pytest.approx(other.objective.value, rel=1e-12)
+
+
+def test_open_and_fixed_undo_each_other(problem: Problem) -> None:
+    opened = problem.open("left.y", "60 mm", "120 mm")
+    assert next(d for d in opened.decisions if d.name == "left.y").start == pytest.approx(0.1)
+    assert opened.fix("left.y").engine == problem.engine
+
+
+def test_more_freedom_is_never_worse(problem: Problem) -> None:
+    less = laufruhe.solve(problem.fix("left.unbalance", "0.01 kg m"))
+    more = laufruhe.solve(problem)
+    assert less.objective is not None
+    assert more.objective is not None
+    assert more.objective.value <= less.objective.value * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "line"),
+    [
+        ("front web.mas", "1 kg", "did you mean 'front web.mass'?"),
+        ("front web.mass", "5 kg", "starts outside its bounds"),
+        ("front web.mass", "5 m", "'m' is not a unit of a mass"),
+        ("engine.strok", "100 mm", "is not a key here"),
+        ("counterweights.nobody.mass", "1 kg", "is no quantity of this scene"),
+        ("whatever", "1", "is no number of this problem"),
+    ],
+)
+def test_what_is_wrong_is_said_as_for_a_file(problem: Problem, name: str, value: str, line: str) -> None:
+    with pytest.raises(InputError) as refused:
+        problem.with_values({name: value})
+    assert line in str(refused.value)
+    assert str(refused.value).startswith(str(LANCHESTER))
+
+
+def test_a_problem_changed_in_code_has_no_file(problem: Problem) -> None:
+    with pytest.raises(ModelError, match="made or changed in code"):
+        problem.changed(tolerance=1e-2).fix("front web.mass")
+
+
+@pytest.mark.parametrize("given", [5, None, [], "none.toml", "title = 5", {}, b"x", Path("/nowhere/x.toml")])
+def test_errors_are_those_of_the_package(given: object) -> None:
+    for call in (laufruhe.load, laufruhe.solve, laufruhe.evaluate, laufruhe.study):
+        with pytest.raises(LaufruheError):
+            call(given)  # type: ignore[operator]
+
+
+def test_an_engine_without_points_is_refused(problem: Problem) -> None:
+    with pytest.raises(ModelError, match="has no operating point"):
+        laufruhe.evaluate(problem.engine)
+
+
+def test_a_problem_goes_to_another_process(problem: Problem) -> None:
+    found = pickle.loads(pickle.dumps(problem))
+    assert found.fix("front web.mass", "1 kg").engine == problem.fix("front web.mass", "1 kg").engine
