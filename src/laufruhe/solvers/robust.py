@@ -126,7 +126,7 @@ def solve_robust(problem: Problem, solve: Solve) -> Result:
     if (drawing.certificate is None and problem.decisions) or not acting.each:
         return replace(drawing, problem=problem)
     problem = replace(problem, tolerances=acting, fidelity=drawing.problem.fidelity)
-    start = _decided(problem, drawing)
+    start = decided_values(problem, drawing)
     seeker, found = _found(problem, over, start, drawing)
     if found.conflict:
         return none_within(problem, evaluate(problem), found.conflict, {"solve": time.perf_counter() - started})
@@ -177,7 +177,7 @@ def _check(problem: Problem) -> None:
         raise ModelError('limits of loads are kept in the worst case only; take over = "worst case", or leave them out')
 
 
-def _decided(problem: Problem, drawing: Result) -> tuple[Value, ...]:
+def decided_values(problem: Problem, drawing: Result) -> tuple[Value, ...]:
     """Decisions of a result, complex."""
     rotors = {rotor.name: rotor.unbalance for rotor in drawing.final.engine.rotors}
     given = {rotor.name: rotor.unbalance for rotor in problem.engine.rotors}
