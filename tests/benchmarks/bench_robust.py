@@ -50,19 +50,25 @@ def main() -> None:
         for _ in range(ENGINES // PIECE):
             found = values_of(built.terms, drawn(problem.tolerances, random, PIECE, how))
             most, over = max(most, float(found.max())), over + int((found > worst).sum())
-        rows.append([how, f"{ENGINES:,}", f"{most:.3f}", f"{worst:.3f}", f"{over}", f"{time.process_time() - started:.0f}"])
+        rows.append(
+            [how, f"{ENGINES:,}", f"{most:.3f}", f"{worst:.3f}", f"{over}", f"{time.process_time() - started:.0f}"]
+        )
     c = result.certificate
     head = ["errors", "engines", "worst drawn [N]", "bound [N]", "above it", "core-seconds"]
-    publish(OUT, f"""# A worst case against a million engines
-
-`problems/tractor-four-robust.toml` was solved in {spent:.1f} core-seconds: no design allowed has a worst case under {c.lower_bound:.3f} N, this one has
-{worst:.3f} N, a gap of {c.gap:.1e}. Engines of this design were then built at random, by `tests/benchmarks/bench_robust.py`.
-
-{piped(head, rows)}
-
-Engines whose errors are even or normal within their tolerances stay far from the worst case: all errors would have to be at their limits, and conspire.
-With all errors at their limits, each end as likely, the worst of a million comes within a thousandth of the bound, and none exceeds it.
-""")
+    lines = [
+        "# A worst case against a million engines",
+        "",
+        f"`problems/tractor-four-robust.toml` was solved in {spent:.1f} core-seconds: no design allowed has a",
+        f"worst case under {c.lower_bound:.3f} N, this one has {worst:.3f} N, a gap of {c.gap:.1e}. Engines of this",
+        "design were then built at random, by `tests/benchmarks/bench_robust.py`.",
+        "",
+        piped(head, rows),
+        "",
+        "Engines whose errors are even or normal within their tolerances stay far from the worst case: all errors",
+        "would have to be at their limits, and conspire. With all errors at their limits, each end as likely,",
+        "the worst of a million comes within a thousandth of the bound, and none exceeds it.",
+    ]
+    publish(OUT, "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

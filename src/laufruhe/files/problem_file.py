@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field
 
 from laufruhe.files import fields as f
 from laufruhe.files.asked import ConstraintTable, ObjectiveTable
+from laufruhe.files.assembly import AssemblyTable
 from laufruhe.files.bearings import MainBearingTable
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
@@ -63,6 +64,7 @@ class ProblemFile(Table):
     search: SearchTable = Field(default_factory=SearchTable)
     tolerances: TolerancesTable | None = None
     robust: RobustTable | None = None
+    assembly: AssemblyTable | None = None
 
 
 def schema() -> str:

@@ -19,6 +19,7 @@ from pydantic import ValidationError
 from laufruhe.errors import Complaint, InputError, ModelError, printed
 from laufruhe.files import edits
 from laufruhe.files.asked import Scene, limits_of, objective_of
+from laufruhe.files.assembly import assembly_of
 from laufruhe.files.bearings import bearings_of
 from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, complaints_of, key_path
@@ -280,6 +281,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         tolerance=file.tolerance,
         mount_numbers=found.numbers,
         search=Search(**file.search.model_dump()),
+        assembly=assembly_of(file.assembly, engine, path.parent),
     )
     return at_fidelity(problem, file.fidelity)
 

@@ -17,6 +17,7 @@ PICTURES = {
     "modes": "Share of each motion in the kinetic energy of each natural mode.",
     "run_up": "Largest force and travel on any mount, and roll, while the engine runs up and is shut down.",
     "robust": "The best drawing and the design decided, each built many times, and what each tolerance costs.",
+    "assembly": "The best assembly of measured parts beside those at random.",
     "trade": "What slightly uneven firing buys.",
 }
 

@@ -10,6 +10,7 @@ from typing import Any, Protocol, TypeAlias
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.problem.assembly import Assembly
 from laufruhe.problem.decision import Decision, Kind, Numbers, moved_numbers
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.phasing import PhasingOf
@@ -81,6 +82,8 @@ class Problem:
         How far built engines stand from the drawing.
     over
         Of which of them what is minimised and limited is taken; None for the drawing.
+    assembly
+        Measured parts to choose among for every cylinder.
     origin
         The file that it was read from; None where it was made or changed in code.
     """
@@ -101,6 +104,7 @@ class Problem:
     phasing: Phasing | None = None
     tolerances: Tolerances = NO_TOLERANCES
     over: Over | None = None
+    assembly: Assembly | None = None
     origin: Origin | None = field(default=None, compare=False, repr=False)
 
     def __repr__(self) -> str:

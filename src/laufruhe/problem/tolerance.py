@@ -92,8 +92,11 @@ class AddedDrive:
 
     def moved(self, drawing: Drawing, error: complex) -> Drawing:
         """One rotor more."""
-        rotor = Rotor(self.name, self.x, self.gain * error, self.shaft, Role.THROW)
-        return replace(drawing, engine=replace(drawing.engine, rotors=(*drawing.engine.rotors, rotor)))
+        return replace(drawing, engine=replace(drawing.engine, rotors=(*drawing.engine.rotors, self.rotor(error))))
+
+    def rotor(self, error: complex) -> Rotor:
+        """What is added."""
+        return Rotor(self.name, self.x, self.gain * error, self.shaft, Role.THROW)
 
 
 @dataclass(frozen=True)

@@ -67,6 +67,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         "firing_intervals": list(result.final.engine.firing_intervals),
         **_phasing(result),
         **_robust(result),
+        **_assembly(result),
         "fidelity": {
             # the crank inertia is null where the crank turns evenly
             **asdict(problem.fidelity),
@@ -277,3 +278,14 @@ def _robust(result: Result) -> Record:
             "tolerances": [_of(t, "name size unit law scope errors price saving") for t in found.tolerances],
         }
     }  # fmt: skip
+
+
+def _assembly(result: Result) -> Record:
+    """`assembly` where measured parts were chosen: the part of every lot in each cylinder, counted from one."""
+    found = result.assembly
+    if found is None:
+        return {}
+    places = [
+        {"cylinder": place.cylinder, **dict(zip(found.kinds, place.parts, strict=True))} for place in found.places
+    ]
+    return {"assembly": {**_of(found, "assemblies looked_at random quantiles worst mean_parts"), "places": places}}

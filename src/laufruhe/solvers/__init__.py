@@ -18,6 +18,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.apart import solve_apart
+from laufruhe.solvers.assembly import solve_assembly
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.places import solve_places
 from laufruhe.solvers.result import Result, Status
@@ -237,6 +238,8 @@ def _checked(problem: Problem, checked: Sequence[Limit]) -> Result:
 
 def _decided(problem: Problem) -> Result:
     """By the first method that suits, for the drawing or for the engines that are built to it."""
+    if problem.assembly is not None:
+        return solve_assembly(problem)
     if problem.over is not None:
         return solve_robust(problem, _decided)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):

@@ -228,6 +228,11 @@ def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
     return replace(result, problem=problem.changed(limits=limits), limits=() if resonant else shown)
 
 
+def angle_name(decision: Decision) -> str:
+    """What the angle of an open size is called."""
+    return decision.name.rsplit(".", 1)[0] + ".angle"
+
+
 def decision_values(decision: Decision, value: Value, slope: Array | None = None) -> tuple[DecisionValue, ...]:
     """Size and, where open, angle of one decision; the slope of the bound prices the side that it stands at."""
     own = decision.set
@@ -245,7 +250,7 @@ def decision_values(decision: Decision, value: Value, slope: Array | None = None
         return (entry,)
     low_angle, high_angle = own.angles
     edge = not own.free_angle and size > reach and min(angle - low_angle, high_angle - angle) < 1e-6
-    name = decision.name.rsplit(".", 1)[0] + ".angle"
+    name = angle_name(decision)
     return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
 
 

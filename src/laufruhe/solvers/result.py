@@ -13,6 +13,7 @@ from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate
+from laufruhe.solvers.assembly_result import AssemblyResult
 from laufruhe.solvers.ranking import PhasingResult
 from laufruhe.solvers.robust_result import RobustResult
 
@@ -121,6 +122,8 @@ class Result:
         Ranking of stars and firing orders, where these were open.
     robust
         Designs under tolerance, where built engines were decided for.
+    assembly
+        Which part goes where, where parts were chosen.
     """
 
     problem: Problem
@@ -137,6 +140,7 @@ class Result:
     timing: dict[str, float] = field(default_factory=dict)
     phasing: PhasingResult | None = None
     robust: RobustResult | None = None
+    assembly: AssemblyResult | None = None
 
     @property
     def designs(self) -> dict[str, Evaluation]:

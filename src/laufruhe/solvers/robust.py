@@ -7,6 +7,7 @@ meets what no engine exceeds (R8).
 
 from __future__ import annotations
 
+import cmath
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -29,7 +30,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.problem.tolerance import Over
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.adversaries import DrawnEngines, EveryError, Found
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, judged, none_within
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, angle_name, judged, none_within
 from laufruhe.solvers.conic import solve_cones
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.robust_conclusion import compared, robust_result
@@ -157,7 +158,7 @@ def _found(
     found = _least_share(problem, drawn, start, over.share, nothing)
     # of errors that lie alike to both sides half of all engines are no better than the drawing (R9)
     bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
-    return drawn, replace(found, bound=bound)
+    return drawn, replace(found, bound=bound if problem.decisions else found.found.bound)
 
 
 def _check(problem: Problem) -> None:
@@ -168,8 +169,10 @@ def _check(problem: Problem) -> None:
     if open_kinds:
         names = ", ".join(d.name for d in problem.decisions if d.kind in open_kinds)
         raise ModelError(f"[robust] decides unbalances, and {names} is open too; fix it, or leave [robust] out")
+    if problem.fidelity.is_uneven:
+        raise ModelError("[robust] takes a crank that turns evenly; leave fidelity.crank_inertia out, or [robust]")
     for measure in problem.measures:
-        if measure.channel.is_number:
+        if measure.channel.is_number or measure.channel.feels_inertia:
             raise ModelError(f"[robust] takes norms of loads, and no {measure.name}; ask for it without [robust]")
     if not problem.objective:
         raise ModelError("[robust] minimises nothing; add [objective]")
@@ -177,28 +180,24 @@ def _check(problem: Problem) -> None:
         raise ModelError('limits of loads are kept in the worst case only; take over = "worst case", or leave them out')
 
 
-def decided_values(problem: Problem, drawing: Result) -> tuple[Value, ...]:
-    """Decisions of a result, complex."""
-    rotors = {rotor.name: rotor.unbalance for rotor in drawing.final.engine.rotors}
-    given = {rotor.name: rotor.unbalance for rotor in problem.engine.rotors}
-    values = []
+def decided_values(problem: Problem, result: Result) -> tuple[Value, ...]:
+    """Decisions of a result, complex (C4)."""
+    sizes = {entry.name: entry.value for entry in result.decisions}
+    values: list[Value] = []
     for decision in problem.decisions:
-        drive = decision.rotor_drives[0]
-        change = (rotors[drive.rotor] - given[drive.rotor]) / drive.gain
-        values.append(decision.start + (complex(change).conjugate() if drive.mirrored else change))
+        turned = sizes[angle_name(decision)] if decision.set.width > 1 else decision.set.angles[0]
+        values.append(sizes[decision.name] * cmath.exp(1j * turned))
     return tuple(values)
 
 
 def _method(problem: Problem, found: Least) -> str:
-    over = problem.over
-    angles = (
-        f"second-order cones over {found.scenarios} sets of errors at {found.angles} angles" if found.angles else ""
-    )
-    if over is not None and over.share is not None:
-        return f"{angles}; {over.engines} drawn engines, bounded by the drawing"
+    over, angles = problem.over or Over(), f"at {found.angles} angles; " if found.angles else ""
+    cones = f"second-order cones over {found.scenarios} sets of errors {angles}" if angles else ""
+    if over.share is not None:
+        return f"{cones}{over.engines} drawn engines, bounded by the drawing"
     if problem.tolerances.is_affine:
-        return f"{angles}; every error bounded by branch and bound".strip("; ")
-    return f"{angles}; the worst of {over.engines if over else 0} drawn engines, not of all".strip("; ")
+        return f"{cones}every error bounded by branch and bound"
+    return f"{cones}the worst of {over.engines} drawn engines, not of all"
 
 
 class _Program:

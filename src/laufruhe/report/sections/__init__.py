@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 from laufruhe.report.grid import Grid
-from laufruhe.report.sections import decisions, limits, modes, mounts, orders, robust, run_up, stars, torque, torsion
+from laufruhe.report.sections import (
+    assembly,
+    decisions,
+    limits,
+    modes,
+    mounts,
+    orders,
+    robust,
+    run_up,
+    stars,
+    torque,
+    torsion,
+)
 from laufruhe.solvers.result import Result
 
-SECTIONS = (stars, decisions, robust, limits, mounts, torque, torsion, modes, run_up, orders)
+SECTIONS = (stars, assembly, decisions, robust, limits, mounts, torque, torsion, modes, run_up, orders)
 
 
 def tables_of(result: Result) -> list[Grid]:

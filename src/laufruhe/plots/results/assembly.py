@@ -1,0 +1,40 @@
+"""The best assembly beside those at random, and beside parts as they come."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from laufruhe.plots.style import AFTER, BEFORE, INK, SKY, entry, headed, page
+from laufruhe.present.measures import objective_unit
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.robust_result import SHARES
+
+MEAN = (0, (1, 2))
+
+
+def applies(result: Result) -> bool:
+    """Where measured parts were chosen."""
+    return result.assembly is not None
+
+
+def figure(result: Result) -> Figure:
+    """Share of assemblies that stay below, and where the best one, the given one and mean parts stand."""
+    found, objective = result.assembly, result.objective
+    if found is None or objective is None:
+        raise ValueError("no parts were chosen")
+    drawn = page(1, 1, (6.4, 3.0))
+    axes = drawn.panels[0]
+    axes.plot(found.quantiles, [100.0 * share for share in SHARES], color=SKY, linewidth=1.8)
+    axes.axvline(objective.value, color=AFTER, linewidth=1.8)
+    axes.axvline(objective.initial, color=BEFORE, linewidth=1.8)
+    axes.axvline(found.mean_parts, color=INK, linewidth=1.2, linestyle=MEAN)
+    name, unit = objective.name, objective_unit(result)
+    axes.set(
+        ylim=(0.0, 104.0), ylabel="assemblies below [%]", xlabel=f"{name} [{unit}]" if len(name) < 60 else f"[{unit}]"
+    )
+    legend = [
+        entry("at random", color=SKY), entry("as they come", color=BEFORE), entry("chosen", color=AFTER),
+        entry("parts of mean mass", color=INK, linestyle=MEAN),
+    ]  # fmt: skip
+    lines = f"{found.random} of {found.assemblies:,.0f} ways to assemble the measured parts."
+    return headed(drawn, result, "What choosing parts buys", lines, legend)

@@ -1,0 +1,125 @@
+"""Which measured part goes where: against all assemblies, one by one."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from laufruhe.errors import InputError, ModelError
+from laufruhe.files.reader import load
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+from laufruhe.solvers.assembly import assembled
+from laufruhe.solvers.result import Result
+from problem_files import FOUR, MOUNTS
+
+THREE = FOUR.replace("[1, 3, 4, 2]", "[1, 3, 2]")
+POINT = '[[operating_points]]\nspeed = "2500 rpm"\n[fidelity]\nsamples = 48\n'
+LEAST = '[objective]\nminimise = "{}"\n'
+PISTONS, RODS = (
+    (1250.0, 1243.0, 1259.0, 1246.0, 1231.0),
+    ((400.0, 800.0), (405.0, 790.0), (391.0, 812.0), (403.0, 801.0)),
+)
+
+Read = Callable[..., Problem]
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Read:
+    def of(text: str, pistons: Sequence[float] = PISTONS, rods: Sequence[Sequence[float]] = RODS) -> Problem:
+        (tmp_path / "p.csv").write_text("mass\n" + "".join(f"{m}\n" for m in pistons), encoding="utf-8")
+        (tmp_path / "r.csv").write_text("".join(f"{a},{b}\n" for a, b in rods), encoding="utf-8")
+        (tmp_path / "engine.toml").write_text(text, encoding="utf-8")
+        return load(tmp_path / "engine.toml")
+
+    return of
+
+
+def every(problem: Problem) -> list[float]:
+    """The objective of all assemblies, by the exact model."""
+    assert problem.assembly is not None
+    lots, cylinders = problem.assembly.lots, len(problem.engine.slider_cranks)
+    found = []
+    for chosen in itertools.product(*(itertools.permutations(range(len(lot.masses)), cylinders) for lot in lots)):
+        found.append(objective_value(problem, evaluate(problem, assembled(problem.engine, lots, chosen))))
+    return found
+
+
+def best(result: Result) -> float:
+    assert result.objective is not None
+    return result.objective.value
+
+
+@pytest.mark.parametrize(
+    ("engine", "quantity", "lots"),
+    [
+        (THREE + MOUNTS, "mean mount force", 'pistons = "p.csv"\n'),
+        (THREE, "rms rocking couple", 'pistons = "p.csv"\nrods = "r.csv"\n'),
+        (FOUR, "maximum shaking force", 'rods = "r.csv"\n'),
+        (FOUR, "peak to peak shaking force", 'pistons = "p.csv"\n'),
+    ],
+)
+def test_best_of_all_assemblies(read: Read, engine: str, quantity: str, lots: str) -> None:
+    pistons = PISTONS[:4] if "rods" in lots else PISTONS
+    problem = read(engine + POINT + LEAST.format(quantity) + "[assembly]\n" + lots, pistons)
+    result, values = solve(problem), every(problem)
+    assert result.certificate is not None
+    assert result.assembly is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    assert best(result) == pytest.approx(min(values), rel=1e-4)
+    assert result.certificate.lower_bound <= min(values) * (1.0 + 1e-12)
+    assert result.assembly.assemblies == len(values)
+    assert result.assembly.worst <= max(values) * (1.0 + 1e-9)
+    # every part once
+    for kind in range(len(result.assembly.kinds)):
+        parts = [place.parts[kind] for place in result.assembly.places]
+        assert len(set(parts)) == len(parts)
+
+
+def test_parts_of_one_mass_are_the_drawing(read: Read) -> None:
+    problem = read(THREE + POINT + LEAST.format("rms rocking couple") + '[assembly]\npistons = "p.csv"\n', [1250.0] * 4)
+    drawing = objective_value(problem, evaluate(problem))
+    assert best(solve(problem)) == pytest.approx(drawing, rel=1e-9)
+
+
+def test_more_parts_are_never_worse(read: Read) -> None:
+    """Of the same lot's mean: a part more at either side."""
+    text = THREE + POINT + LEAST.format("rms rocking couple") + '[assembly]\npistons = "p.csv"\n'
+    few = best(solve(read(text, [1240.0, 1250.0, 1260.0])))
+    many = best(solve(read(text, [1240.0, 1250.0, 1260.0, 1245.0, 1255.0])))
+    assert many <= few * (1.0 + 1e-4)
+
+
+def test_order_of_the_file_does_not_matter(read: Read) -> None:
+    text = THREE + POINT + LEAST.format("rms rocking couple") + '[assembly]\npistons = "p.csv"\nrods = "r.csv"\n'
+    values = [best(solve(read(text, np.array(PISTONS)[order]))) for order in ([0, 1, 2, 3, 4], [4, 2, 0, 1, 3])]
+    assert values[0] == pytest.approx(values[1], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("more", "rule"),
+    [
+        ("[assembly]\n", "no parts to choose among"),
+        ('[assembly]\npistons = "none.csv"\n', "cannot be read"),
+        ('[assembly]\npistons = "p.csv"\nmass_unit = "mm"\n', "not a unit of a mass"),
+        ('[assembly]\nrods = "r.csv"\n', "has 2 parts for 3 cylinders"),
+    ],
+)
+def test_one_line_for_what_is_wrong(read: Read, more: str, rule: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read(THREE + POINT + LEAST.format("rms rocking couple") + more, PISTONS, RODS[:2])
+    (complaint,) = caught.value.complaints
+    assert rule in complaint.rule
+
+
+def test_what_is_open_beside_is_refused(read: Read) -> None:
+    weight = '[[counterweights]]\nname = "w"\nopposite_throw = 1\nunbalance = { between = ["0 kg m", "1 kg m"] }\n'
+    text = THREE + POINT + LEAST.format("rms rocking couple") + '[assembly]\npistons = "p.csv"\n' + weight
+    with pytest.raises(ModelError, match="engine that is fixed"):
+        solve(read(text))
