@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -137,29 +138,45 @@ def test_throws_given_and_their_firing_order_open() -> None:
     assert result.objective.value == pytest.approx(min(flat), rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("whole", "line"),
-    [
-        (tables(4, bearing("mean"), OPEN, phasing={"intervals": {"largest_deviation": "20 deg"}}),
-         "loads inside the crankcase are decided with even firing"),
-        (tables(6, bearing("mean"), engine={"layout": "vee", "bank_angle": 60, "split_pin_angle": 60}, main_bearings=[
-            {"x": f"{x} mm"} for x in (190, 60, -60, -190)]), "where each cylinder has its own throw"),
-    ],
-)  # fmt: skip
-def test_what_is_not_decided_is_refused_by_name(whole: Tables, line: str) -> None:
-    with pytest.raises(ModelError, match=line):
+def test_uneven_throws_are_refused_by_name() -> None:
+    whole = tables(4, bearing("mean"), OPEN, phasing={"intervals": {"largest_deviation": "20 deg"}})
+    with pytest.raises(ModelError, match="loads inside the crankcase are decided with even firing"):
         laufruhe.solve(problem_of(whole))
+
+
+VEE = {"layout": "vee", "bank_angle": 60, "split_pin_angle": 60}
+BETWEEN = [{"x": f"{x} mm"} for x in (190, 60, -60, -190)]
+
+
+def test_two_rods_on_a_pin_are_decided_order_by_order() -> None:
+    """The best of all firing orders of all even stars, each as a problem of its own."""
+    one_bearing = bearing("mean", bearings=["2"])
+    whole = tables(6, one_bearing, engine=VEE, main_bearings=BETWEEN, phasing={"best": 4})
+    result = laufruhe.solve(problem_of(whole))
+    assert result.certificate.kind is Proof.GLOBAL
+    given = {key: value for key, value in whole["engine"].items() if key != "cylinders"}
+    without = {key: value for key, value in whole.items() if key != "phasing"}
+    values = {}
+    for star in result.phasing.ranking:
+        throws = [math.degrees(angle) for angle in star.throws]
+        assert star.order_count == 4
+        for order in star.firing_orders:
+            fired = {**given, "throws": throws, "firing_order": list(order.order)}
+            one = laufruhe.solve(problem_of({**without, "engine": fired}))
+            values[order.order] = one.final.value(one.problem.objective[0].measure)
+    assert len(values) == 8
+    assert result.objective.value == pytest.approx(min(values.values()), rel=1e-9)
+    assert values[result.phasing.ranking[0].firing_orders[0].order] == pytest.approx(min(values.values()), rel=1e-9)
+    assert max(values.values()) > 1.001 * min(values.values())
 
 
 def test_without_gas_two_rods_on_a_pin_are_decided() -> None:
     """Inertia alone does not feel the firing order, so banks that share throws are stars like any other."""
-    bearings = [{"x": f"{x} mm"} for x in (190, 60, -60, -190)]
-    vee = {"layout": "vee", "bank_angle": 60, "split_pin_angle": 60}
-    whole = tables(6, bearing("mean"), engine=vee, gas=None, main_bearings=bearings)
+    whole = tables(6, bearing("mean"), engine=VEE, gas=None, main_bearings=BETWEEN)
     result = laufruhe.solve(problem_of(whole))
     assert result.certificate.kind is Proof.GLOBAL
     for star in result.phasing.ranking:
         given = {key: value for key, value in whole["engine"].items() if key != "cylinders"}
-        throws = [float(angle) * 180.0 / 3.141592653589793 for angle in star.throws]
+        throws = [math.degrees(angle) for angle in star.throws]
         one = laufruhe.solve(problem_of({**whole, "engine": {**given, "throws": throws}}))
         assert one.final.value(one.problem.objective[0].measure) == pytest.approx(star.value, rel=1e-6)

@@ -189,6 +189,11 @@ class PhasingOf(Generic[P]):
         return tuple(name for names in self.shafts.optional for name in names if name not in candidate.left_out)
 
     @property
+    def shares_throws(self) -> bool:
+        """Whether several cylinders work on one throw."""
+        return len(self.layout(*self.least_geometry).throw_positions) < self.cylinders
+
+    @property
     def least_geometry(self) -> tuple[float | None, float | None]:
         """Bank angle and split pin at their lower bounds [rad]: as given where they are not open."""
         return (None if self.bank is None else self.bank[0]), (None if self.split is None else self.split[0])

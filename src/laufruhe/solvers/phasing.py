@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.machine.firing import MOST_ORDERS
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.nothing import nothing_of
@@ -15,7 +16,15 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.solvers.conclusion import no_star, with_star
-from laufruhe.solvers.ranking import ORDERS_LISTED, ranked_orders, ranked_star, ranking_result, told_orders
+from laufruhe.solvers.ranking import (
+    ORDERS_LISTED,
+    RankedOrder,
+    RankedStar,
+    ranked_orders,
+    ranked_star,
+    ranking_result,
+    told_orders,
+)
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.star_answers import Answer, Decided, searched
 from laufruhe.solvers.star_cuts import owners_of, solve_design
@@ -55,6 +64,10 @@ def solve_phasing(problem: Problem) -> Result:
 
 def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
+    if problem.feels_order and is_even and phasing.shares_throws:
+        pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
+        stars = [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]
+        return _by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
     families = families_of(phasing, problem.feels_order)[0] if is_even else ()
     if not families and not phasing.continuous:
         return no_star(problem, none_fires(phasing)[0])
@@ -75,13 +88,23 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
 def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     """Throws as given: the best of their firing orders, and of the sets of shafts."""
     star = Candidate(phasing.throws or (), None, *phasing.least_geometry)
-    orders = ranked_orders(phasing, star)
-    if not orders:
+    return _by_each_order(problem, phasing, [(star, None)])
+
+
+def _by_each_order(
+    problem: Problem, phasing: Phasing, stars: Sequence[tuple[Candidate, tuple[int, ...] | None]]
+) -> Result:
+    """Every firing order that loads tell apart of every star, and every set of shafts, each solved by itself."""
+    orders = {star: ranked_orders(phasing, star, steps) for star, steps in stars}
+    if not any(orders.values()):
         return no_star(problem, none_fires(phasing)[0])
     # the small ones first: a shaft that buys nothing is not built
     sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
-    told = told_orders(problem, phasing, star)
-    designs = [replace(star, firing_order=o.order, left_out=phasing.without(built)) for built in sets for o in told]
+    told = [(star, order.order) for star, steps in stars for order in told_orders(problem, phasing, star, steps)]
+    if len(told) * len(sets) >= MOST_ORDERS:
+        many = f"{MOST_ORDERS} and more firing orders and sets of shafts are too many to decide one by one"
+        raise ModelError(f"{many}; give a firing order, or throws")
+    designs = [replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in told]
     every, complete = _solved(problem, phasing, designs)
     solved = [design for design in every if design.is_met]
     if not solved:
@@ -94,16 +117,32 @@ def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
         if design.value < best.value - room_of(best.value, _share(problem), nothing):
             best = design
     bound = min(design.bound for design in every) if complete else 0.0
-    entry = ranked_star(phasing, best.candidate, None, best.value, bound, complete)
-    own = next(order for order in orders if order.order == best.candidate.firing_order)
-    rest = tuple(order for order in orders if order != own)
-    entry = replace(entry, firing_orders=(own, *rest)[:ORDERS_LISTED], even=own.is_even)
-    method = f"{len(told)} of {len(orders)} firing order(s), {len(sets)} set(s) of shafts looked at"
+    count = sum(map(len, orders.values()))
+    of_stars = f" of {len(stars)} stars" if len(stars) > 1 else ""
+    method = f"{len(told)} of {count} firing order(s){of_stars}, {len(sets)} set(s) of shafts looked at"
     proof = best.result.certificate
     how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     certificate = certified(best.value, bound, nothing, problem.tolerance, Reach.WHOLE, residual, how)
-    details = ranking_result(phasing, best.candidate, [entry], len(orders) * len(sets), len(solved), method)
+    ranking = _entries(phasing, [best, *sorted(solved, key=lambda one: one.value)], orders, bound, complete)
+    details = ranking_result(phasing, best.candidate, ranking, count * len(sets), len(solved), method)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
+
+
+def _entries(
+    phasing: Phasing, designs: Sequence[StarDesign], orders: Mapping[Candidate, tuple[RankedOrder, ...]], bound: float,
+    complete: bool,
+) -> list[RankedStar]:  # fmt: skip
+    """The first design of every star, its own firing order before the others of the star."""
+    firsts: dict[Candidate, StarDesign] = {}
+    for design in designs:
+        firsts.setdefault(replace(design.candidate, firing_order=None, left_out=()), design)
+    found = []
+    for star, design in [*firsts.items()][: phasing.best]:
+        entry = ranked_star(phasing, design.candidate, None, design.value, bound, complete)
+        own = next(order for order in orders[star] if order.order == design.candidate.firing_order)
+        rest = tuple(order for order in orders[star] if order != own)
+        found.append(replace(entry, firing_orders=(own, *rest)[:ORDERS_LISTED], even=own.is_even))
+    return found
 
 
 def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) -> tuple[list[StarDesign], bool]:

@@ -113,11 +113,6 @@ def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family
 
 
 def _by_firing(phasing: Phasing, geometry: tuple[float | None, float | None], layout: Layout) -> Family:
-    if len(layout.throw_positions) < phasing.cylinders:
-        raise ModelError(
-            "firing orders are decided against loads inside the crankcase where each cylinder has its own throw; "
-            "give throws, and leave the firing order open"
-        )
     fixed = None if phasing.firing_order is None else order_slots(phasing.firing_order)
     return FiringFamily(geometry, layout, slot_space(phasing.cylinders, layout.throw_positions), fixed)
 
