@@ -67,7 +67,7 @@ def test_one_number_for_each() -> None:
         ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "1 kg m^2"}]}, "nothing holds the ring"),
         ({"absorbers": [{"name": "d", "on": "puley", "inertia": "1 kg m^2"}]}, "did you mean 'pulley'"),
         ({"output": "gearbox"}, "is no disc"),
-        ({"crank": {"stiffness": {"between": ["1e5 N m/rad", "1e6 N m/rad"]}}}, "cannot be left open"),
+        ({"throw_inertia": {"between": ["0.001 kg m^2", "0.01 kg m^2"]}}, "cannot be left open"),
         ({"discs": []}, None),
     ],
 )

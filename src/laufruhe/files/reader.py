@@ -255,14 +255,14 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     cycle = cycle_of(table)
     bearings = bearings_of(file.main_bearings, cylinders)
     rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
-    chain = torsion_of(file.torsion, cylinders, throws)
+    chain, of_chain = torsion_of(file.torsion, cylinders, throws)
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke, brake)
     run = run_of(file.run_up, found.block, [point.name for point in points])
     engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run)
     scene, decisions = (
         Scene(engine, points),
-        (*_of_pistons(file, table, cylinders), *collected.decisions, *found.decisions, *of_wheel),
+        (*_of_pistons(file, table, cylinders), *collected.decisions, *found.decisions, *of_wheel, *of_chain),
     )
     objective = objective_of(file.objective, scene)
     _check_decided(decisions)

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Literal
+from typing import Literal, TypeVar
 
 from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, nearest, one_of
-from laufruhe.files.fields import Name, Table
+from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Absorber, Disc, Section, SliderCrank, Torsion
 from laufruhe.machine.layouts import Throw
 from laufruhe.machine.torsion import STEEL, stiffness_of
 from laufruhe.physics.torsion import reduced_inertia
+from laufruhe.problem.decision import Decision, TorsionDrive
+from laufruhe.problem.sets import Interval
+
+T = TypeVar("T")
 
 
 class PieceTable(Table):
     """A round piece of a shaft."""
 
     length: f.PositiveLength
-    diameter: f.PositiveLength
+    diameter: f.OpenPositiveLength
     bore: f.NonNegativeLength = 0.0
 
 
@@ -41,7 +45,7 @@ class SectionTable(Table):
 class ShaftTable(SectionTable):
     """A shaft between two discs: its stiffness, or what it follows from."""
 
-    stiffness: f.TorsionalStiffness | None = None
+    stiffness: f.OpenTorsionalStiffness | None = None
 
 
 class CrankTable(SectionTable):
@@ -55,7 +59,7 @@ class DiscTable(Table):
 
     name: Name
     end: Literal["front", "rear"]
-    inertia: f.PositiveInertia
+    inertia: f.OpenInertia
     damping: f.TorsionalDamping = Field(default=0.0, description="Against the block.")
     shaft: ShaftTable = Field(description="From this disc to the next towards the throws.")
 
@@ -65,9 +69,9 @@ class AbsorberTable(Table):
 
     name: Name
     on: str = Field(description="Name of its disc, or throw 1, throw 2 ...")
-    inertia: f.PositiveInertia
-    damping: f.TorsionalDamping = 0.0
-    stiffness: f.TorsionalStiffness | None = None
+    inertia: f.OpenInertia
+    damping: f.OpenTorsionalDamping = 0.0
+    stiffness: f.OpenTorsionalStiffness | None = None
     loss_factor: f.LossFactor = 0.0
     order: f.Positive | None = f.told("That a pendulum is tuned to.")
     damping_ratio: f.NonNegative = 0.0
@@ -87,34 +91,53 @@ class TorsionTable(Table):
     absorbers: list[AbsorberTable] = Field(default_factory=list)
 
 
-def torsion_of(table: TorsionTable | None, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> Torsion | None:
-    """The chain from front to rear; None where nothing is said of it."""
+class _Opened:
+    """Numbers as they are given, and the decisions about those that are open."""
+
+    def __init__(self) -> None:
+        self.decisions: list[Decision] = []
+
+    def number(self, value: float | Open, key: str, unit: str, name: str, parts: Sequence[str]) -> float:
+        """The number that some parts have, or start from."""
+        given = Open.of(value)
+        if given.is_open:
+            drives = tuple(TorsionDrive(part, key) for part in parts)
+            found = Decision(f"torsion.{name}.{key}", unit, Interval(*given.bounds), given.start, drives)
+            self.decisions.append(found)
+        return given.start
+
+
+def torsion_of(
+    table: TorsionTable | None, parts: Sequence[SliderCrank], throws: Sequence[Throw]
+) -> tuple[Torsion | None, list[Decision]]:
+    """The chain from front to rear, and what of it is decided; None where nothing is said of it."""
     if table is None:
-        return None
+        return None, []
     for part in parts:
         if part.shaft != CRANKSHAFT:
             rule = f"is of one crankshaft, and {part.name} works on shaft '{part.shaft.name}'"
             raise Refused("torsion", None, rule, "leave it out")
-    own = _throw_discs(table, parts, throws)
-    crank = _crank_sections(table, len(own))
-    front = [_disc(disc) for disc in table.discs if disc.end == "front"]
-    rear = [_disc(disc) for disc in table.discs if disc.end == "rear"]
+    opened, own = _Opened(), _throw_discs(table, parts, throws)
+    ends = {end: [(k, disc) for k, disc in enumerate(table.discs) if disc.end == end] for end in ("front", "rear")}
+    front, rear = ([_disc(disc, opened) for _, disc in ends[end]] for end in ("front", "rear"))
     discs = (*front, *own, *rear)
-    ends = [
-        (disc.end, _section(disc.shaft, table, f"torsion.discs[{k + 1}].shaft", disc.shaft.stiffness))
-        for k, disc in enumerate(table.discs)
-    ]
-    sections = [*(s for end, s in ends if end == "front"), *crank, *(s for end, s in ends if end == "rear")]
-    named = (replace(s, name=f"{discs[k].name} - {discs[k + 1].name}") for k, s in enumerate(sections))
     names = [disc.name for disc in discs]
+    links = [f"{a} - {b}" for a, b in itertools.pairwise(names)]
+    beside = [*links[: len(front)], *links[len(links) - len(rear) :]]
+    shafts = [
+        _section(disc.shaft, table, f"torsion.discs[{k + 1}].shaft", disc.shaft.stiffness, disc.name, [link], opened)[0]
+        for (k, disc), link in zip((*ends["front"], *ends["rear"]), beside, strict=True)
+    ]
+    crank = _crank_sections(table, links[len(front) : len(links) - len(rear)], opened)
+    sections = (*shafts[: len(front)], *crank, *shafts[len(front) :])
     if table.output is not None and table.output not in names:
         raise Refused("torsion.output", table.output, "is no disc", nearest(table.output, names))
     if table.speeds is not None and not table.speeds[0] < table.speeds[1]:
         raise Refused("torsion.speeds", None, "is no range", "write the smaller one first")
-    absorbers = [_absorber(a, names, f"torsion.absorbers[{k + 1}]") for k, a in enumerate(table.absorbers)]
+    absorbers = [_absorber(a, names, f"torsion.absorbers[{k + 1}]", opened) for k, a in enumerate(table.absorbers)]
     with blamed_on("torsion"):
         speeds = None if table.speeds is None else (table.speeds[0], table.speeds[1])
-        return Torsion(discs, tuple(named), tuple(absorbers), table.output or "", speeds)
+        return Torsion(discs, sections, tuple(absorbers), table.output or "", speeds), opened.decisions
 
 
 def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> list[Disc]:
@@ -134,54 +157,90 @@ def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequ
     return found
 
 
-def _crank_sections(table: TorsionTable, throws: int) -> list[Section]:
-    if throws == 1:
-        if table.crank is not None:
-            raise Refused("torsion.crank", None, "joins throws, and there is one", "leave it out")
+def _crank_sections(table: TorsionTable, links: Sequence[str], opened: _Opened) -> list[Section]:
+    where, crank = "torsion.crank", table.crank
+    if not links:
+        if crank is not None:
+            raise Refused(where, None, "joins throws, and there is one", "leave it out")
         return []
-    if table.crank is None:
-        raise Refused("torsion.crank", None, "is missing", "say how stiff the crankshaft is from throw to throw")
-    if table.crank.stiffness is None:
-        return [_section(table.crank, table, "torsion.crank", None)] * (throws - 1)
-    each = _for_each(table.crank.stiffness, throws - 1, "torsion.crank.stiffness", "shafts between throws")
-    return [_section(table.crank, table, "torsion.crank", stiffness) for stiffness in each]
+    if crank is None:
+        raise Refused(where, None, "is missing", "say how stiff the crankshaft is from throw to throw")
+    if crank.stiffness is None or len(crank.stiffness) == 1:
+        value = None if crank.stiffness is None else crank.stiffness[0]
+        return _section(crank, table, where, value, "crank", links, opened)
+    each = _for_each(crank.stiffness, len(links), f"{where}.stiffness", "shafts between throws")
+    return [
+        _section(crank, table, where, stiffness, link, [link], opened)[0]
+        for stiffness, link in zip(each, links, strict=True)
+    ]
 
 
-def _section(shaft: SectionTable, table: TorsionTable, where: str, stiffness: float | None) -> Section:
-    """A shaft without a name yet."""
+def _section(
+    shaft: SectionTable, table: TorsionTable, where: str, given: float | Open | None, name: str,
+    links: Sequence[str], opened: _Opened,
+) -> list[Section]:  # fmt: skip
+    """Shafts that are alike, by the names of what they join."""
     one_of(shaft, where, "stiffness", "pieces")
-    diameter, bore = shaft.diameter, shaft.bore
-    for k, piece in enumerate(shaft.pieces):
-        if piece.bore >= piece.diameter:
-            shown = units.shown(piece.bore, "m")
-            raise Refused(f"{where}.pieces[{k + 1}].bore", shown, "is as wide as its shaft", "give it a wall")
-    if stiffness is None:
-        pieces = [(piece.length, piece.diameter, piece.bore) for piece in shaft.pieces]
+    diameter, bore, length = shaft.diameter, shaft.bore, None
+    if given is not None:
+        stiffness = opened.number(given, "stiffness", "N m/rad", name, links)
+    else:
+        pieces = [_piece(piece, f"{where}.pieces[{k + 1}]", len(shaft.pieces)) for k, piece in enumerate(shaft.pieces)]
         stiffness = stiffness_of(pieces, table.shear_modulus)
         if diameter is None:
             _, diameter, bore = min(pieces, key=lambda piece: (piece[1] ** 4 - piece[2] ** 4) / piece[1])
+            length = pieces[0][0] if len(pieces) == 1 else None
+        if length is not None:
+            opened.number(shaft.pieces[0].diameter, "diameter", "m", name, links)
+        elif any(isinstance(piece.diameter, Open) for piece in shaft.pieces):
+            raise Refused(f"{where}.diameter", None, "is given beside one that is open", "leave it out")
     loss = table.loss_factor if shaft.loss_factor is None else shaft.loss_factor
     with blamed_on(where):
-        return Section("shaft", stiffness, shaft.damping, loss, diameter, bore)
+        return [
+            Section(link, stiffness, shaft.damping, loss, diameter, bore, length, table.shear_modulus) for link in links
+        ]
 
 
-def _disc(table: DiscTable) -> Disc:
-    return Disc(table.name, table.inertia, table.damping)
+def _piece(piece: PieceTable, where: str, count: int) -> tuple[float, float, float]:
+    """Length, diameter and bore; an open diameter is that of a shaft of one piece."""
+    given = Open.of(piece.diameter)
+    if given.is_open and count > 1:
+        raise Refused(f"{where}.diameter", None, "is open, and its shaft has other pieces", "fix it, or give one piece")
+    if piece.bore >= given.lower:
+        raise Refused(f"{where}.bore", units.shown(piece.bore, "m"), "is as wide as its shaft", "give it a wall")
+    return piece.length, given.start, piece.bore
 
 
-def _absorber(table: AbsorberTable, names: Sequence[str], where: str) -> Absorber:
+def _disc(table: DiscTable, opened: _Opened) -> Disc:
+    inertia = opened.number(table.inertia, "inertia", "kg m^2", table.name, [table.name])
+    return Disc(table.name, inertia, table.damping)
+
+
+def _absorber(table: AbsorberTable, names: Sequence[str], where: str, opened: _Opened) -> Absorber:
     if table.on not in names:
         raise Refused(f"{where}.on", table.on, "is no disc", nearest(table.on, list(names)))
     if table.order is not None and table.stiffness is not None:
         raise Refused(f"{where}.order", None, "is of a pendulum, and its stiffness is that of rubber", "keep one")
+    held = Open.of(table.stiffness).lower or Open.of(table.damping).lower or table.order
+    if not held:
+        rule = "leaves its ring to nothing where it is zero"
+        raise Refused(f"{where}.damping", None, rule, "give stiffness, damping or order, with bounds above zero")
+    inertia, stiffness, damping = (
+        opened.number(value, key, unit, table.name, [table.name])
+        for key, unit, value in (
+            ("inertia", "kg m^2", table.inertia),
+            ("stiffness", "N m/rad", table.stiffness or 0.0),
+            ("damping", "N m s/rad", table.damping),
+        )
+    )
     with blamed_on(where):
         return Absorber(
-            table.name, table.on, table.inertia, table.stiffness or 0.0, table.loss_factor, table.damping,
-            table.order or 0.0, table.damping_ratio,
+            table.name, table.on, inertia, stiffness, table.loss_factor, damping, table.order or 0.0,
+            table.damping_ratio,
         )  # fmt: skip
 
 
-def _for_each(values: Sequence[float], count: int, where: str, what: str) -> list[float]:
+def _for_each(values: Sequence[T], count: int, where: str, what: str) -> list[T]:
     if len(values) not in (1, count):
         raise Refused(where, None, f"has {len(values)} numbers for {count} {what}", "give one, or one for each")
     return list(values) * count if len(values) == 1 else list(values)

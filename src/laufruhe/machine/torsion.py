@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from laufruhe.errors import ModelError
 
@@ -54,6 +55,10 @@ class Section:
         Hysteretic: its stiffness is k (1 + i eta).
     diameter, bore
         Of its weakest place [m]; needed for a stress only.
+    length
+        Of a shaft that is one round piece, whose stiffness follows from its diameter [m]; else None.
+    shear_modulus
+        [Pa].
     """
 
     name: str
@@ -62,6 +67,8 @@ class Section:
     loss_factor: float = 0.0
     diameter: float | None = None
     bore: float = 0.0
+    length: float | None = None
+    shear_modulus: float = STEEL
 
     def __post_init__(self) -> None:
         if not self.stiffness > 0.0:
@@ -70,6 +77,13 @@ class Section:
             raise ModelError(f"shaft '{self.name}' has a negative damping")
         if self.diameter is not None and not 0.0 <= self.bore < self.diameter:
             raise ModelError(f"shaft '{self.name}' has a bore of {self.bore:g} m in a diameter of {self.diameter:g} m")
+
+    def moved(self, stiffness: float, diameter: float | None) -> Section:
+        """With another stiffness, or another diameter of its one piece and the stiffness of that."""
+        if diameter is None or diameter == self.diameter or self.length is None:
+            return replace(self, stiffness=stiffness)
+        stiffness = stiffness_of([(self.length, diameter, self.bore)], self.shear_modulus)
+        return replace(self, stiffness=stiffness, diameter=diameter)
 
     @property
     def modulus(self) -> float:
@@ -171,6 +185,28 @@ class Torsion:
         """Index of the disc where the load takes its torque: the last where none is named."""
         return self.index(self.output) if self.output else len(self.discs) - 1
 
+    @property
+    def numbers(self) -> dict[tuple[str, str], Any]:
+        """What decisions may move, by the name of a disc, section or absorber and that of its attribute."""
+        found: dict[tuple[str, str], Any] = {(disc.name, "inertia"): disc.inertia for disc in self.discs}
+        for part in self.sections:
+            found |= {(part.name, "stiffness"): part.stiffness, (part.name, "diameter"): part.diameter}
+        for absorber in self.absorbers:
+            found |= {(absorber.name, key): getattr(absorber, key) for key in ("inertia", "stiffness", "damping")}
+        return found
+
+    def moved(self, numbers: Mapping[tuple[str, str], Any]) -> Torsion:
+        """With these numbers in place of its own."""
+        return replace(
+            self,
+            discs=tuple(replace(d, inertia=numbers[d.name, "inertia"]) for d in self.discs),
+            sections=tuple(s.moved(numbers[s.name, "stiffness"], numbers[s.name, "diameter"]) for s in self.sections),
+            absorbers=tuple(
+                replace(a, **{key: numbers[a.name, key] for key in ("inertia", "stiffness", "damping")})
+                for a in self.absorbers
+            ),
+        )
+
     def scaled(self, length: float, mass: float) -> Torsion:
         """The same in another size and of the same material: stiffness grows as the cube of length."""
         inertia, stiffness = mass * length**2, length**3
@@ -178,7 +214,8 @@ class Torsion:
         discs = (replace(d, inertia=d.inertia * inertia, damping=d.damping * damping) for d in self.discs)
         sections = (
             replace(s, stiffness=s.stiffness * stiffness, damping=s.damping * damping, bore=s.bore * length,
-                    diameter=None if s.diameter is None else s.diameter * length)
+                    diameter=None if s.diameter is None else s.diameter * length,
+                    length=None if s.length is None else s.length * length)
             for s in self.sections
         )  # fmt: skip
         absorbers = (

@@ -11,9 +11,10 @@ chapter 2.9 is behind it: discs and shafts, half the reciprocating mass, critica
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ from laufruhe.physics.torque import crank_torque
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
+"""Of a chain, by order [1] and speed [rad/s] what each section makes of its twist, shape (orders, sections)."""
 
 _STEPS = 1024
 _SINGULAR = 1e-13
@@ -74,7 +77,7 @@ def _reduced_inertia(part: SliderCrank) -> float:
 
 def natural_modes(chain: Torsion, speed: float = 0.0) -> TorsionalModes:
     """Of the undamped chain with its rings; a pendulum's is that of a speed [rad/s] (V4)."""
-    inertia, stiffness = _inertias(chain), _stiffness(chain, speed).real
+    inertia, stiffness = inertias(chain), _stiffness(chain, speed).real
     root = np.sqrt(inertia)
     squares, shapes = np.linalg.eigh(stiffness / np.outer(root, root))
     shapes = shapes / root[:, None]
@@ -188,6 +191,8 @@ def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
     taken = (chain.driven <= sections)[:, None]
     stiff = np.array([section.stiffness for section in chain.sections])
     out[still] = (through * 1.0 - taken) / stiff[:, None]
+    if np.all(still):
+        return out
     size = count + len(chain.absorbers)
     drives = np.tile(np.eye(size, dtype=complex), (int(np.sum(~still)), 1, 1))
     angles = _solved(chain, orders[~still], speed, drives)[:, :count, :count]
@@ -213,17 +218,31 @@ def twist(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> 
 
 def shaft_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Torque in each section, shape (n, sections) [N m], towards the rear (V8)."""
-    turned = twist(engine, point, fidelity)
-    stiff = section_stiffness(chain_of(engine), turned.orders, point.speed)
-    return Spectrum(turned.base, turned.coefficients * stiff)
+    return times(twist(engine, point, fidelity), section_stiffness, chain_of(engine), point.speed)
 
 
 def shaft_stress(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Shear stress of every section that has a diameter, shape (n, those sections) [Pa] (V8; textbook 2.9)."""
     chain = chain_of(engine)
     own = [k for k, section in enumerate(chain.sections) if section.diameter is not None]
-    moduli = np.array([chain.sections[k].modulus for k in own])
-    return shaft_torque(engine, point, fidelity).each(lambda torque: torque[:, own] / moduli)
+    whole = times(twist(engine, point, fidelity), stress_factors, chain, point.speed)
+    return whole.each(lambda values: values[:, own])
+
+
+def times(twisted: Spectrum, factors: Factors, chain: Torsion, speed: float) -> Spectrum:
+    """A twist times what each section makes of it in each order."""
+    return Spectrum(twisted.base, twisted.coefficients * factors(chain, twisted.orders, speed))
+
+
+def unit_factors(chain: Torsion, orders: Array, _: float) -> ComplexArray:
+    """One for every order and section: the twist itself."""
+    return np.ones((len(orders), len(chain.sections)), dtype=complex)
+
+
+def stress_factors(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
+    """What a section makes of its twist, over its section modulus; zero of a section without a diameter (V8)."""
+    own = np.array([0.0 if section.diameter is None else 1.0 / section.modulus for section in chain.sections])
+    return np.asarray(section_stiffness(chain, orders, speed) * own)
 
 
 def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Array:
@@ -240,6 +259,13 @@ def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     return np.array(heat)
 
 
+def dynamic_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
+    """K + i H + i h w C - (h w)^2 J in every order, affine in inertia, stiffness and damping (V5)."""
+    rate = (orders * speed)[:, None, None]
+    found = _stiffness(chain, speed) + 1j * rate * _damping(chain, speed) - rate**2 * np.diag(inertias(chain))
+    return np.asarray(found)
+
+
 def _angles(chain: Torsion, torques: Spectrum, speed: float) -> ComplexArray:
     """Angles of discs and rings in every order but zero, shape (orders, discs and rings) (V5)."""
     drives = np.zeros((len(torques.coefficients) - 1, len(chain.discs) + len(chain.absorbers), 1), dtype=complex)
@@ -249,8 +275,7 @@ def _angles(chain: Torsion, torques: Spectrum, speed: float) -> ComplexArray:
 
 def _solved(chain: Torsion, orders: Array, speed: float, drives: ComplexArray) -> ComplexArray:
     """Angles under torques of every order but zero on discs and rings, shapes (orders, discs and rings, columns)."""
-    rate = (orders * speed)[:, None, None]
-    dynamic = _stiffness(chain, speed) + 1j * rate * _damping(chain, speed) - rate**2 * np.diag(_inertias(chain))
+    dynamic = dynamic_stiffness(chain, orders, speed)
     try:
         found = np.linalg.solve(dynamic, drives)
     except np.linalg.LinAlgError:
@@ -266,7 +291,8 @@ def _solved(chain: Torsion, orders: Array, speed: float, drives: ComplexArray) -
     return np.asarray(found)
 
 
-def _inertias(chain: Torsion) -> Array:
+def inertias(chain: Torsion) -> Array:
+    """Of discs and rings [kg m2]."""
     return np.array([disc.inertia for disc in chain.discs] + [absorber.inertia for absorber in chain.absorbers])
 
 

@@ -165,7 +165,7 @@ def barred_ranges(result: Result, design: Evaluation) -> tuple[Barred, ...]:
 def _barred(design: Evaluation, limits: tuple[Limit, ...], low: float, high: float) -> tuple[Barred, ...]:
     found = []
     for limit in limits:
-        if limit.measure.feels_order:
+        if limit.measure.is_twist:
             ranges = _ranges(_exceeds(design, limit), speeds_between(design, low, high))
             found += [Barred(limit.name, *ends) for ends in ranges]
     return tuple(found)

@@ -41,6 +41,8 @@ class Kind(IntEnum):
     """Nothing but the flywheel and how evenly the crank turns feels it."""
     PISTON = 7
     """Every load is affine in it, not so the inertia that turns."""
+    TORSION = 8
+    """Nothing but the twist of the crankshaft feels it."""
 
 
 @dataclass
@@ -57,6 +59,8 @@ class Numbers:
         Of every mount thirteen: stiffness, loss factor, damping, position, turned angles (E13).
     flywheel, pistons
         Inertia of the rest, mean diameter, width and height of a rim; changes of reciprocating masses by name [kg].
+    torsion
+        Of discs, sections and absorbers of the crankshaft, by their name and that of the number.
     """
 
     unbalances: dict[str, Any] = field(default_factory=dict)
@@ -64,6 +68,7 @@ class Numbers:
     mounts: list[list[Any]] = field(default_factory=list)
     flywheel: list[Any] = field(default_factory=list)
     pistons: dict[str, Any] = field(default_factory=dict)
+    torsion: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
@@ -72,7 +77,8 @@ class Numbers:
         unbalances = {name: rotor.unbalance for name, rotor in rotors.items()}
         places: dict[str, list[Any]] = {name: list(rotor.place) for name, rotor in rotors.items()}
         flywheel = list(engine.flywheel.numbers) if engine.flywheel else []
-        return cls(unbalances, places, [list(row) for row in mounts], flywheel)
+        torsion = engine.torsion.numbers if engine.torsion else {}
+        return cls(unbalances, places, [list(row) for row in mounts], flywheel, torsion=torsion)
 
     def engine(self, given: Engine) -> Engine:
         """The engine with these numbers."""
@@ -84,11 +90,12 @@ class Numbers:
         if self.mounts:
             mounts = tuple(mount_of(mount, row) for mount, row in zip(given.mounts, self.mounts, strict=True))
         flywheel, parts = given.flywheel.moved(self.flywheel) if given.flywheel else None, given.slider_cranks
+        torsion = given.torsion.moved(self.torsion) if given.torsion else None
         if self.pistons:
             # a sum of changes may leave a bound of zero by a rounding
             masses = (max(part.reciprocating_mass + float(self.pistons.get(part.name, 0.0)), 0.0) for part in parts)
             parts = tuple(replace(part, reciprocating_mass=mass) for part, mass in zip(parts, masses, strict=True))
-        return replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel)
+        return replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, torsion=torsion)
 
 
 class Drive(Protocol):
@@ -190,6 +197,20 @@ class MassDrive:
     def move(self, numbers: Numbers, change: Any) -> None:
         """Of the slider-crank."""
         numbers.pistons[self.part] = numbers.pistons.get(self.part, 0.0) + change.real
+
+
+@dataclass(frozen=True)
+class TorsionDrive:
+    """One number of a disc, section or absorber of the crankshaft += change."""
+
+    part: str
+    number: str
+    kind: ClassVar[Kind] = Kind.TORSION
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the crankshaft."""
+        numbers.torsion[self.part, self.number] += change
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import heapq
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,13 +86,30 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
     most = search.most_boxes
     if not most or not search.is_sampled_fully:
         return Divided(0.0, 0)
+    return divide(search, search.model.lower, search.model.upper, value, room, most)
+
+
+class Bounded(Protocol):
+    """What bounds boxes from below."""
+
+    what: str
+
+    @property
+    def at_once(self) -> int:
+        """Boxes of one round."""
+
+    def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
+
+
+def divide(search: Bounded, lower: Array, upper: Array, value: float, room: float, most: int) -> Divided:
+    """Halve boxes, the least first, until none may hold a design that is `room` better than `value`."""
     enough = value - NEARLY * room if value < math.inf else math.inf
-    lower, upper = search.model.lower, search.model.upper
     bounds, sides = search.bounds(lower[None], upper[None])
     heap = [(float(bounds[0]), 0, lower, upper, int(sides[0]))]
     seen = 1
     while heap and heap[0][0] < enough and seen < most and not passed():
-        tell("boxes of stiffness", seen, value=value, bound=heap[0][0])
+        tell(search.what, seen, value=value, bound=heap[0][0])
         halves: list[tuple[Array, Array, float]] = []
         while heap and heap[0][0] < enough and len(halves) < search.at_once:
             known, _, low, high, side = heapq.heappop(heap)
@@ -112,6 +129,8 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
 
 class _Search:
     """Bounds of boxes."""
+
+    what = "boxes of stiffness"
 
     def __init__(self, problem: Problem, left_out: float) -> None:
         self.problem = problem

@@ -106,6 +106,12 @@ def _flywheel(problem: Problem) -> Result:
     return solve_flywheel(problem)
 
 
+def _torsion(problem: Problem) -> Result:
+    from laufruhe.solvers.torsion import solve_torsion
+
+    return solve_within(problem, solve_torsion)
+
+
 def _apart(problem: Problem) -> Result:
     return solve_apart(problem, _decided)
 
@@ -157,9 +163,11 @@ def _asks_loads(problem: Problem) -> bool:
 
 
 _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
+_T = Kind.TORSION
 METHODS: tuple[Method, ...] = (
     Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, state),
     Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
+    Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, _torsion),
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_unbalances)),
     Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,

@@ -43,6 +43,7 @@ from laufruhe.problem.channels.kinds import (
     Needs,
     NumberChannel,
     PlaceChannel,
+    TwistChannel,
 )
 from laufruhe.problem.channels.runs import OF_RUNS, RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.problem.channels.torsional import TORSIONAL
@@ -61,6 +62,7 @@ __all__ = [
     "Needs",
     "NumberChannel",
     "PlaceChannel",
+    "TwistChannel",
 ]
 
 

@@ -11,14 +11,15 @@ from laufruhe.machine import Engine, Flywheel, Role
 from laufruhe.machine.clearances import Span
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.torsion import Factors, unit_factors
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import PointLoads
 
 OfWheel: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
-OF_WHEEL = frozenset({Kind.FLYWHEEL})
-"""At an even speed no load feels the flywheel."""
+UNFELT = frozenset({Kind.FLYWHEEL, Kind.TORSION})
+"""At an even speed no load on block or bearings feels the flywheel, nor how the crankshaft twists."""
 ON_BLOCK = ("operating_points", "orders")
 AT_SECTIONS = (*ON_BLOCK, "sections")
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
@@ -74,6 +75,8 @@ class Channel:
         Whether it never falls where a number of the flywheel grows, if it is of that; else it never rises.
     of_wheel
         The value as a function of the flywheel of an engine, if it is of that.
+    of_modes
+        Whether it is of natural frequencies of the crankshaft, which rise with stiffness and fall with inertia.
     span
         Least and largest of its numbers while shafts stand between their places in two engines, if it is of these.
     """
@@ -88,6 +91,7 @@ class Channel:
     of_loads: bool = False
     rises: bool = True
     of_wheel: Callable[[Asked, Answered], OfWheel] | None = None
+    of_modes: bool = False
     span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
@@ -119,7 +123,7 @@ class Channel:
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Whether it may change with decisions of these kinds."""
-        return bool(set(kinds) - OF_WHEEL)
+        return bool(set(kinds) - UNFELT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,14 +172,21 @@ class LoadChannel(Channel):
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Mounts move what they transmit, and nothing of what the block feels."""
-        felt = set(kinds) - OF_WHEEL
+        felt = set(kinds) - UNFELT
         return bool(felt if self.part is None and not self.is_inside else felt - OF_MOUNTS)
 
 
 @dataclass(frozen=True, eq=False)
 class TwistChannel(LoadChannel):
-    """A load that makes the crankshaft twist: of when every cylinder fires, and of no unbalance."""
+    """A load that makes the crankshaft twist: of when every cylinder fires, and of no unbalance.
 
+    Attributes
+    ----------
+    factors
+        What its places make of the twist of each section.
+    """
+
+    factors: Factors = unit_factors
     keys: tuple[str, ...] = AT_SECTIONS
     needs: Needs = Needs.TORSION
     is_inside: bool = True
@@ -183,8 +194,8 @@ class TwistChannel(LoadChannel):
     feels_inertia: ClassVar[bool] = True
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Throws and firing order, and the inertia of the pistons."""
-        return Kind.STAR in kinds or Kind.PISTON in kinds
+        """Throws and firing order, the inertia of the pistons, discs and shafts."""
+        return bool({Kind.STAR, Kind.PISTON, Kind.TORSION} & set(kinds))
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +234,7 @@ class MountChannel(NumberChannel):
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Mounts, and all that moves loads where these count."""
-        return bool(set(kinds) - OF_WHEEL) if self.of_loads else bool(set(kinds) & OF_MOUNTS)
+        return bool(set(kinds) - UNFELT) if self.of_loads else bool(set(kinds) & OF_MOUNTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,8 +245,8 @@ class TorsionChannel(NumberChannel):
     minimised: bool = False
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """What excites them is a matter of throws and firing order, all else of discs, shafts and pistons."""
-        return Kind.PISTON in kinds or (self.of_loads and Kind.STAR in kinds)
+        """Discs, shafts and pistons; what excites them is a matter of throws and firing order too."""
+        return bool({Kind.PISTON, Kind.TORSION} & set(kinds)) or (self.of_loads and Kind.STAR in kinds)
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ def _names_of_stressed(engine: Engine) -> Sequence[str]:
 
 
 def _of_shafts(
-    name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum],
+    name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum], factors: torsion.Factors,
     places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Needs = Needs.TORSION,
 ) -> TwistChannel:  # fmt: skip
     def found(loads: PointLoads) -> Spectrum:
@@ -33,7 +33,7 @@ def _of_shafts(
             raise ValueError(f"of a wrench alone there is no {name}")
         return signal(loads.moving, loads.point, loads.fidelity).each(lambda values: values[:, :, None])
 
-    return TwistChannel(name, unit, needs=needs, signal=found, places=places)
+    return TwistChannel(name, unit, needs=needs, signal=found, places=places, factors=factors)
 
 
 def _points(measure: Asked, evaluation: Answered) -> list[PointLoads]:
@@ -59,12 +59,15 @@ def _heat(measure: Asked, evaluation: Answered) -> Sequence[float]:
     return (max((float(heat) for each in found for heat in each), default=0.0),)
 
 
-SHAFT_TWIST = _of_shafts("shaft twist", "rad", torsion.twist)
-SHAFT_TORQUE = _of_shafts("shaft torque", "N m", torsion.shaft_torque)
-SHAFT_STRESS = _of_shafts("shaft stress", "Pa", torsion.shaft_stress, _names_of_stressed, Needs.DIAMETERS)
-TORSIONAL_FREQUENCIES = TorsionChannel(
-    "torsional frequencies", "Hz", ("operating_points",), sides=("min", "max", "outside"), values=_frequencies
+SHAFT_TWIST = _of_shafts("shaft twist", "rad", torsion.twist, torsion.unit_factors)
+SHAFT_TORQUE = _of_shafts("shaft torque", "N m", torsion.shaft_torque, torsion.section_stiffness)
+SHAFT_STRESS = _of_shafts(
+    "shaft stress", "Pa", torsion.shaft_stress, torsion.stress_factors, _names_of_stressed, Needs.DIAMETERS
 )
+TORSIONAL_FREQUENCIES = TorsionChannel(
+    "torsional frequencies", "Hz", ("operating_points",), sides=("min", "max", "outside"), values=_frequencies,
+    of_modes=True,
+)  # fmt: skip
 CRITICAL_SPEEDS = TorsionChannel(
     "critical speeds", "rad/s", ("operating_points", "orders"), sides=("min", "max", "outside"),
     values=_critical_speeds,

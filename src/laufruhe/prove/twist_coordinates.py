@@ -1,0 +1,86 @@
+"""What is open of the crankshaft, in coordinates that its dynamic stiffness is affine in (V13)."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Section, Torsion
+from laufruhe.physics.torsion import chain_of
+from laufruhe.problem.decision import Decision, TorsionDrive
+from laufruhe.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+
+class TwistCoordinates:
+    """Inertia, stiffness and damping as they are decided; of a diameter the stiffness that it makes.
+
+    Attributes
+    ----------
+    lower, upper
+        Bounds, shape (n,).
+    owners
+        Which coordinate moves which section, shape (n, sections), zeros and ones.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self._chain = problem, chain_of(problem.engine)
+        self._drives = [_drives_of(decision) for decision in problem.decisions]
+        self.lower = self.of(np.array([decision.lower for decision in problem.decisions]))
+        self.upper = self.of(np.array([decision.upper for decision in problem.decisions]))
+        self.owners = np.array(
+            [[float(any(drive.part == s.name for drive in drives)) for s in self._chain.sections]
+             for drives in self._drives]
+        )  # fmt: skip
+
+    @cached_property
+    def is_exact(self) -> bool:
+        """Whether stress bends one way with every stiffness: viscous damping of a shaft of open diameter spoils it."""
+        return all(section.damping == 0.0 for _, section in self._round)
+
+    @property
+    def _round(self) -> list[tuple[int, Section]]:
+        """Coordinates of diameters, and one of the sections that has each."""
+        named = {section.name: section for section in self._chain.sections}
+        return [(k, named[drives[0].part]) for k, drives in enumerate(self._drives) if drives[0].number == "diameter"]
+
+    def of(self, values: Array) -> Array:
+        """Of decisions."""
+        found = np.array(values, dtype=float)
+        for k, section in self._round:
+            found[k] = section.moved(section.stiffness, float(values[k])).stiffness
+        return found
+
+    def decisions(self, coordinates: Array) -> Array:
+        """That these coordinates are of."""
+        found = np.array(coordinates, dtype=float)
+        for k, section in self._round:
+            diameter = section.diameter or 0.0
+            solid = section.stiffness / (diameter**4 - section.bore**4)
+            found[k] = (found[k] / solid + section.bore**4) ** 0.25
+        low, high = (np.array([getattr(d, end) for d in self.problem.decisions]) for end in ("lower", "upper"))
+        return np.asarray(np.clip(found, low, high))
+
+    def chain(self, coordinates: Array) -> Torsion:
+        """Of a point."""
+        return chain_of(self.problem.design(self.decisions(coordinates).tolist()))
+
+    def ends(self, lower: Array, upper: Array) -> tuple[Torsion, Torsion] | None:
+        """Of a box the chains of the lowest and of the highest natural frequencies; None where no corner is known."""
+        absorbers = {absorber.name: absorber for absorber in self._chain.absorbers}
+        falls = np.zeros(len(lower), dtype=bool)
+        for k, drives in enumerate(self._drives):
+            absorber = absorbers.get(drives[0].part)
+            free = absorber is not None and drives[0].number == "stiffness" and lower[k] == 0.0
+            # the spring of a pendulum grows with its inertia, and a ring that turns free has no frequency
+            if free or (absorber is not None and drives[0].number == "inertia" and absorber.order > 0.0):
+                return None
+            falls[k] = drives[0].number == "inertia"
+        return self.chain(np.where(falls, upper, lower)), self.chain(np.where(falls, lower, upper))
+
+
+def _drives_of(decision: Decision) -> list[TorsionDrive]:
+    return [drive for drive in decision.drives if isinstance(drive, TorsionDrive)]

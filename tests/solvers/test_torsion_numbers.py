@@ -1,0 +1,140 @@
+"""Dampers, shafts and flywheels decided against torsion: optima, bounds, limits, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import differential_evolution
+
+import laufruhe
+from laufruhe.errors import InputError, ModelError
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers.result import Result, Status
+from problem_files import PROBLEMS
+
+READY = PROBLEMS / "inline-five-damper.toml"
+QUICK = {"fidelity": {"samples": 180}, "tolerance": 1e-2, "search": {"starts": 4}}
+STIFF = {"between": ["3e5 N m/rad", "6e5 N m/rad"], "start": "4e5 N m/rad"}
+
+
+def problem_of(torsion: dict[str, Any] | None = None, **more: Any) -> Problem:
+    tables = tables_of(READY)
+    tables["torsion"] = {**tables["torsion"], **(torsion or {})}
+    return load_tables({**tables, **QUICK, **more}, Path("five.toml"))
+
+
+def value_at(problem: Problem, x: Any) -> float:
+    return objective_value(problem, evaluate(problem, problem.design([float(v) for v in x])))
+
+
+@pytest.fixture(scope="module")
+def damper() -> tuple[Problem, Result]:
+    problem = problem_of()
+    return problem, laufruhe.solve(problem)
+
+
+@pytest.mark.slow
+def test_a_viscous_damper_is_proven(damper: tuple[Problem, Result]) -> None:
+    """No design of a grid over the bounds is better, and none of it is under the bound."""
+    problem, result = damper
+    bounds = [(d.lower, d.upper) for d in problem.decisions]
+    grid = [value_at(problem, (a, b)) for a in np.linspace(*bounds[0], 5) for b in np.geomspace(*bounds[1], 12)]
+    assert result.objective.value <= min(grid) * (1.0 + 1e-6)
+    assert result.certificate.lower_bound <= min(grid)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.gap <= 1e-2
+    assert result.certificate.kkt_residual < 1e-5
+    assert result.objective.value == pytest.approx(value_at(problem, [d.value for d in result.decisions]))
+    assert result.objective.value < 0.5 * result.objective.initial
+
+
+@pytest.mark.slow
+def test_other_numbers_agree_with_an_evolution() -> None:
+    """A rubber ring and the stiffness of the crank, three numbers: SciPy's differential evolution finds no better."""
+    rubber = {
+        "name": "ring", "on": "pulley", "loss_factor": 0.15, "inertia": "0.006 kg m^2",
+        "stiffness": {"between": ["5e3 N m/rad", "5e4 N m/rad"], "start": "1e4 N m/rad"},
+        "damping": {"between": ["0 N m s/rad", "5 N m s/rad"], "start": "1 N m s/rad"},
+    }  # fmt: skip
+    problem = problem_of({"absorbers": [rubber], "crank": {"stiffness": STIFF, "diameter": "48 mm"}},
+                         search={"starts": 6, "boxes": 300})  # fmt: skip
+    result = laufruhe.solve(problem)
+    bounds = [(d.lower, d.upper) for d in problem.decisions]
+    found = differential_evolution(lambda x: value_at(problem, x), bounds, seed=3, maxiter=12, popsize=8, polish=False)
+    assert result.objective.value <= found.fun * (1.0 + 1e-4)
+    assert result.certificate.lower_bound <= found.fun
+    assert result.certificate.kkt_residual < 1e-3
+
+
+@pytest.mark.slow
+def test_a_shaft_under_a_limit_of_its_frequencies() -> None:
+    """The diameter of the crank with no natural frequency in a band: the design keeps it, its bound holds on a grid."""
+    crank = {"pieces": [{"length": "70 mm", "diameter": {"between": ["40 mm", "60 mm"], "start": "48 mm"}}]}
+    band = {"limit": "torsional frequencies", "outside": ["300 Hz", "345 Hz"]}
+    problem = problem_of({"crank": crank, "absorbers": []}, constraints=[band])
+    result = laufruhe.solve(problem)
+    grid = np.linspace(0.040, 0.060, 41)
+    values = {float(d): value_at(problem, [d]) for d in grid}
+    kept = [v for d, v in values.items() if evaluate(problem, problem.design([d])).excess(problem.limits) <= 0.0]
+    assert 0 < len(kept) < len(grid)
+    assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
+    assert result.final.excess(problem.limits) <= 1e-6
+    assert result.objective.value <= min(kept) * (1.0 + 1e-6)
+    assert result.certificate.lower_bound <= result.objective.value
+    # without the limit there is more freedom
+    free = laufruhe.solve(problem_of({"crank": crank, "absorbers": []}))
+    assert free.objective.value <= result.objective.value * (1.0 + 1e-6)
+    assert free.certificate.lower_bound <= min(values.values())
+
+
+@pytest.mark.slow
+def test_peaks_have_a_local_optimum(damper: tuple[Problem, Result]) -> None:
+    """Boxes bound root mean squares alone: of a peak nothing is proven, and it is said."""
+    result = laufruhe.solve(problem_of(objective={"minimise": "maximum shaft stress"}))
+    assert result.certificate.kind is Proof.LOCAL
+    assert result.certificate.lower_bound == 0.0
+    assert result.objective.value < result.objective.initial
+
+
+@pytest.mark.slow
+def test_heat_is_a_limit(damper: tuple[Problem, Result]) -> None:
+    """A damper that may give off less is no better."""
+    free = damper[1]
+    few = {"starts": 4, "boxes": 20}
+    problem = problem_of(constraints=[{"limit": "absorber heat", "max": "250 W"}], search=few)
+    heat = free.final.value(problem.limits[0].measure)
+    allowed = problem_of(constraints=[{"limit": "absorber heat", "max": f"{0.9 * heat} W"}], search=few)
+    result = laufruhe.solve(allowed)
+    assert result.final.value(problem.limits[0].measure) == pytest.approx(0.9 * heat, rel=1e-3)
+    assert result.objective.value > free.objective.value
+    assert laufruhe.solve(problem).objective.value == pytest.approx(free.objective.value, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_what_no_design_keeps() -> None:
+    result = laufruhe.solve(problem_of(constraints=[{"limit": "rms shaft stress", "max": "2 N/mm^2", "name": "low"}]))
+    assert result.status is Status.INFEASIBLE
+    assert result.conflict == ("low",)
+
+
+def test_what_is_refused() -> None:
+    tables = tables_of(READY)
+    engine = {**tables["engine"], "throws": "open", "cylinders": 5}
+    del engine["firing_order"]
+    with pytest.raises(ModelError, match=r"no method decides star and torsion together"):
+        laufruhe.solve(problem_of(engine=engine))
+    wide, open_ring = {"between": ["40 mm", "60 mm"]}, {"between": ["0 N m s/rad", "9 N m s/rad"]}
+    pieces = [{"length": "30 mm", "diameter": wide}, {"length": "20 mm", "diameter": "50 mm"}]
+    with pytest.raises(InputError, match="is open, and its shaft has other pieces"):
+        problem_of({"crank": {"pieces": pieces}})
+    with pytest.raises(InputError, match="leaves its ring to nothing"):
+        problem_of({"absorbers": [{"name": "d", "on": "pulley", "inertia": "1 kg m^2", "damping": open_ring}]})
+    with pytest.raises(InputError, match="must be more than"):
+        problem_of({"absorbers": [{"name": "d", "on": "pulley", "damping": "1 N m s/rad",
+                                   "inertia": {"between": ["0 kg m^2", "1 kg m^2"]}}]})  # fmt: skip
