@@ -64,7 +64,7 @@ def test_one_number_for_each() -> None:
         ({"throw_inertia": ["1 kg m^2"] * 4}, "has 4 numbers for 5 throws"),
         ({"absorbers": [{"name": "d", "on": "pulley", "damping": "2 N m s/rad"}]}, "absorbers[1].inertia: is missing"),
         ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "0 kg m^2"}]}, "must be more than 0 kg m^2"),
-        ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "1 kg m^2"}]}, "nothing holds the ring"),
+        ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "1 kg m^2"}]}, "leaves its ring to nothing"),
         ({"absorbers": [{"name": "d", "on": "puley", "inertia": "1 kg m^2"}]}, "did you mean 'pulley'"),
         ({"output": "gearbox"}, "is no disc"),
         ({"throw_inertia": {"between": ["0.001 kg m^2", "0.01 kg m^2"]}}, "cannot be left open"),

@@ -26,6 +26,7 @@ from laufruhe.physics.torsion import (
     shaft_stress,
     shaft_torque,
     throw_torques,
+    turned_by,
     twist,
     vector_sums,
 )
@@ -117,6 +118,15 @@ def test_half_the_reciprocating_mass_turns_with_the_throw() -> None:
     rate = np.cos(phi) / (3.0 * np.cos(swing))
     expected = 0.05**2 + 2.0 * np.mean(speed**2) - 2e-4 * np.mean(rate**2)
     assert reduced_inertia(short) == pytest.approx(expected, rel=1e-9)
+
+
+def test_other_pistons_turn_with_their_throws(five: tuple[Engine, OperatingPoint]) -> None:
+    engine, _ = five
+    heavier = tuple(replace(part, reciprocating_mass=part.reciprocating_mass + 0.1) for part in engine.slider_cranks)
+    moved = turned_by(engine.torsion, engine.slider_cranks, heavier)
+    expected = reduced_inertia(heavier[0]) - reduced_inertia(engine.slider_cranks[0])
+    assert moved.discs[3].inertia - engine.torsion.discs[3].inertia == pytest.approx(expected)
+    assert moved.discs[0] == engine.torsion.discs[0]
 
 
 def test_throws_together_have_the_torque_of_the_crank(five: tuple[Engine, OperatingPoint]) -> None:

@@ -75,6 +75,13 @@ def _reduced_inertia(part: SliderCrank) -> float:
     return part.rotating_mass * part.crank_radius**2 + swinging + turning
 
 
+def turned_by(chain: Torsion, before: Sequence[SliderCrank], after: Sequence[SliderCrank]) -> Torsion:
+    """The chain with other pistons and rods in place of those that its discs have (V1)."""
+    more = {a.name: reduced_inertia(b) - reduced_inertia(a) for a, b in zip(before, after, strict=True)}
+    discs = (replace(d, inertia=d.inertia + sum(more[name] for name in d.cylinders)) for d in chain.discs)
+    return replace(chain, discs=tuple(discs))
+
+
 def natural_modes(chain: Torsion, speed: float = 0.0) -> TorsionalModes:
     """Of the undamped chain with its rings; a pendulum's is that of a speed [rad/s] (V4)."""
     inertia, stiffness = inertias(chain), _stiffness(chain, speed).real

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from laufruhe.machine import Engine, Mount
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.rigid_body import turned_axes
+from laufruhe.physics.torsion import turned_by
 from laufruhe.problem.sets import Set, Value
 
 Array = NDArray[np.float64]
@@ -95,6 +96,7 @@ class Numbers:
             # a sum of changes may leave a bound of zero by a rounding
             masses = (max(part.reciprocating_mass + float(self.pistons.get(part.name, 0.0)), 0.0) for part in parts)
             parts = tuple(replace(part, reciprocating_mass=mass) for part, mass in zip(parts, masses, strict=True))
+            torsion = None if torsion is None else turned_by(torsion, given.slider_cranks, parts)
         return replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, torsion=torsion)
 
 
