@@ -19,7 +19,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, orders_equal
-from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel, TwistChannel
+from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel
 from laufruhe.problem.loads import PointLoads
 
 Array = NDArray[np.float64]
@@ -124,13 +124,6 @@ class Measure:
     def is_twist(self) -> bool:
         """Whether it is of the crankshaft's twist, which rotors do not load."""
         return self.is_load and not self.load.feels_unbalances
-
-    @property
-    def twisted(self) -> TwistChannel:
-        """The channel of the crankshaft's twist."""
-        if not isinstance(self.channel, TwistChannel):
-            raise TypeError(f"{self.name} is no twist")
-        return self.channel
 
     @property
     def lever(self) -> int | None:

@@ -251,7 +251,7 @@ class TwistBoxes:
     ) -> tuple[ComplexArray, ComplexArray, Array]:
         """Value, slopes and rest of what a measure makes of the twist, in every order that counts."""
         speed, counted = lines.loads.point.speed, measure.counted(lines.orders)
-        low, here, high = (measure.twisted.factors(chain, lines.orders[counted], speed) for chain in chains)
+        low, here, high = (measure.load.factors(chain, lines.orders[counted], speed) for chain in chains)
         # each factor is of its own stiffness, and bends one way: so much the secant may be off
         turn, bend = 0.5 * (high - low), np.abs(here - 0.5 * (high + low))
         value, by_side, left = twist.value[counted], twist.slopes[:, counted], twist.rest[counted]
@@ -266,7 +266,7 @@ class TwistBoxes:
         """The same of order zero, each section of its own stiffness alone."""
         zero, speed = np.zeros(1), lines.loads.point.speed
         low, here, high = (
-            (receptances(chain, zero, speed)[0] @ lines.mean) * measure.twisted.factors(chain, zero, speed)[0]
+            (receptances(chain, zero, speed)[0] @ lines.mean) * measure.load.factors(chain, zero, speed)[0]
             for chain in chains
         )
         return here, self.coordinates.owners * (0.5 * (high - low)), np.abs(here - 0.5 * (high + low))

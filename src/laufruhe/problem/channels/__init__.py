@@ -43,7 +43,6 @@ from laufruhe.problem.channels.kinds import (
     Needs,
     NumberChannel,
     PlaceChannel,
-    TwistChannel,
 )
 from laufruhe.problem.channels.runs import OF_RUNS, RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.problem.channels.torsional import TORSIONAL
@@ -62,7 +61,6 @@ __all__ = [
     "Needs",
     "NumberChannel",
     "PlaceChannel",
-    "TwistChannel",
 ]
 
 

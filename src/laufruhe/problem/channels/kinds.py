@@ -146,6 +146,8 @@ class LoadChannel(Channel):
         Whether it acts inside the crankcase, so that neither the block nor its mounts feel it.
     adds_up
         Whether its places are added up, so that no norm but the mean over the cycle has a meaning.
+    factors
+        Of a twist of the crankshaft, what its places make of that of each section.
     """
 
     keys: tuple[str, ...] = ON_BLOCK
@@ -156,6 +158,7 @@ class LoadChannel(Channel):
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
     is_inside: bool = False
     adds_up: bool = False
+    factors: Factors = unit_factors
     is_load: ClassVar[bool] = True
     feels_unbalances: ClassVar[bool] = True
     """Whether rotors load it, and the loads of each throw add up; else it is of cylinders and what they twist."""
@@ -178,15 +181,8 @@ class LoadChannel(Channel):
 
 @dataclass(frozen=True, eq=False)
 class TwistChannel(LoadChannel):
-    """A load that makes the crankshaft twist: of when every cylinder fires, and of no unbalance.
+    """A load that makes the crankshaft twist: of when every cylinder fires, and of no unbalance."""
 
-    Attributes
-    ----------
-    factors
-        What its places make of the twist of each section.
-    """
-
-    factors: Factors = unit_factors
     keys: tuple[str, ...] = AT_SECTIONS
     needs: Needs = Needs.TORSION
     is_inside: bool = True

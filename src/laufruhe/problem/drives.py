@@ -1,0 +1,218 @@
+"""What decisions drive: kinds of numbers of an engine, and how a change moves each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from typing import Any, ClassVar, Protocol
+
+from laufruhe.machine import Engine, Mount
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.physics.rigid_body import turned_axes
+from laufruhe.physics.torsion import turned_by
+from laufruhe.problem.sets import Value
+
+STIFFNESS, LOSS, DAMPING, POSITION, TURNED = slice(0, 3), 3, slice(4, 7), slice(7, 10), slice(10, 13)
+NUMBERS_OF_MOUNT = 13
+
+
+class Kind(IntEnum):
+    """Kinds of what may be open, by what a method has to know of them; of several the last one counts."""
+
+    UNBALANCE = 1
+    """Every load is affine in it (P1)."""
+    PLACE = 2
+    """Every load is affine in it while the unbalances are held (P8)."""
+    STIFFNESS = 3
+    """K is linear in it."""
+    MOUNT = 4
+    STAR = 5
+    """Of the phasing: no number."""
+    FLYWHEEL = 6
+    """Nothing but the flywheel and how evenly the crank turns feels it."""
+    PISTON = 7
+    """Every load is affine in it, not so the inertia that turns."""
+    TORSION = 8
+    """Nothing but the twist of the crankshaft feels it."""
+
+
+@dataclass
+class Numbers:
+    """The numbers of an engine that decisions may move; symbols do as well.
+
+    Attributes
+    ----------
+    unbalances
+        Of the rotors by name [kg m] (C4).
+    places
+        Of the rotors by name: x, and y and z of their shafts [m] (C2).
+    mounts
+        Of every mount thirteen: stiffness, loss factor, damping, position, turned angles (E13).
+    flywheel, pistons
+        Inertia of the rest, mean diameter, width and height of a rim; changes of reciprocating masses by name [kg].
+    torsion
+        Of discs, sections and absorbers of the crankshaft, by their name and that of the number.
+    """
+
+    unbalances: dict[str, Any] = field(default_factory=dict)
+    places: dict[str, list[Any]] = field(default_factory=dict)
+    mounts: list[list[Any]] = field(default_factory=list)
+    flywheel: list[Any] = field(default_factory=list)
+    pistons: dict[str, Any] = field(default_factory=dict)
+    torsion: dict[tuple[str, str], Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
+        """Those of an engine as given, and of its mounts where these may move."""
+        rotors = {rotor.name: rotor for rotor in engine.rotors}
+        unbalances = {name: rotor.unbalance for name, rotor in rotors.items()}
+        places: dict[str, list[Any]] = {name: list(rotor.place) for name, rotor in rotors.items()}
+        flywheel = list(engine.flywheel.numbers) if engine.flywheel else []
+        torsion = engine.torsion.numbers if engine.torsion else {}
+        return cls(unbalances, places, [list(row) for row in mounts], flywheel, torsion=torsion)
+
+    def engine(self, given: Engine) -> Engine:
+        """The engine with these numbers."""
+        rotors = tuple(
+            replace(rotor, unbalance=self.unbalances[rotor.name]).placed(*self.places[rotor.name])
+            for rotor in given.rotors
+        )
+        mounts = given.mounts
+        if self.mounts:
+            mounts = tuple(mount_of(mount, row) for mount, row in zip(given.mounts, self.mounts, strict=True))
+        flywheel, parts = given.flywheel.moved(self.flywheel) if given.flywheel else None, given.slider_cranks
+        torsion = given.torsion.moved(self.torsion) if given.torsion else None
+        if self.pistons:
+            # a sum of changes may leave a bound of zero by a rounding
+            masses = (max(part.reciprocating_mass + float(self.pistons.get(part.name, 0.0)), 0.0) for part in parts)
+            parts = tuple(replace(part, reciprocating_mass=mass) for part, mass in zip(parts, masses, strict=True))
+            torsion = None if torsion is None else turned_by(torsion, given.slider_cranks, parts)
+        return replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, torsion=torsion)
+
+
+class Drive(Protocol):
+    """How a decision acts on one number of the engine."""
+
+    @property
+    def kind(self) -> Kind:
+        """What a method has to know of it."""
+
+    @property
+    def acts(self) -> bool:
+        """Whether anything of the engine follows."""
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Move the number by a change of the decision."""
+
+
+@dataclass(frozen=True)
+class RotorDrive:
+    """U += gain u of one rotor, or gain conj(u) when mirrored."""
+
+    rotor: str
+    gain: complex
+    mirrored: bool = False
+    kind: ClassVar[Kind] = Kind.UNBALANCE
+
+    @property
+    def acts(self) -> bool:
+        """Unless the gain is nothing."""
+        return self.gain != 0.0
+
+    def of(self, change: Value) -> Value:
+        """What a change of the decision does to the unbalance."""
+        return self.gain * (change.conjugate() if self.mirrored else change)
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the unbalance."""
+        numbers.unbalances[self.rotor] += self.of(change)
+
+
+@dataclass(frozen=True)
+class PlaceDrive:
+    """Place of one rotor += change, along x, or by the y or z of its shaft (C2)."""
+
+    rotor: str
+    axis: int
+    kind: ClassVar[Kind] = Kind.PLACE
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the rotor."""
+        numbers.places[self.rotor][self.axis] += change
+
+
+@dataclass(frozen=True)
+class MountDrive:
+    """number += gain x change, of one number of one mount (E13)."""
+
+    mount: int
+    number: int
+    gain: float
+
+    @property
+    def kind(self) -> Kind:
+        """K is linear in stiffness alone."""
+        return Kind.STIFFNESS if self.number < STIFFNESS.stop else Kind.MOUNT
+
+    @property
+    def acts(self) -> bool:
+        """Unless the gain is nothing."""
+        return self.gain != 0.0
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the mount's number."""
+        numbers.mounts[self.mount][self.number] += self.gain * change
+
+
+@dataclass(frozen=True)
+class FlywheelDrive:
+    """One number of the flywheel += change."""
+
+    number: int
+    kind: ClassVar[Kind] = Kind.FLYWHEEL
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the flywheel."""
+        numbers.flywheel[self.number] += change
+
+
+@dataclass(frozen=True)
+class MassDrive:
+    """Reciprocating mass of one slider-crank += change."""
+
+    part: str
+    kind: ClassVar[Kind] = Kind.PISTON
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the slider-crank."""
+        numbers.pistons[self.part] = numbers.pistons.get(self.part, 0.0) + change.real
+
+
+@dataclass(frozen=True)
+class TorsionDrive:
+    """One number of a disc, section or absorber of the crankshaft += change."""
+
+    part: str
+    number: str
+    kind: ClassVar[Kind] = Kind.TORSION
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the crankshaft."""
+        numbers.torsion[self.part, self.number] += change
+
+
+def mount_of(mount: Mount, numbers: Sequence[float]) -> Mount:
+    """A mount with these numbers in place of its own."""
+    rows = turned_axes(NUMBERS, numbers[TURNED]).tolist()
+    # a sum of changes may leave a bound of zero by a rounding
+    (a, b, c), (p, q, r) = (tuple(max(float(v), 0.0) for v in numbers[s]) for s in (STIFFNESS, DAMPING))
+    x, y, z = (float(v) for v in numbers[POSITION])
+    return replace(
+        mount, stiffness=(a, b, c), loss_factor=max(float(numbers[LOSS]), 0.0), damping=(p, q, r), position=(x, y, z),
+        orientation=(tuple(rows[0]), tuple(rows[1]), tuple(rows[2])),
+    )  # fmt: skip
