@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from laufruhe.cli.fidelity import explained, traded
 from laufruhe.errors import InputError, ModelError
 from laufruhe.machine import Flywheel, Rim
 from laufruhe.physics.irregularity import irregularity
@@ -255,3 +256,13 @@ def test_what_no_method_decides_with_a_flywheel_is_refused_by_name(tmp_path: Pat
     text = changed(SINGLE, "throws = [0]", 'cylinders = 3\ncylinder_spacing = "120 mm"\nthrows = "open"')
     with pytest.raises(ModelError, match="degree of irregularity"):
         laufruhe.solve(loaded(tmp_path, text + INERTIA + LEAST))
+
+
+def test_what_a_flywheel_needs_is_told_and_nothing_traded_for_it() -> None:
+    """Gas and speed enter, orders of two and more do not; a cheap model would make a wheel that breaks its limits."""
+    path = PROBLEMS / "diesel-70-hp-flywheel.toml"
+    text, _ = explained(path, 1e-3)
+    assert "gas: without" in text
+    assert "crank speed: without" in text
+    with pytest.raises(InputError, match="no cheap model is traded"):
+        traded([path], Path("nowhere"), lambda _: None)

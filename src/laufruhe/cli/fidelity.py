@@ -62,6 +62,11 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     from laufruhe.plots.trade import figure, has_picture
 
     problems = [_with_objective(path) for path in paths]
+    for path, problem in zip(paths, problems, strict=True):
+        if problem.flywheel_decisions:
+            # a cheap model makes one that breaks its limits, and what that costs no error of the objective tells
+            rule = "is open, and no cheap model is traded for a flywheel that keeps its limits"
+            raise InputError(str(path), (Complaint("flywheel", "", rule, "fix it"),))
     found: dict[int, Trade] = {}
     for k, one in _measured(paths, problems, say):
         problem, path, found[k] = problems[k], paths[k], one

@@ -51,8 +51,8 @@ def needs(problem: Problem) -> Choice:
 
 
 def _values(problem: Problem) -> Array:
-    """All that is asked of mounts; of natural frequencies all six."""
-    evaluation, wanted = evaluate(problem), [measure for measure in problem.measures if measure.is_mounting]
+    """All numbers that are asked; of natural frequencies all six."""
+    evaluation, wanted = evaluate(problem), [measure for measure in problem.measures if measure.channel.is_number]
     return np.array([value for measure in wanted for value in evaluation.values(measure)])
 
 
@@ -72,6 +72,8 @@ def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
 
 def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
     """Parts of block and mounts, each with the problem that lacks it or has more of it."""
+    if problem.engine.block is None:
+        return
     block, mounts = mounting_in(problem.engine).block, problem.engine.mounts
     stiff = tuple(replace(m, stiffness=(MORE * m.stiffness[0], m.stiffness[1], m.stiffness[2] / MORE)) for m in mounts)
     inertia: Any = tuple(tuple(MORE * value for value in row) for row in block.inertia)

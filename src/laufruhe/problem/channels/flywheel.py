@@ -38,7 +38,7 @@ def _found(
     def of_wheel(measure: Asked, evaluation: Answered) -> OfWheel:
         counted = [at.point for at in evaluation.loads if measure.points is None or at.point.name in measure.points]
         swings = [swing_of(evaluation.engine, point, evaluation.fidelity) for point in counted]
-        return lambda wheel: max(number(wheel, swing) for swing in swings)
+        return lambda wheel: max((number(wheel, swing) for swing in swings), default=0.0)
 
     def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
         inertia, wheel = turning_inertia(evaluation.engine, evaluation.fidelity), evaluation.engine.flywheel

@@ -24,8 +24,8 @@ class RunChannel(NumberChannel):
 def _most(name: str, unit: str, number: Callable[[RunUp], float]) -> RunChannel:
     def values(_: Asked, evaluation: Answered) -> Sequence[float]:
         run = evaluation.engine.run
-        if run is None:
-            return ()
+        if run is None or not evaluation.loads:
+            return (0.0,)
         point = point_of(run, [loads.point for loads in evaluation.loads])
         return (max(map(number, runs_of(evaluation.engine, point, evaluation.fidelity, run))),)
 
