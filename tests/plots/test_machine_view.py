@@ -47,7 +47,7 @@ def test_a_half_disc_has_the_unbalance_that_it_stands_for() -> None:
 
 def test_what_was_decided_is_marked() -> None:
     result = scenes.solved(scenes.TIGHT)
-    scene = Scene.of(result.final.engine, result.problem)
+    scene = Scene.of(result)
     assert scene.rotors == {rotor.name for rotor in result.final.engine.rotors}
     assert not scene.throws
     labels = [text.get_text() for text in engine.figure(result).legends[0].get_texts()]

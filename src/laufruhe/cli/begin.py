@@ -22,6 +22,7 @@ _OWN = (
     ("cycle", "Cycle (four-stroke, two-stroke)", "four-stroke", str),
     ("cylinders", "Cylinders", "4", int),
     ("bank_angle", "Angle between the banks [deg]", "90", float),
+    ("split_pin_angle", "Split pins: angle by which the right bank's pin leads [deg]", "0", float),
     ("bank_stagger", "Distance between opposed cylinders along the crank", "40 mm", str),
     ("firing_order", "Firing order", "", str),
     ("bore", "Bore", "80 mm", str),
@@ -30,7 +31,7 @@ _OWN = (
     ("rod_ratio", "Crank radius over rod length", "0.3", float),
     ("reciprocating_mass", "Reciprocating mass of a cylinder", "0.5 kg", str),
 )
-_OF_BANKS = ("bank_angle", "bank_stagger")
+_OF_BANKS = ("bank_angle", "split_pin_angle", "bank_stagger")
 _OF_SEVERAL = ("cylinder_spacing", "firing_order")
 _ORDERS = {1: "1", 2: "1-2", 3: "1-3-2", 4: "1-3-4-2", 5: "1-2-4-5-3", 6: "1-5-3-6-2-4", 8: "1-8-6-2-7-3-4-5"}
 

@@ -52,7 +52,10 @@ def folder() -> Path:
 def ready() -> dict[str, Ready]:
     """All of them by name, those of one use together."""
     with (folder() / _LIST).open(encoding="utf-8", newline="") as stream:
-        return {row["problem"]: _found(row["problem"], row["use"]) for row in csv.DictReader(stream)}
+        rows = list(csv.DictReader(stream))
+    uses = list(dict.fromkeys(row["use"] for row in rows))
+    rows.sort(key=lambda row: uses.index(row["use"]))
+    return {row["problem"]: _found(row["problem"], row["use"]) for row in rows}
 
 
 def ready_named(name: str) -> Ready:

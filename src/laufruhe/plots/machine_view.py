@@ -16,7 +16,8 @@ from matplotlib.patches import Circle, Patch, Rectangle, Wedge
 from laufruhe.machine import Engine, Rotor, Shaft, SliderCrank
 from laufruhe.machine.rotor import Role
 from laufruhe.plots.style import AFTER, FAINT, GREY, INK, ORANGE, entry, entry_of_dots
-from laufruhe.problem.problem import Problem
+from laufruhe.present.measures import changed
+from laufruhe.solvers.result import Result
 
 STEEL = 7850.0
 THICKNESS = 0.02
@@ -37,21 +38,26 @@ class Scene:
         Names of those that were decided.
     throws
         Whether the crank was.
+    state
+        "decided", or "open" in a design as given.
     """
 
     engine: Engine
     rotors: frozenset[str]
     mounts: frozenset[str]
     throws: bool
+    state: str
 
     @classmethod
-    def of(cls, engine: Engine, problem: Problem) -> Scene:
-        """Of a design of a problem."""
+    def of(cls, result: Result) -> Scene:
+        """Of the design of a result."""
+        engine, problem = result.final.engine, result.problem
         drives = [drive for decision in problem.decisions for drive in decision.drives]
         rotors = {name for name in (getattr(drive, "rotor", None) for drive in drives) if name is not None}
         numbers = {number for number in (getattr(drive, "mount", None) for drive in drives) if number is not None}
         mounts = {mount.name for k, mount in enumerate(engine.mounts) if k in numbers}
-        return cls(engine, frozenset(rotors), frozenset(mounts), problem.phasing is not None)
+        state = "decided" if changed(result) else "open"
+        return cls(engine, frozenset(rotors), frozenset(mounts), problem.phasing is not None, state)
 
     @property
     def weights(self) -> list[Rotor]:
@@ -63,6 +69,17 @@ class Scene:
         """Shafts beside the cranks."""
         cranks = {part.shaft for part in self.engine.slider_cranks}
         return [shaft for shaft in self.engine.shafts if shaft not in cranks]
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether its cylinders lie: such an engine is seen from above, others from the left."""
+        leaning = [abs(math.cos(part.bank)) for part in self.engine.slider_cranks]
+        return max(leaning) < 0.5
+
+    @property
+    def beside(self) -> str:
+        """From where the second view is taken."""
+        return "from above" if self.is_flat else "from the left"
 
     def colour(self, rotor: Rotor) -> str:
         """Of a weight: whether it was decided."""
@@ -118,53 +135,59 @@ def front_view(axes: Axes, scene: Scene, phi: float = 0.0) -> None:
 
 
 def side_view(axes: Axes, scene: Scene, phi: float = 0.0) -> None:
-    """From the left: the front of the engine at the left, z up."""
+    """From the left, z up, or from above, y down: the front of the engine at the left."""
     bore, parts = _bore(scene.engine), scene.engine.slider_cranks
+    quarter = 0.5 * math.pi if scene.is_flat else 0.0
+
+    def level(place: complex) -> float:
+        return _MM * (place.imag if scene.is_flat else place.real)
+
     for shaft in scene.engine.shafts:
         places = [part.x for part in parts if part.shaft is shaft]
         places += [rotor.x for rotor in scene.engine.rotors if rotor.shaft == shaft]
         ends = (max(places) + 0.6 * bore, min(places) - 0.6 * bore)
-        axes.plot([_MM * x for x in ends], [_MM * shaft.z] * 2, color=FAINT, linewidth=1.0, zorder=2)
+        axes.plot([_MM * x for x in ends], [level(complex(shaft.z, shaft.y))] * 2, color=FAINT, linewidth=1.0, zorder=2)
     for pose in (_Pose.of(part, phi) for part in parts):
-        x, wide, pin = _MM * pose.part.x, _MM * 0.18 * bore, _MM * pose.pin.real
+        x, wide, pin = _MM * pose.part.x, _MM * 0.18 * bore, level(pose.pin)
         look: Any = {"color": _crank_colour(scene), "linewidth": 2.6, "zorder": 4}
-        crank = _MM * pose.crank.real
+        crank, piston = level(pose.crank), level(pose.piston)
         axes.plot([x - wide, x - wide, x + wide, x + wide], [crank, pin, pin, crank], **look)
-        axes.plot([x, x], [pin, _MM * pose.piston.real], color=_METAL, linewidth=2.6, zorder=3)
-        height = _MM * 0.5 * bore * max(abs(math.cos(pose.part.bank)), 0.2)
-        place = (x - 0.48 * _MM * bore, _MM * pose.piston.real - 0.5 * height)
+        axes.plot([x, x], [pin, piston], color=_METAL, linewidth=2.6, zorder=3)
+        height = _MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
+        place = (x - 0.48 * _MM * bore, piston - 0.5 * height)
         axes.add_patch(Rectangle(place, 0.96 * _MM * bore, height, **_PISTON, zorder=5))
-        number = pose.part.name.rpartition(" ")[2]
+        number = next((word for word in pose.part.name.split() if word.isdecimal()), "")
         # pistons of two banks may stand behind each other
-        aside = -0.25 * _MM * bore * float(np.sign(round(math.sin(pose.part.bank), 9)))
-        axes.text(x + aside, _MM * pose.piston.real, number, ha="center", va="center", size=7.5, zorder=6)
+        aside = -0.25 * _MM * bore * float(np.sign(round(math.sin(pose.part.bank - quarter), 9)))
+        axes.text(x + aside, piston, number, ha="center", va="center", size=7.5, zorder=6)
     for rotor in scene.weights:
-        low, high = _heights(half_disc(abs(rotor.unbalance)), _direction(rotor, phi))
-        place = (_MM * (rotor.x - 0.5 * THICKNESS), _MM * (rotor.shaft.z + low))
+        low, high = _heights(half_disc(abs(rotor.unbalance)), _direction(rotor, phi) - quarter)
+        place = (_MM * (rotor.x - 0.5 * THICKNESS), level(complex(rotor.shaft.z, rotor.shaft.y)) + _MM * low)
         look = {"facecolor": scene.colour(rotor), "edgecolor": INK, "linewidth": 0.6, "alpha": 0.75, "zorder": 5.5}
         axes.add_patch(Rectangle(place, _MM * THICKNESS, _MM * (high - low), **look))
     for mount in scene.engine.mounts:
-        x, _, z = mount.position
-        axes.plot(_MM * x, _MM * z, **_mount_look(mount.name in scene.mounts))
-    axes.set(xlabel="x [mm], the front at the left", ylabel="z [mm]")
+        x, y, z = mount.position
+        axes.plot(_MM * x, level(complex(z, y)), **_mount_look(mount.name in scene.mounts))
+    axes.set(xlabel="x [mm], the front at the left", ylabel="y [mm]" if scene.is_flat else "z [mm]")
 
 
-def framed(axes: Axes, points: Sequence[tuple[float, float]], backwards: bool = False) -> None:
-    """One scale both ways, with room around what is seen at any angle [mm]."""
+def framed(axes: Axes, points: Sequence[tuple[float, float]], backwards: bool = False, down: bool = False) -> None:
+    """One scale both ways, with room around what is seen at any angle [mm]; x to the left, or y down, where told."""
     corners = np.array([np.min(points, axis=0), np.max(points, axis=0)])
     panel = np.array(axes.bbox.size)
     wide, high = 0.5 * 1.12 * float(((corners[1] - corners[0]) / panel).max()) * panel
     x, y = corners.mean(axis=0)
-    axes.set(xlim=(x + wide, x - wide) if backwards else (x - wide, x + wide), ylim=(y - high, y + high))
+    across, up = (x - wide, x + wide), (y - high, y + high)
+    axes.set(xlim=across[::-1] if backwards else across, ylim=up[::-1] if down else up)
 
 
 def reaches(scene: Scene) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
-    """Corners of what is seen from the front and from the left, over a whole turn [mm]."""
+    """Corners of what is seen from the front and from beside, over a whole turn [mm]."""
     front, side = [], []
     for x, centre, radius in _spots(scene):
         for y, z in ((centre.imag - radius, centre.real - radius), (centre.imag + radius, centre.real + radius)):
             front.append((_MM * y, _MM * z))
-            side.append((_MM * x, _MM * z))
+            side.append((_MM * x, _MM * (y if scene.is_flat else z)))
     bore = _MM * _bore(scene.engine)
     side += [(corner + sign * 0.7 * bore, z) for corner, z in side[:] for sign in (-1.0, 1.0)]
     return front, side
@@ -178,20 +201,23 @@ def _spots(scene: Scene) -> Iterator[tuple[float, complex, float]]:
             yield part.x, pose.pin, 0.15 * bore
     for rotor in scene.weights:
         yield rotor.x, complex(rotor.shaft.z, rotor.shaft.y), half_disc(abs(rotor.unbalance))
+    for rotor in scene.engine.rotors:
+        yield rotor.x, complex(rotor.shaft.z, rotor.shaft.y), 0.1 * bore
     for mount in scene.engine.mounts:
         yield mount.position[0], complex(mount.position[2], mount.position[1]), 0.1 * bore
 
 
 def legend_of(scene: Scene) -> list[Line2D | Patch]:
     """What stands for what."""
-    found: list[Line2D | Patch] = [entry("crank", color=_crank_colour(scene), linewidth=3.0)]
+    crank = f"crank, {scene.state}" if scene.throws else "crank"
+    found: list[Line2D | Patch] = [entry(crank, color=_crank_colour(scene), linewidth=3.0)]
     colours = {scene.colour(rotor) for rotor in scene.weights}
-    words = {GREY: "weight", AFTER: "weight, decided"}
+    words = {GREY: "weight", AFTER: f"weight, {scene.state}"}
     found += [Patch(facecolor=colour, edgecolor=INK, alpha=0.75, label=words[colour]) for colour in sorted(colours)]
-    if scene.engine.mounts:
+    if len(scene.mounts) < len(scene.engine.mounts):
         found.append(entry_of_dots("mount", marker="^", color=ORANGE))
     if scene.mounts:
-        found.append(entry_of_dots("mount, decided", marker="^", color=AFTER))
+        found.append(entry_of_dots(f"mount, {scene.state}", marker="^", color=AFTER))
     return found
 
 

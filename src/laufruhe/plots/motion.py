@@ -28,7 +28,7 @@ def animate(result: Result, path: Path) -> None:
     """One working cycle; arrows are the shaking force at the crank, and the force on each mount."""
     from PIL import Image
 
-    scene = Scene.of(result.final.engine, result.problem)
+    scene = Scene.of(result)
     k, series = hardest_point(result) if result.problem.points else 0, series_of(result, loads=True)
     loads = [_loads(one, k) for one in series] if has_loads(result) else []
     largest = max((float(np.abs(one[:, :, 1:]).max()) for one in loads), default=0.0)
@@ -38,8 +38,9 @@ def animate(result: Result, path: Path) -> None:
         phi = result.final.engine.cycle.angle * step / FRAMES
         front_view(drawn.panels[0], scene, phi)
         side_view(drawn.panels[1], scene, phi)
-        for axes, points, backwards in zip(drawn.panels, reaches(scene), (False, True), strict=True):
-            framed(axes, points, backwards)
+        ahead, beside = reaches(scene)
+        framed(drawn.panels[0], ahead)
+        framed(drawn.panels[1], beside, backwards=True, down=scene.is_flat)
         for one, forces in zip(series, loads, strict=False):
             _arrows(drawn.panels[0], scene, forces[step], largest, one.colour)
         shown = f"{math.degrees(phi):5.1f} deg after cylinder 1 fires"

@@ -1,7 +1,7 @@
 """Pictures of a result in the order of a report, a line each: `plots.results` has a file of that name to draw it."""
 
 PICTURES = {
-    "engine": "The engine to scale, from the front and from the left, with what was decided marked.",
+    "engine": "The engine to scale, from the front and from beside, with what was decided marked.",
     "star": "The best crank stars, from the front and from the side.",
     "firings": "Firing orders of the best stars over one working cycle.",
     "polar": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",

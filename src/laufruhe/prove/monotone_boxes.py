@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.progress import tell
 
 Array = NDArray[np.float64]
 
@@ -119,6 +120,7 @@ def divided(problem: OneWayProblem, tolerance: float, most: int = MOST_BOXES) ->
                 best, found = problem.value(x), x
         if bound >= best - NEARLY * tolerance * abs(best):
             return Divided(found, min(bound, best), looked, True)
+        tell("boxes", looked, value=best, bound=bound)
         if looked >= most or passed():
             return Divided(found, min(bound, best), looked, False)
         for half in _halves(problem, lower, upper):

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.progress import tell
 from laufruhe.prove.error_parts import ROUNDING, Block, Known, Terms, bounded
 
 Array = NDArray[np.float64]
@@ -83,6 +84,7 @@ def worst_case(
     queue = [(-first.bound, next(order), start, whole, first.split)]
     nodes = 1
     while queue and -queue[0][0] > best[0] * (1.0 + tolerance) and nodes < most and not passed():
+        tell("boxes of errors", nodes)
         above, _, centre, blocks, split = heapq.heappop(queue)
         rest = [block for k, block in enumerate(blocks) if k != split]
         for middle, free in blocks[split].parts(centre):

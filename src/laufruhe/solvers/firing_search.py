@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.progress import tell
 from laufruhe.physics.crank_stars import Array, Stars
 from laufruhe.solvers.star_search import BestStars, StarsFound
 
@@ -41,6 +42,7 @@ def enumerate_orders(
     squares = np.array([[table.constant + table.placed(stars, stars[:, 0], 0)[0] for table in objective.tables]])
     waiting: list[tuple[int, Stars, Array]] = [(1, stars, squares)]
     while waiting and not ended:
+        tell("partial firing orders", seen, value=float(found.values.min(initial=np.inf)))
         placed, stars, squares = waiting.pop()
         ended = passed() or time.perf_counter() - started > time_limit
         if placed == count:
@@ -56,10 +58,8 @@ def enumerate_orders(
             more = [table.placed(grown, step, placed) for table in objective.tables]
             grown[:, placed] = step
             waiting.append((placed + 1, grown, squares[row] + np.stack(more, axis=1)))
-    least = float("inf")
-    if len(found.values):
-        of_best = np.array([table.squares(found.stars[:1])[0] for table in objective.tables])
-        least = objective.below(of_best)
+    of_best = np.array([table.squares(found.stars[:1])[0] for table in objective.tables if len(found.values)])
+    least = objective.below(of_best) if len(found.values) else float("inf")
     seconds = time.perf_counter() - started
     return StarsFound(found.stars, found.values, 0.0 if ended else least, not ended, seen, seconds)
 

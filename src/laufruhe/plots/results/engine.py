@@ -16,16 +16,15 @@ def applies(result: Result) -> bool:
 
 def figure(result: Result) -> Figure:
     """End and side view of the design at the firing dead centre of cylinder 1."""
-    scene = Scene.of(result.final.engine, result.problem)
+    scene = Scene.of(result)
     drawn = page(1, 2, (5.2, 4.6), across=0.75)
     front, side = drawn.panels
     front_view(front, scene)
     side_view(side, scene)
-    for axes, points, backwards, title in (
-        (front, reaches(scene)[0], False, "from the front, turning clockwise"),
-        (side, reaches(scene)[1], True, "from the left"),
-    ):
-        framed(axes, points, backwards)
+    ahead, beside = reaches(scene)
+    framed(front, ahead)
+    framed(side, beside, backwards=True, down=scene.is_flat)
+    for axes, title in ((front, "from the front, turning clockwise"), (side, scene.beside)):
         axes.set_title(title, loc="left", size=9)
     weights = f" Weights as half discs of steel, {1e3 * THICKNESS:g} mm thick, of the same unbalance."
     lines = f"To scale, at the firing dead centre of cylinder 1.{weights if scene.weights else ''}"
