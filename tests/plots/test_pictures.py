@@ -70,7 +70,9 @@ def test_polar_diagrams_are_the_samples() -> None:
         lines = {line.get_label(): line.get_xydata() for line in axes.lines}
         for label, design in (("as given", result.initial), ("as decided", result.final)):
             samples = samples_of(design, 0)[:, m, 1:]
-            assert np.array_equal(np.asarray(lines[label])[:-1], samples)
+            path = np.asarray(lines[label])[:-1]
+            assert len(path) >= 720
+            assert np.array_equal(path, samples[:: len(samples) // len(path)])
             assert np.array_equal(np.asarray(lines[label])[-1], samples[0])
 
 

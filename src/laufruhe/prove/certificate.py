@@ -210,11 +210,11 @@ def best_bound(fine: AffineProblem, x: Array, found: Multipliers) -> Bound:
     best = max((lower_bound(fine, m) for m in (spread, direct)), key=lambda bound: bound.value)
     for _ in range(LEVELLINGS):
         if fine.objective(x) - best.value > LEVEL * best.value:
-            best = max(best, lower_bound(fine, _levelled(fine, x, best)), key=lambda bound: bound.value)
+            best = max(best, lower_bound(fine, levelled(fine, x, best)), key=lambda bound: bound.value)
     return best
 
 
-def _levelled(problem: AffineProblem, x: Array, bound: Bound) -> Multipliers:
+def levelled(problem: AffineProblem, x: Array, bound: Bound) -> Multipliers:
     """Dual rows of the terms, changed by as little as makes the bound level along what is inside its set.
 
     A slope that is a rounding of the solver, times a bound far from what is needed, would else be all that is left.

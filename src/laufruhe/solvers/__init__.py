@@ -23,7 +23,7 @@ from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, j
 from laufruhe.solvers.places import solve_places
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.robust import solve_robust
-from laufruhe.solvers.unbalances import beyond_mounts, solve_unbalances
+from laufruhe.solvers.unbalances import beyond_mounts, solve_sharply
 
 __all__ = ["METHODS", "Result", "Status", "solve", "state"]
 
@@ -169,9 +169,9 @@ METHODS: tuple[Method, ...] = (
     Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
     Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, _torsion),
     Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
-           lambda problem: solve_within(problem, solve_unbalances)),
+           lambda problem: solve_within(problem, solve_sharply)),
     Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,
-           lambda problem: solve_within(problem, solve_unbalances)),
+           lambda problem: solve_within(problem, solve_sharply)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_block, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),

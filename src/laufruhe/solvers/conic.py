@@ -156,6 +156,32 @@ def _solved(problem: AffineProblem, held: tuple[Array, Array] | None) -> ConicSo
     return replace(best, x=None) if contradiction else best
 
 
+def solve_quadratic(
+    problem: AffineProblem, gradient: Array, curvature: Array, x: Array, stay: float
+) -> tuple[Array, tuple[Array, ...]] | None:
+    """Least gradient . (y - x) + (y - x)' curvature (y - x) / 2 within sets and limits (P10).
+
+    A share `stay` of the curvature in all directions is added in each.
+
+    Returns
+    -------
+    y, and the dual rows of the limits; None where the solver does not stand by its answer.
+    """
+    part = replace(problem, terms=(), groups=())
+    blocks, starts, rows, _ = _program(part, None)
+    units, n = part.units, part.size
+    size = float(np.abs(gradient * units).max(initial=0.0)) or 1.0
+    bent = curvature * np.outer(units, units) / size
+    bent = bent + stay * float(np.trace(bent)) * np.eye(n)
+    quadratic, cost = np.zeros((rows.columns, rows.columns)), np.zeros(rows.columns)
+    quadratic[:n, :n], cost[:n] = np.triu(bent), gradient * units / size - bent @ (x / units)
+    found = _told(rows, cost, {}, quadratic)
+    if str(found.status) != "Solved":
+        return None
+    answer = _answer(part, blocks, starts, found)
+    return None if answer.x is None else (answer.x, tuple(size * z for z in answer.multipliers.limits))
+
+
 def _rank(problem: AffineProblem, x: Array | None) -> tuple[float, float]:
     """By what breaks limits least, then by what is least."""
     if x is None:
@@ -222,7 +248,7 @@ def _cost(problem: AffineProblem, blocks: Sequence[Block], rows: Rows) -> Array:
     return cost
 
 
-def _told(rows: Rows, cost: Array, told: Mapping[str, Any]) -> Any:
+def _told(rows: Rows, cost: Array, told: Mapping[str, Any], quadratic: Array | None = None) -> Any:
     import clarabel
     from scipy.sparse import csc_array
 
@@ -231,9 +257,9 @@ def _told(rows: Rows, cost: Array, told: Mapping[str, Any]) -> Any:
     for name, value in told.items():
         setattr(settings, name, value)
     settings.time_limit = max(left(), SHORTEST)
-    nothing = csc_array((rows.columns, rows.columns))
+    bent = csc_array((rows.columns, rows.columns)) if quadratic is None else csc_array(quadratic)
     right = np.concatenate(rows.right)
-    return clarabel.DefaultSolver(nothing, cost, rows.matrix(), right, rows.cones, settings).solve()
+    return clarabel.DefaultSolver(bent, cost, rows.matrix(), right, rows.cones, settings).solve()
 
 
 def _answer(problem: AffineProblem, blocks: list[Block], starts: list[int], found: Any) -> ConicSolution:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,12 @@ from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.nothing import ROUNDING, nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Bound, Reach, best_bound, gap_of, kkt_residual
+from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
 from laufruhe.solvers.conic import solve_cones
 from laufruhe.solvers.lightest import SAME_LOAD, lightest
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.sharpening import Optimum, sharpened
 
 Array = NDArray[np.float64]
 
@@ -29,32 +30,6 @@ MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
 MOST_ROWS = 60_000
 NEGLIGIBLE = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class _Optimum:
-    """A design, the bound that meets it, and how far it is from being allowed.
-
-    Attributes
-    ----------
-    problem
-        Rows on the grid that the bound holds on.
-    judge
-        Rows at the angles that its limits are judged at.
-    excess
-        Largest relative excess over a limit, sought between the angles too.
-    nothing
-        Objective that counts as zero.
-    """
-
-    x: Array
-    bound: Bound
-    problem: AffineProblem
-    judge: AffineProblem
-    gap: float
-    excess: float
-    samples: int
-    nothing: float
 
 
 def beyond_mounts(problem: Problem) -> tuple[str, ...]:
@@ -66,7 +41,12 @@ def beyond_mounts(problem: Problem) -> tuple[str, ...]:
     return solve_unbalances(apart).conflict if apart.decisions else broken_limits(limits, evaluate(apart))
 
 
-def solve_unbalances(problem: Problem) -> Result:
+def solve_sharply(problem: Problem) -> Result:
+    """As `solve_unbalances`, with a gap that is a rounding where the optimum is smooth (P10)."""
+    return solve_unbalances(problem, sharply=True)
+
+
+def solve_unbalances(problem: Problem, sharply: bool = False) -> Result:
     """Global optimum of a problem whose decisions are unbalances.
 
     Returns
@@ -85,6 +65,8 @@ def solve_unbalances(problem: Problem) -> Result:
     if optimum is None:
         conflict = conflict_of(tightened(model.at(samples), 0.0), [limit.name for limit in problem.load_limits])
         return none_within(problem, initial, conflict, timing)
+    if sharply:
+        optimum = sharpened(model, optimum)
     hopeless = _hopeless(problem, optimum)
     if hopeless:
         return none_within(problem, initial, hopeless, timing)
@@ -96,7 +78,7 @@ def solve_unbalances(problem: Problem) -> Result:
     return concluded(design, initial, _shown(problem.load_limits, optimum, design.value), timing)
 
 
-def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[_Optimum | None, int]:
+def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optimum | None, int]:
     """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6).
 
     Returns
@@ -119,7 +101,7 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[_Opti
     return best, samples
 
 
-def _allowed(problem: Problem, model: AffineModel, samples: int, nothing: float) -> _Optimum | None:
+def _allowed(problem: Problem, model: AffineModel, samples: int, nothing: float) -> Optimum | None:
     """An optimum at `samples` angles that keeps its limits between them too.
 
     A peak between the angles breaks its limit by a little; the next attempt asks for
@@ -135,7 +117,7 @@ def _allowed(problem: Problem, model: AffineModel, samples: int, nothing: float)
     return found
 
 
-def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float, margin: float) -> _Optimum | None:
+def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float, margin: float) -> Optimum | None:
     coarse, fine = model.at(samples), model.at(2 * samples)
     solution = solve_cones(tightened(coarse, margin))
     if solution.x is None:
@@ -144,7 +126,7 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float,
     bound = best_bound(model.at(fine.samples, averaged=True), x, solution.multipliers)
     judge = model.at(fine.samples, finer=True) if _has_peaks(problem) else fine
     value = judge.objective(x)
-    return _Optimum(x, bound, fine, judge, gap_of(value, bound.value, nothing), judge.excess(x), samples, nothing)
+    return Optimum(x, bound, fine, judge, gap_of(value, bound.value, nothing), judge.excess(x), samples, nothing)
 
 
 def _has_peaks(problem: Problem) -> bool:
@@ -156,7 +138,7 @@ def tightened(affine: AffineProblem, margin: float) -> AffineProblem:
     return replace(affine, limits=tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits))
 
 
-def _hopeless(problem: Problem, optimum: _Optimum) -> tuple[str, ...]:
+def _hopeless(problem: Problem, optimum: Optimum) -> tuple[str, ...]:
     """A limit that is broken and that nothing open acts on; none where there is no such."""
     for limit, (maximum, norm) in zip(problem.load_limits, optimum.judge.limits, strict=True):
         if not norm.slope.any() and norm.value(optimum.x) > maximum * (1.0 + KEPT):
@@ -236,14 +218,14 @@ def _triangle(slope: Array) -> Array:
     return triangle / (float(np.abs(triangle).max()) or 1.0)
 
 
-def _shown(limits: Sequence[Limit], optimum: _Optimum, value: float) -> Shown:
+def _shown(limits: Sequence[Limit], optimum: Optimum, value: float) -> Shown:
     bound, prices = optimum.bound, optimum.bound.multipliers.shadow_prices(optimum.problem)
     unit = value if value > optimum.nothing else optimum.nothing / ROUNDING
     return Shown(
         bound=bound.value,
         reach=Reach.WHOLE,
         kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
-        method=f"second-order cones at {optimum.samples} angles, dual bound at {optimum.problem.samples}",
+        method=f"second-order cones at {optimum.samples} angles{optimum.then}, dual bound at {optimum.problem.samples}",
         prices={(limit, "at most"): price for limit, price in zip(limits, prices, strict=True)},
         slopes={domain.decision.name: bound.gradient[domain.columns] for domain in optimum.problem.domains},
     )

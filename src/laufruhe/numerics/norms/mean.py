@@ -24,6 +24,8 @@ from laufruhe.numerics.norms.norm import (
 )
 from laufruhe.numerics.spectrum import Spectrum
 
+SHORT = 1e-6
+"""Share of the longest row that a second derivative takes the shortest for."""
 LEAST = 1e-9
 """Share of the longest row that a majorant takes the shortest for."""
 
@@ -43,6 +45,11 @@ class Mean(Norm):
         """w_k v_k / |v_k|."""
         size = lengths(rows)
         return np.asarray(grid.weights[:, None] * rows / np.where(size > 0.0, size, 1.0)[:, None])
+
+    def across(self, grid: Grid, rows: Array) -> Array | None:
+        """w_k / |v_k|; that of a short row where one vanishes."""
+        size = lengths(rows)
+        return np.asarray(grid.weights / np.maximum(size, SHORT * float(size.max(initial=0.0)) or 1.0))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """max_k |z_k| / w_k; infinite where a weightless row is used."""

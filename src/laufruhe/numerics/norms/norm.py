@@ -152,6 +152,10 @@ class Norm(ABC):
         The inner product is sum_k z_k . v_k; weights are part of Z.
         """
 
+    def across(self, grid: Grid, rows: Array) -> Array | None:
+        """Second derivative across every row, shape (k,); None where the norm is no sum over its rows (P10)."""
+        return None
+
     @abstractmethod
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Smallest t with <Z, V> <= t norm(V) for every V (P3); infinite where there is none."""

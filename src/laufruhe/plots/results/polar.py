@@ -31,6 +31,7 @@ from laufruhe.problem.evaluation import samples_of
 from laufruhe.solvers.result import Result
 
 MOST_PANELS = 12
+POINTS = 1440
 PANEL = 2.9
 applies = has_mount_forces
 
@@ -69,7 +70,10 @@ def _columns(count: int, narrow: bool) -> int:
 
 
 def _closed(samples: Array) -> Array:
-    return np.concatenate([samples, samples[:1]])
+    """A turn of the path that ends where it began, in no more points than a picture shows."""
+    count = len(samples)
+    step = next((n for n in range(count // POINTS, 1, -1) if count % n == 0), 1)
+    return np.concatenate([samples[::step], samples[:1]])
 
 
 def _path(axes: Axes, path: Array, one: Series, quarters: int) -> None:
