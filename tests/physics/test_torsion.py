@@ -120,6 +120,21 @@ def test_half_the_reciprocating_mass_turns_with_the_throw() -> None:
     assert reduced_inertia(short) == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("name", ["radial-seven", "vee-eight-cross", "boxer-four", "two-stroke-five"])
+def test_any_mechanism_drives_its_throw(name: str) -> None:
+    """Articulated rods, banks and two strokes: cylinder by cylinder, each later by its firing, as all at once."""
+    problem = laufruhe.load(PROBLEMS / f"{name}.toml")
+    discs = [Disc("front", 0.01), Disc("rear", 0.3)]
+    parts = [Disc(part.name, 0.02, cylinders=(part.name,)) for part in problem.engine.slider_cranks]
+    own = (discs[0], *parts, discs[1])
+    engine = replace(problem.engine, torsion=Torsion(own, tuple(Section(d.name, 1e5) for d in own[1:])))
+    together = throw_torques(engine, problem.points[0]).coefficients.sum(axis=1)
+    whole = crank_torque(engine, problem.points[0]).rebased(engine.cycle.base_order).coefficients
+    count = min(len(together), len(whole))
+    assert together[:count] == pytest.approx(whole[:count], abs=1e-9 * np.abs(whole).max())
+    assert np.abs(together[count:]).max(initial=0.0) < 1e-9 * np.abs(whole).max()
+
+
 def test_other_pistons_turn_with_their_throws(five: tuple[Engine, OperatingPoint]) -> None:
     engine, _ = five
     heavier = tuple(replace(part, reciprocating_mass=part.reciprocating_mass + 0.1) for part in engine.slider_cranks)

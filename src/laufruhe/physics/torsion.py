@@ -60,7 +60,7 @@ def reduced_inertia(part: SliderCrank) -> float:
 
     With a long rod half the reciprocating mass at the crank radius.
     """
-    return _reduced_inertia(replace(part, name="", x=0.0, bank=0.0, throw=part.fires_at, firing_angle=0.0))
+    return _reduced_inertia(replace(part, name="", x=0.0, throw=part.bank, firing_angle=0.0))
 
 
 @lru_cache(maxsize=256)
@@ -168,7 +168,7 @@ def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fide
     """Coefficients of one cylinder's torque by order of the cycle [N m], counted from its firing (T1)."""
     if part.shaft != CRANKSHAFT:
         raise ModelError(f"{part.name} works on shaft '{part.shaft.name}'; twist is modelled of one crankshaft")
-    first = replace(part, name="cylinder", x=0.0, bank=0.0, throw=part.fires_at, firing_angle=0.0)
+    first = replace(part, name="cylinder", x=0.0, throw=part.bank + part.fires_at, firing_angle=0.0)
     return _cylinder_torque(cycle, first, replace(point, name="", weight=1.0), fidelity)
 
 
