@@ -25,6 +25,7 @@ from laufruhe.physics.bearing_loads import (
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import cylinder_pressure
 from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
+from laufruhe.physics.torque import crank_torque
 
 FloatArray = NDArray[np.float64]
 GAS = Seiliger(peak_pressure=80e5, imep=6e5)
@@ -271,3 +272,16 @@ def test_pressure_on_a_pin_is_that_of_its_rod() -> None:
     assert found == pytest.approx(forces.sample(32) / areas[:, None])
     with pytest.raises(ModelError, match="cylinder 1 has no big end"):
         crank_pin_pressures(engine, forces)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pins_drive_the_crank_with_its_torque(seed: int) -> None:
+    """Virtual power: the forces of the rods on pins that move with the crank, and what they do to it in sum."""
+    engine = engine_of(seed)
+    phi = np.linspace(0.0, 4.0 * math.pi, 61)
+    pins, torque = pin_forces(engine, POINT).values(phi), crank_torque(engine, POINT).values(phi)
+    power = np.zeros(len(phi))
+    for k, part in enumerate(engine.slider_cranks):
+        velocity = 1j * POINT.speed * part.crank_radius * np.exp(1j * (phi + part.throw))
+        power += velocity.real * pins[:, k, 2] + velocity.imag * pins[:, k, 1]
+    assert power == pytest.approx(POINT.speed * torque, rel=1e-8, abs=1e-8 * np.abs(power).max())
