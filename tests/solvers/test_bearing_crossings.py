@@ -1,0 +1,88 @@
+"""Bearings crossed with what else an engine may have: decided, and no design drawn at random goes under the bound."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.errors import ModelError
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from problem_files import PROBLEMS
+
+THREE = tables_of(PROBLEMS / "tractor-three-bearings.toml")
+ENGINE = {key: value for key, value in THREE["engine"].items() if key != "firing_order"}
+WEBS = [
+    {"name": f"web {k + 1}", "x": f"{125 - 125 * k + 30} mm", "opposite_throw": k + 1, "radius": "75 mm",
+     "mass": {"between": ["0 kg", "3 kg"]}} for k in range(3)
+]  # fmt: skip
+ELASTIC = {
+    "mounts": {"kind": "elastic", "loss_factor": 0.1, "places": [
+        {"name": name, "position": [f"{x} mm", f"{y} mm", "0 mm"], "stiffness": ["200 N/mm", "200 N/mm", "400 N/mm"]}
+        for name, x, y in (("front left", 250, 250), ("front right", 250, -250), ("rear", -900, 0))
+    ]},
+    "block": {"mass": "300 kg", "centre_of_gravity": ["-200 mm", "0 mm", "100 mm"],
+              "inertia": ["20 kg m^2", "45 kg m^2", "40 kg m^2"]},
+    "constraints": [{"limit": "mean mount force", "max": "900 N"}],
+}  # fmt: skip
+POINTS = [
+    {"name": "rated", "speed": "2500 rpm"}, {"name": "idle", "speed": "900 rpm", "weight": 2.0},
+    {"name": "over", "speed": "3300 rpm", "gas": False, "weight": 0.5},
+]  # fmt: skip
+VEE = ENGINE | {"layout": "vee", "bank_angle": 60, "throws": [0, 120, 240]}
+WIEBE = {"model": "wiebe", "imep": "6 bar", "start": "-8 deg", "duration": "60 deg"}
+CASES: dict[str, dict[str, Any]] = {
+    "uneven throws": {"engine": ENGINE | {"throws": [0, 100, 250], "firing_order": [1, 3, 2]}},
+    "three points": {"operating_points": POINTS},
+    "heat release": {"gas": WIEBE},
+    "no gas": {"gas": None},
+    "two rods on a pin": {"engine": VEE},
+    "two-stroke": {"engine": ENGINE | {"cycle": "two-stroke", "firing_order": [1, 3, 2]}},
+    "elastic mounts": ELASTIC,
+    "as a beam": {"fidelity": {"samples": 120, "crankshaft": "beam"}},
+    "pin off its path": {"engine": ENGINE | {"offset": "6 mm", "firing_order": [1, 3, 2]}},
+}
+
+
+def problem_of(told: dict[str, Any], quantity: str) -> Problem:
+    whole = {key: value for key, value in THREE.items() if key != "constraints"}
+    whole |= {"counterweights": WEBS, "fidelity": {"samples": 120}, "objective": {"minimise": quantity}, **told}
+    return load_tables({key: value for key, value in whole.items() if value is not None}, Path("crossed.toml"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("quantity", ["mean main-bearing force", "maximum main-bearing pressure"])
+def test_no_design_goes_under_the_bound(name: str, quantity: str) -> None:
+    problem = problem_of(CASES[name], quantity)
+    result = laufruhe.solve(problem)
+    assert result.certificate.kind in (Proof.GLOBAL, Proof.WITHIN_GAP)
+    assert result.certificate.gap < 2e-3
+    assert result.objective.value < 0.9995 * result.objective.initial
+    rng = np.random.default_rng(9)
+    best = np.array([d.value for d in result.decisions])
+    met = 0
+    for k in range(24):
+        # near the design that is told, and anywhere
+        masses = best + rng.normal(0.0, 0.1, 3) if k % 2 else rng.uniform(0.0, 3.0, 3)
+        masses = np.clip(masses, 0.0, 3.0)
+        other = evaluate(problem, problem.design(masses.tolist()), 2880)
+        if other.excess(problem.limits) <= 0.0:
+            met += 1
+            assert objective_value(problem, other) >= result.certificate.lower_bound * (1.0 - 1e-3)
+    assert met > 2
+
+
+def test_mechanisms_whose_rods_are_not_modelled_are_refused_by_name() -> None:
+    radial = {key: value for key, value in ENGINE.items() if key not in ("cylinder_spacing", "throws", "rod")}
+    radial |= {"layout": "radial", "cylinders": 3, "knuckle_radius": "42 mm"}
+    told = {"engine": radial, "counterweights": [{**WEBS[0], "opposite_throw": 1}], "mounts": None,
+            "main_bearings": [{"x": "80 mm"}, {"x": "-80 mm"}]}  # fmt: skip
+    with pytest.raises(ModelError, match="loads of its rod are not modelled"):
+        laufruhe.solve(problem_of(told, "mean main-bearing force"))
