@@ -11,6 +11,7 @@ import pytest
 import laufruhe
 from laufruhe.cli.fidelity import explained, traded
 from laufruhe.errors import InputError, ModelError
+from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import Flywheel, Rim
 from laufruhe.physics.irregularity import irregularity
 from laufruhe.problem.problem import Problem
@@ -266,3 +267,22 @@ def test_what_a_flywheel_needs_is_told_and_nothing_traded_for_it() -> None:
     assert "crank speed: without" in text
     with pytest.raises(InputError, match="no cheap model is traded"):
         traded([path], Path("nowhere"), lambda _: None)
+
+
+def test_two_machines_on_one_shaft_are_best_half_a_turn_apart() -> None:
+    """The same engines: the least flywheel is even in the angle between their cranks, and least half a turn apart."""
+    tables = tables_of(PROBLEMS / "two-machines.toml")
+
+    def least(angle: float) -> float:
+        first, second = tables["engine"]["slider_cranks"]
+        engine = {**tables["engine"], "slider_cranks": [first, {**second, "throw": angle}]}
+        return proven(load_tables({**tables, "engine": engine}, Path("two.toml"))).objective.value
+
+    found = {angle: least(angle) for angle in (0, 90, 150, 180, 210, 270)}
+    assert found[90] == pytest.approx(found[270], rel=1e-6)
+    assert found[150] == pytest.approx(found[210], rel=1e-6)
+    assert found[180] < found[150] < found[90] < found[0]
+    # in step they are one machine of twice the size
+    alone = {**tables["engine"], "slider_cranks": tables["engine"]["slider_cranks"][:1]}
+    one = proven(load_tables({**tables, "engine": alone}, Path("one.toml"))).objective.value
+    assert found[0] == pytest.approx(2.0 * one, rel=1e-6)
