@@ -178,6 +178,12 @@ def test_check_of_a_study_counts_its_points(tmp_path: Path) -> None:
     assert (answer.exit_code, answer.stdout) == (0, "ok: A sweep, 4 points\n")
 
 
+def test_a_tab_in_the_title_of_a_study_is_shown_as_one(tmp_path: Path) -> None:
+    written(tmp_path, scenes.GIVEN)
+    study = written(tmp_path, STUDY.replace("A sweep", "A\\tsweep"), "study")
+    assert CliRunner().invoke(app, ["check", str(study)]).stdout == "ok: A\\tsweep, 4 points\n"
+
+
 def test_a_broken_matplotlibrc_in_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import subprocess
     import sys

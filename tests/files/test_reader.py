@@ -84,6 +84,8 @@ BAD = [
         "engine.thorws = [0, 180, 180, 0]: is not a key here; did you mean 'throws'?"),
     bad("key that begins with a space", "stroke =", '" stroke" =',
         """engine." stroke" = "120 mm": is not a key here; did you mean 'stroke'?"""),
+    bad("a length that no float can square", '"120 mm"', '"1e-320 mm"',
+        """engine.stroke = "1e-320 mm": is below any engine; write for example "120 mm", or 0"""),
     bad("misspelt table", "[objective]", "[objektive]",
         """objektive = {"minimise": "mean mount force"}: is not a key here; did you mean 'objective'?"""),
     bad("misspelt key of a tagged table", "imep =", "imp =",

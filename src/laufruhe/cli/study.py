@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from laufruhe.cli.screen import pace
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import Complaint, InputError, printed
 from laufruhe.files.reader import shown_as
 from laufruhe.numerics.cores import processors
 from laufruhe.report import files
@@ -45,7 +45,8 @@ def checked(path: Path) -> tuple[str, str]:
     """How many points the parts of a study have, as text and as JSON."""
     study, scenes = load_study(path), Scenes(path.parent)
     points = {part.name: len(part.points(scenes)) for part in study.study.parts}
-    return f"ok: {study.title}, {sum(points.values())} points\n", strict({"title": study.title, "points": points})
+    told = f"ok: {printed(study.title)}, {sum(points.values())} points\n"
+    return told, strict({"title": study.title, "points": points})
 
 
 class _Teller:

@@ -22,8 +22,8 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
 
-# SI; squares and products of what is smaller stay finite.
-LARGEST = 1e12
+# SI; squares and products of what lies between stay finite, and off zero.
+SMALLEST, LARGEST = 1e-40, 1e12
 # Ratios are taken as fractions with a denominator of at most a thousand.
 SLOWEST = 1e-3
 
@@ -129,6 +129,8 @@ class Number:
     def _bounded(self, value: float) -> float:
         if abs(value) > LARGEST:
             raise refusal(f"is beyond any engine; {units.advice(self.unit)}")
+        if 0.0 < abs(value) < SMALLEST:
+            raise refusal(f"is below any engine; {units.advice(self.unit)}, or 0")
         if value <= self.above:
             raise refusal(f"must be more than {units.shown(self.above, self.unit)}; {units.advice(self.unit)}")
         if value < self.least:
