@@ -16,7 +16,7 @@ from matplotlib.text import Text
 from cli import scenes
 from lanes import first_fast
 from laufruhe.plots import draw
-from laufruhe.plots.results import bars, cycle, polar, spectrum
+from laufruhe.plots.results import bars, cycle, engine, polar, spectrum
 from laufruhe.plots.style import AFTER, BEFORE, DPI, fitted
 from laufruhe.present.measures import mount_orders
 from laufruhe.problem.evaluation import measured, samples_of
@@ -43,10 +43,10 @@ def size_of(path: Path) -> tuple[int, int]:
     ("text", "names"),
     first_fast(
         [
-            (scenes.TIGHT, ("polar.png", "cycle.png", "bars.png", "spectrum.png")),
-            (scenes.TWO_POINTS, ("polar.png", "cycle.png", "bars.png", "spectrum.png")),
-            (scenes.PARTS, ("polar.png", "cycle.png", "bars.png", "spectrum.png")),
-            (scenes.SHAKING_ONLY, ("cycle.png", "spectrum.png")),
+            (scenes.TIGHT, ("engine.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
+            (scenes.TWO_POINTS, ("engine.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
+            (scenes.PARTS, ("engine.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
+            (scenes.SHAKING_ONLY, ("engine.png", "cycle.png", "spectrum.png")),
         ],
         1,
     ),
@@ -55,7 +55,9 @@ def test_pictures_are_whole(text: str, names: tuple[str, ...], tmp_path: Path) -
     result = scenes.solved(text)
     assert draw(result, tmp_path) == names
     assert {path.name for path in tmp_path.iterdir()} == set(names)
-    makers = {f"{maker.__name__.rpartition('.')[2]}.png": maker.figure for maker in (polar, cycle, bars, spectrum)}
+    makers = {
+        f"{maker.__name__.rpartition('.')[2]}.png": maker.figure for maker in (engine, polar, cycle, bars, spectrum)
+    }
     for name in names:
         inches = makers[name](result).get_size_inches()
         assert size_of(tmp_path / name) == tuple(int(DPI * side) for side in inches)
@@ -233,7 +235,7 @@ def renamed(result: Result, name: str) -> Result:
 
 @pytest.mark.parametrize("name", first_fast(["$a$ and $b", "\\frac{", "发动机", "a" * 60, "{x}", "%d"], 2))
 def test_any_name_can_be_drawn(name: str, tmp_path: Path) -> None:
-    assert len(draw(renamed(scenes.solved(scenes.TIGHT), name), tmp_path)) == 4
+    assert len(draw(renamed(scenes.solved(scenes.TIGHT), name), tmp_path)) == 5
 
 
 def test_long_lines_are_cut() -> None:
