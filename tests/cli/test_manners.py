@@ -155,3 +155,14 @@ def test_a_star_search_tells_value_and_bound_that_enclose_the_answer(tmp_path: P
     for step in valued:
         assert step.bound <= result.objective.value * (1.0 + 1e-4)
         assert step.value >= result.objective.value * (1.0 - 1e-4)
+
+
+@pytest.mark.parametrize(("kind", "ends"), [("svg", {".svg"}), ("both", {".svg", ".png"})])
+def test_pictures_come_in_the_format_asked_for(here: Path, kind: str, ends: set[str]) -> None:
+    assert run.invoke(app, ["evaluate", str(SINGLE), "-q", "--format", kind]).exit_code == 0
+    folder = here / "results" / "tractor-single-as-given"
+    assert {path.suffix for path in folder.glob("bars.*")} == ends
+    assert "(bars.svg)" in (folder / "report.md").read_text(encoding="utf-8") or kind == "both"
+    assert (folder / "bars.svg").read_text(encoding="utf-8").count("<svg") == 1
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/svg+xml;base64,") == len(list(folder.glob("*.svg")))

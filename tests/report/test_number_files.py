@@ -12,8 +12,10 @@ import pandas as pd
 import pytest
 
 from cli import scenes
-from laufruhe.present.pictures import SHEETS
+from laufruhe.files.reader import load
+from laufruhe.present.pictures import PRINTED, PRINTED_SHEETS, SHEETS
 from laufruhe.problem.evaluation import measured
+from laufruhe.report.sections import SECTIONS
 from laufruhe.report.tables import sheets_of, write_tables
 from laufruhe.solvers import Result, solve, state
 from problem_files import PROBLEMS, loaded
@@ -82,8 +84,6 @@ def test_the_same_numbers_make_the_same_files(result: Result, folder: Path, tmp_
 
 @pytest.mark.slow
 def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) -> None:
-    from laufruhe.files.reader import load
-
     found = sheets_of(state(load(PROBLEMS / "study-soft-mounts.toml")))
     assert {"modes", "transmissibility", "run-up", "forces"} <= set(found)
     assert any(head.startswith("travel at front left") for head in found["forces"].head)
@@ -92,8 +92,6 @@ def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_ranked_stars_are_a_sheet() -> None:
-    from laufruhe.files.reader import load
-
     found = sheets_of(solve(load(PROBLEMS / "inline-five-open.toml")))
     assert found["rankings"].rows[0][0] == 1
     assert found["rankings"].rows[0][3] is True
@@ -109,4 +107,15 @@ def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
 
 
 def test_names_are_known_before_anything_is_made(result: Result) -> None:
-    assert set(sheets_of(result)) <= set(SHEETS)
+    assert set(sheets_of(result)) <= {*SHEETS, *PRINTED_SHEETS}
+    known = {section.__name__.rpartition(".")[2] for section in SECTIONS}
+    # every section of a report is a file: in full precision, or as it is printed
+    assert known - set(PRINTED) == {"stars", "decisions", "limits", "mounts", "modes", "orders"}
+    assert set(PRINTED) <= known
+
+
+@pytest.mark.slow
+def test_what_only_the_report_knows_is_a_file_too() -> None:
+    found = sheets_of(state(load(PROBLEMS / "inline-five-torsion.toml")))
+    assert {"table-torque", "table-torsion", "table-torsion-2"} <= set(found) <= {*SHEETS, *PRINTED_SHEETS}
+    assert any(isinstance(cell, float) for row in found["table-torque"].rows for cell in row)

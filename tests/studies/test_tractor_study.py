@@ -116,7 +116,7 @@ def test_picture_and_file(figure: Data, name: str, tmp_path: Path) -> None:
     """A dataset that was read again is drawn: it knows all that its picture says."""
     figure(name).to_netcdf(tmp_path / "f.nc")
     with xr.open_dataset(tmp_path / "f.nc") as again:
-        save_picture(Replication.picture(again), tmp_path / "f.png")
+        save_picture(Replication.picture(again), tmp_path / "f")
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "f.png").stat().st_size > 20_000
 

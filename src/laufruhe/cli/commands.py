@@ -133,6 +133,7 @@ def study(
     problem: o.StudyArgument,
     json: o.StudyJsonOption = None,
     out: o.OutOption = None,
+    kind: o.FormatOption = o.Format.PNG,
     jobs: o.JobsOption = None,
     scheduler: o.SchedulerOption = None,
     time_limit: o.StopOption = None,
@@ -151,7 +152,7 @@ def study(
         from laufruhe.cli.study import studied
 
         with progress() as say:
-            found = studied(problem, out, jobs, say)
+            found = studied(problem, out, jobs, say, kind.kinds)
         hand_out(*found)
 
 

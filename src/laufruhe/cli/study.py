@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shlex
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from laufruhe.cli.screen import pace
@@ -19,7 +20,9 @@ from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.reader import load_study
 
 
-def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None]) -> tuple[str, str]:
+def studied(
+    path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None], kinds: Sequence[str] = ("png",)
+) -> tuple[str, str]:
     """Files of a study in their folder; what to say of them, and all parts as JSON."""
     if jobs is not None and jobs < 1:
         complaint = Complaint("--jobs", str(jobs), "must be one or more", "leave it out to use every core")
@@ -34,7 +37,8 @@ def studied(path: Path, out: Path | None, jobs: int | None, say: Callable[[str],
         # late: pictures are not needed where the study is refused
         from laufruhe.plots.picture import save_picture
 
-        write_study(study, datasets, seconds, stage, shlex.join(["laufruhe", "study", str(path)]), say, save_picture)
+        draw, command = partial(save_picture, kinds=kinds), shlex.join(["laufruhe", "study", str(path)])
+        write_study(study, datasets, seconds, stage, command, say, draw, f".{kinds[0]}")
     kept.unlink(missing_ok=True)
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())
     text = f"{spent}done in {time.perf_counter() - started:.1f} s: {folder / files.REPORT}\n"

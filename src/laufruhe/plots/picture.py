@@ -44,10 +44,11 @@ def draw(picture: Picture) -> Figure:
     return drawn.figure
 
 
-def save_picture(picture: Picture, path: Path) -> str:
-    """Write the picture as a PNG file; the same as SVG."""
+def save_picture(picture: Picture, place: Path, kinds: Sequence[str] = ("png",)) -> str:
+    """Write the picture as files of these kinds at a place that has no ending; returns it as SVG."""
     drawn = draw(picture)
-    save(drawn, path)
+    for kind in kinds:
+        save(drawn, place.with_name(f"{place.name}.{kind}"))
     return as_svg(drawn)
 
 

@@ -24,4 +24,10 @@ PICTURES = {
 SHEETS = (
     "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "run-up", "rankings",
 )  # fmt: skip
-"""Tables and curves of a result as files: `report.tables` fills them."""
+"""Curves and tables of a result as files: `report.tables` fills them in full precision."""
+PRINTED = ("assembly", "robust", "torque", "torsion", "run_up")
+"""Sections of the report whose tables are files as they are printed, and how many each may have."""
+MOST_PRINTED = 8
+PRINTED_SHEETS = tuple(
+    f"table-{name.replace('_', '-')}{f'-{k}' if k > 1 else ''}" for name in PRINTED for k in range(1, MOST_PRINTED + 1)
+)

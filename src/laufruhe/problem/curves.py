@@ -18,7 +18,14 @@ from laufruhe.errors import ModelError
 from laufruhe.numerics.spectrum import Spectrum, common_base, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.problem.channels import MAIN_BEARING_FORCE, MOUNT_FORCE, MOUNT_TRAVEL, mounting_in
+from laufruhe.problem.channels import (
+    CRANK_PIN_FORCE,
+    CRANK_TORQUE,
+    MAIN_BEARING_FORCE,
+    MOUNT_FORCE,
+    MOUNT_TRAVEL,
+    mounting_in,
+)
 from laufruhe.problem.channels.kinds import LoadChannel
 from laufruhe.problem.evaluation import Evaluation, over
 from laufruhe.problem.loads import PointLoads
@@ -124,8 +131,11 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
     ]
     for name, words, place, channel in _places(first):
         values = sampled([[channel.signal(loads) for loads in design.loads] for design in designs.values()])
-        own = (Axis(place, tuple(channel.places(first.engine))), Axis("direction", axes[-values.shape[-1] :]))
-        fields.append(Field(name, words, channel.unit, own, values))
+        places = Axis(place, tuple(channel.places(first.engine)))
+        if values.shape[-1] == len(axes):
+            fields.append(Field(name, words, channel.unit, (places, direction), values))
+        else:
+            fields.append(Field(name, words, channel.unit, (places,), values[..., 0]))
     rows = (Axis("point", tuple(names)), angles)
     return Fields("Loads over the crank angle", _axis_of(designs), rows, tuple(fields))
 
@@ -185,8 +195,11 @@ def _places(design: Evaluation) -> Iterator[tuple[str, str, str, LoadChannel]]:
         yield "mount_force", "force on", "mount", MOUNT_FORCE
     if design.engine.mounts and design.engine.block is not None:
         yield "mount_travel", "travel at", "mount", MOUNT_TRAVEL
-    if design.engine.bearings and has_bearing_loads(design.engine, design.fidelity):
-        yield "main_bearing_force", "force on", "bearing", MAIN_BEARING_FORCE
+    if has_bearing_loads(design.engine, design.fidelity):
+        yield "crank_torque", "torque of", "shaft", CRANK_TORQUE
+        if design.engine.bearings:
+            yield "main_bearing_force", "force on", "bearing", MAIN_BEARING_FORCE
+            yield "crank_pin_force", "force on pin of", "cylinder", CRANK_PIN_FORCE
 
 
 def _amplitudes(spectrum: Spectrum, count: int) -> Array:

@@ -25,7 +25,8 @@ from laufruhe.studies.text import Rows, Text
 def file_names(study: StudyFile) -> list[str]:
     """Everything that `write_study` makes."""
     common = (files.REPORT, files.PAGE, files.BOOK)
-    return [*common, *(f"{part.name}.{end}" for part in study.study.parts for end in part.ends)]
+    pictures = [f"{part.name}.svg" for part in study.study.parts if "png" in part.ends]
+    return [*common, *pictures, *(f"{part.name}.{end}" for part in study.study.parts for end in part.ends)]
 
 
 def write_study(
@@ -36,6 +37,7 @@ def write_study(
     command: str,
     say: Callable[[str], None],
     draw: Callable[[Picture, Path], str],
+    ending: str = ".png",
 ) -> None:
     """Datasets, tables, pictures and the report into a folder that exists.
 
@@ -44,7 +46,9 @@ def write_study(
     seconds
         What each part took.
     draw
-        Makes a PNG file of a picture, and returns it as SVG.
+        Makes the files of a picture, whose place comes without an ending, and returns it as SVG.
+    ending
+        Of the files that the Markdown page shows.
     """
     pictures, sheets = {}, {}
     for part in study.study.parts:
@@ -58,11 +62,11 @@ def write_study(
             rows.to_csv(folder / f"{name}.csv")
             sheets[name] = Sheet([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
         if "png" in part.ends:
-            pictures[name] = draw(part.picture(data), folder / f"{name}.png")
+            pictures[name] = draw(part.picture(data), folder / name)
     if sheets:
         tables.write_book(sheets, folder / files.BOOK)
     document = study_document(study, datasets, seconds, command)
-    files.write(folder / files.REPORT, rendered(document, ".png"))
+    files.write(folder / files.REPORT, rendered(document, ending))
     files.write(folder / files.PAGE, as_html(document, pictures))
 
 

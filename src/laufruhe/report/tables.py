@@ -15,12 +15,13 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from laufruhe.physics.run_up import RunUp
 from laufruhe.present.measures import has_loads, has_ranking, limits_of, load_designs, places_of, ranking_of
 from laufruhe.present.mounting import facts_of, is_elastic
-from laufruhe.present.pictures import SHEETS
+from laufruhe.present.pictures import MOST_PRINTED, PRINTED, SHEETS
 from laufruhe.present.run_up import shown_runs
 from laufruhe.present.speed_curves import speeds_of, transmissibility_of
 from laufruhe.problem.curves import STEPS, Fields, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.report import files
+from laufruhe.report.sections import SECTIONS
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
 from laufruhe.units import readable
 
@@ -45,7 +46,29 @@ class Sheet:
 
 def sheets_of(result: Result) -> dict[str, Sheet]:
     """All sheets that a result fills, by name: SI, but for degrees and rpm where their heads say so."""
-    return {name: sheet for name, of in _SHEETS.items() if (sheet := of(result)) is not None}
+    found = {name: sheet for name, of in _SHEETS.items() if (sheet := of(result)) is not None}
+    return found | _printed(result)
+
+
+def _printed(result: Result) -> dict[str, Sheet]:
+    """Tables of the report that have no sheet of their own, as they are printed."""
+    found = {}
+    for section in SECTIONS:
+        name = section.__name__.rpartition(".")[2]
+        if name in PRINTED:
+            grids = [grid for grid in section.tables(result) if grid.rows][:MOST_PRINTED]
+            for k, grid in enumerate(grids, 1):
+                rows = [[_number(cell) for cell in row] for row in grid.rows]
+                head = [f"{grid.title}: {grid.head[0]}", *grid.head[1:]]
+                found[f"table-{name.replace('_', '-')}{f'-{k}' if k > 1 else ''}"] = Sheet(head, rows)
+    return found
+
+
+def _number(cell: str) -> str | float:
+    try:
+        return float(cell)
+    except ValueError:
+        return cell
 
 
 def _decisions(result: Result) -> Sheet | None:
