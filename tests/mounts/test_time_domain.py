@@ -192,6 +192,7 @@ def soft() -> str:
     return text[: text.index("[run_up]")]
 
 
+@pytest.mark.slow
 def test_a_run_up_is_a_limit_that_is_checked(soft, tmp_path):
     """Where the best design without it keeps it, nothing changes; where not, no design is called one."""
     alone = laufruhe.solve(loaded(tmp_path, soft))

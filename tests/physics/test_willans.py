@@ -112,6 +112,7 @@ def test_tables_that_make_no_line(loads: list[float], fuel: list[float], rule: s
         willans_friction(loads, fuel)
 
 
+@pytest.mark.slow
 def test_scenarios_of_the_ready_problem(solved: laufruhe.solvers.Result) -> None:
     """Both loads stand at the middle and two deviations to either side; the worst of them all is proven least."""
     problem = solved.problem
@@ -135,6 +136,7 @@ def test_scenarios_of_the_ready_problem(solved: laufruhe.solvers.Result) -> None
     assert "bar of friction" in problem.assumptions[-1]
 
 
+@pytest.mark.slow
 def test_no_load_between_is_worse_than_the_ends(solved: laufruhe.solvers.Result) -> None:
     """The pressure of a cycle of finite heat release is affine in imep, and a mean of lengths convex: the ends tell."""
     problem = solved.problem

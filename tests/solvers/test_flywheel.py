@@ -95,6 +95,7 @@ def test_the_least_inertia_has_its_degree_and_is_shown_from_both_sides(tmp_path:
     assert result.limits[0].shadow_price == pytest.approx(slope, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_rim_is_the_best_of_a_grid(tmp_path: Path) -> None:
     """Of 60 x 60 sections and diameters with the width that keeps the degree none is lighter."""
     limits = '[[constraints]]\nlimit = "rim stress"\nmax = "18 N/mm^2"\n'
@@ -116,6 +117,7 @@ def test_a_rim_is_the_best_of_a_grid(tmp_path: Path) -> None:
     assert best <= 1.02 * result.objective.value
 
 
+@pytest.mark.slow
 def test_a_sum_of_inertia_and_degree_is_proven(tmp_path: Path) -> None:
     """One rises and the other falls: brute force finds nothing under the bound, and no better design."""
     degree = '{ quantity = "degree of irregularity", weight = 500 }'
@@ -150,6 +152,7 @@ def test_a_flywheel_that_cannot_reach_the_degree_is_told_in_one_line(tmp_path: P
     assert set(both.conflict) == {"degree of irregularity at rated", "rim stress"}
 
 
+@pytest.mark.slow
 def test_the_worked_diesel_gets_the_flywheel_that_it_was_given(diesel: laufruhe.solvers.Result) -> None:
     """70 hp diesel, part E: 1:60, rim of 300 by 195 mm and 4850 kg under 3.5 m, 6330 kg in all, from a coefficient."""
     assert diesel.certificate is not None
@@ -166,6 +169,7 @@ def test_the_worked_diesel_gets_the_flywheel_that_it_was_given(diesel: laufruhe.
     assert diesel.certificate.kkt_residual < 1e-6
 
 
+@pytest.mark.slow
 def test_more_room_is_never_worse(diesel: laufruhe.solvers.Result) -> None:
     problem = diesel.problem
     limits = tuple(
@@ -269,6 +273,7 @@ def test_what_a_flywheel_needs_is_told_and_nothing_traded_for_it() -> None:
         traded([path], Path("nowhere"), lambda _: None)
 
 
+@pytest.mark.slow
 def test_two_machines_on_one_shaft_are_best_half_a_turn_apart() -> None:
     """The same engines: the least flywheel is even in the angle between their cranks, and least half a turn apart."""
     tables = tables_of(PROBLEMS / "two-machines.toml")
@@ -286,3 +291,14 @@ def test_two_machines_on_one_shaft_are_best_half_a_turn_apart() -> None:
     alone = {**tables["engine"], "slider_cranks": tables["engine"]["slider_cranks"][:1]}
     one = proven(load_tables({**tables, "engine": alone}, Path("one.toml"))).objective.value
     assert found[0] == pytest.approx(2.0 * one, rel=1e-6)
+
+
+def test_every_even_star_of_equal_cylinders_stores_the_same(tmp_path: Path) -> None:
+    """Ranked with proof, and all alike; the degree itself is refused by name where throws are open."""
+    text = changed(SINGLE, "throws = [0]", 'cylinders = 4\ncylinder_spacing = "120 mm"\nthrows = "open"')
+    result = proven(loaded(tmp_path, text + '[objective]\nminimise = "peak to peak stored work"\n'))
+    assert len(result.phasing.ranking) > 2
+    assert [star.value for star in result.phasing.ranking] == pytest.approx([result.objective.value] * 3, rel=1e-3)
+    fixed = changed(INERTIA, '{ between = ["0.05 kg m^2", "40 kg m^2"] }', '"1 kg m^2"')
+    with pytest.raises(ModelError, match="no method decides star together for degree of irregularity"):
+        laufruhe.solve(loaded(tmp_path, text + fixed + '[objective]\nminimise = "degree of irregularity"\n'))

@@ -117,6 +117,7 @@ def masses(problem: Problem, mass: float) -> Engine:
     return problem.design([mass])
 
 
+@pytest.mark.slow
 def test_the_studys_seven_metres_a_second() -> None:
     """There the torque of the masses works against that of the gas: least work is stored with some 2.25 kg, not 1.25.
 
@@ -140,6 +141,7 @@ def test_the_studys_seven_metres_a_second() -> None:
     assert np.all(np.diff(few, 2) >= -1e-9 * few[0])
 
 
+@pytest.mark.slow
 def test_with_a_counterweight_more_freedom_is_never_worse(tmp_path: Path) -> None:
     both = laufruhe.solve(loaded(tmp_path, VEE + WEB + objective("mean mount force")))
     assert both.status is Status.OPTIMAL
