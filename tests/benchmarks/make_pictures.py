@@ -16,6 +16,7 @@ COLOURS = 64
 WANTED = {
     ("solve", "tractor-four-lanchester"): {"bars": "tractor-four-lanchester-bars"},
     ("study", "tractor-study"): {name: f"tractor-study-{name}" for name in ("fig-10", "fig-22", "reciprocating-mass")},
+    ("study", "torsion-pareto"): {"firing-order": "torsion-pareto"},
     ("trade", "tractor-four-lanchester"): {"tractor-four-lanchester": "tractor-four-lanchester-trade"},
 }
 
