@@ -105,6 +105,12 @@ class Cluster:
         worker.kill()
         worker.wait()
 
+    def processor_time(self) -> float:
+        """Of all workers so far [s]."""
+        import psutil
+
+        return sum(sum(psutil.Process(worker.pid).cpu_times()[:2]) for worker in self.workers)
+
     def kill(self) -> None:
         """Everything, by SIGKILL."""
         for process in (*self.workers, *([self.scheduler] if self.scheduler else [])):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,13 +14,15 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from laufruhe.cli import app
-from laufruhe.errors import InputError
+from laufruhe.errors import InputError, SolverError
 from laufruhe.files.reader import load
+from laufruhe.numerics.workers import working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve
-from laufruhe.studies import run
+from laufruhe.studies import run, runner
 from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.regions import Regions
 from problem_files import PROBLEMS
 
 pytest.importorskip("zarr", reason="Zarr is not installed: pip install 'laufruhe[cluster]'")
@@ -130,6 +136,42 @@ def test_the_ready_study_runs_and_goes_on(tmp_path: Path) -> None:
     again = CliRunner().invoke(app, words)
     assert again.exit_code == 0
     assert "0.0 s on one core" not in again.stdout
+
+
+def test_any_executor_does(tmp_path: Path) -> None:
+    alone = computed(tmp_path / "1", DESIGNS + "draws = 60\nchunk = 7")
+    with ThreadPoolExecutor(3) as pool, working_on(pool):
+        shared = computed(tmp_path / "2", DESIGNS + "draws = 60\nchunk = 7")
+    assert shared.identical(alone)
+
+
+def test_another_program_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker that runs another version may answer otherwise."""
+    versions = iter(["0.1.0 here"])
+    monkeypatch.setattr(runner, "program", lambda: next(versions, "0.1.0 elsewhere"))
+    with (
+        ThreadPoolExecutor(1) as pool,
+        working_on(pool),
+        pytest.raises(SolverError, match="runs another Laufruhe; install the same everywhere"),
+    ):
+        computed(tmp_path, DESIGNS + "draws = 5")
+
+
+def test_a_full_disk_is_one_line_and_the_study_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keys, keep, kept = DESIGNS + "draws = 60\nchunk = 10", Regions.keep, iter(range(99))
+
+    def full(self: Regions, *words: Any) -> None:
+        if next(kept) >= 3:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        keep(self, *words)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Regions, "keep", full)
+        with pytest.raises(SolverError, match=r"No space left on device.*make room and the same command goes on"):
+            computed(tmp_path / "1", keys)
+    store = xr.open_zarr(tmp_path / "1/out.zarr", group="p", consolidated=False, chunks=None)
+    assert int(np.any(store["done"].values, axis=2).sum()) == 3
+    assert computed(tmp_path / "1", keys).identical(computed(tmp_path / "2", keys))
 
 
 @pytest.mark.parametrize(

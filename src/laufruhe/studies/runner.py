@@ -63,7 +63,11 @@ def run(
         with closing(answers(list(todo.values()), scenes, jobs)) as found:
             for count, answer in enumerate(found, 1):
                 mark = names[answer.task]
-                store[mark].keep(mark, answer.seconds, answer.record)
+                try:
+                    store[mark].keep(mark, answer.seconds, answer.record)
+                except OSError as error:
+                    why = f"a point cannot be kept ({error.strerror or error})"
+                    raise SolverError(f"{why}; finished points are, make room and the same command goes on") from None
                 say(whole - len(todo) + count, whole)
         datasets, seconds = {}, {}
         for part in study.study.parts:
