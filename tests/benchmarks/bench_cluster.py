@@ -292,24 +292,24 @@ def main() -> None:
 BAR = "| ---: " * 6 + "|"
 SHARES = """## More and more workers
 
-{draws:,} designs in pieces of {chunk:,}, and {scenes} solves in pieces of {few}. Reports, data, pictures and every number of
-the store beside those of one process:
+{draws:,} designs in pieces of {chunk:,}, and {scenes} solves in pieces of {few}. Reports, data, pictures and every
+number of the store beside those of one process:
 """
 KILLS = """## Kills
 
 SIGKILL at random moments, one to three times a run; a worker or a scheduler that is killed is started again, a client
 that is killed is the same command again. Every file and number is compared with those of one process.
 """
-LONG = """A run as long as the machine allowed: engines with four numbers drawn, least RMS of the mount force, in pieces of
-500 on two Dask workers of a low priority; its client was killed on the way and started again. A hundred thousand were
-asked for at first. Every one is a proven optimum; the largest gap is 5.3e-15. Core-seconds are by the clock of the
-workers here, which had a tenth of a core each: alone, one of these solves takes 13 ms of one core.
+LONG = """A run as long as the machine allowed: engines with four numbers drawn, least RMS of the mount force, in
+pieces of 500 on two Dask workers of a low priority; its client was killed on the way and started again. A hundred
+thousand were asked for at first. Every one is a proven optimum; the largest gap is 5.3e-15. Core-seconds are by the
+clock of the workers here, which had a tenth of a core each: alone, one of these solves takes 13 ms of one core.
 """
 PAPER = """A scheduler hands out a piece each 4 ms or so, hence a piece must take longer than 4 ms times the number of
 workers: of evaluations, which take microseconds, a million a piece keep hundreds of workers busy and no more, and a
 dozen cores do the work in minutes without a cluster. Who started the study writes the store: 1 to 2 ms a piece beside
 the bytes. `done` is checked when a study goes on, which reads all of the store once. The dataset takes 8 bytes a number
-at once; of a thousand million draws it is read piece by piece from the store, which the report of a study does not do yet.
+at once; a thousand million draws would be read piece by piece from the store, which reports do not do yet.
 """
 
 

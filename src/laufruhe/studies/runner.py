@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,11 +63,8 @@ def run(
         with closing(answers(list(todo.values()), scenes, jobs)) as found:
             for count, answer in enumerate(found, 1):
                 mark = names[answer.task]
-                try:
+                with _making_room():
                     store[mark].keep(mark, answer.seconds, answer.record)
-                except OSError as error:
-                    why = f"a point cannot be kept ({error.strerror or error})"
-                    raise SolverError(f"{why}; finished points are, make room and the same command goes on") from None
                 say(whole - len(todo) + count, whole)
         datasets, seconds = {}, {}
         for part in study.study.parts:
@@ -76,6 +73,16 @@ def run(
             datasets[part.name] = part.dataset([point for _, point in own], records)
             seconds[part.name] = sum(store[mark].seconds[mark] for mark in {mark for mark, _ in own})
     return datasets, seconds
+
+
+@contextmanager
+def _making_room() -> Iterator[None]:
+    """A full disk costs what is at hand, and says so."""
+    try:
+        yield
+    except OSError as error:
+        why = f"a point cannot be kept ({error.strerror or error})"
+        raise SolverError(f"{why}; finished points are, make room and the same command goes on") from None
 
 
 @dataclass(frozen=True)
