@@ -117,6 +117,7 @@ def test_the_best_order_is_that_of_all_solved_one_by_one(name: str) -> None:
     assert max(values.values()) > 1.004 * least
 
 
+@pytest.mark.slow
 def test_a_ranking_lists_orders_by_what_each_is_worth() -> None:
     whole = tables(4, {"minimise": "mean friction power"}, {"mass": "1 kg"}, phasing={"best": 6})
     ranking = laufruhe.solve(problem_of(whole)).phasing.ranking
@@ -148,6 +149,7 @@ VEE = {"layout": "vee", "bank_angle": 60, "split_pin_angle": 60}
 BETWEEN = [{"x": f"{x} mm"} for x in (190, 60, -60, -190)]
 
 
+@pytest.mark.slow
 def test_two_rods_on_a_pin_are_decided_order_by_order() -> None:
     """The best of all firing orders of all even stars, each as a problem of its own."""
     one_bearing = bearing("mean", bearings=["2"])

@@ -130,6 +130,7 @@ def test_more_freedom_is_never_worse(tmp_path: Path) -> None:
     assert values[1] >= values[2] * (1.0 - 1e-4)
 
 
+@pytest.mark.slow
 def test_mounts_and_bearings_limit_each_other(tmp_path: Path) -> None:
     """Least bearing force under a mount force, and least mount force under that bearing force, are one design's."""
     first = laufruhe.solve(
