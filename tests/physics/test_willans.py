@@ -197,3 +197,24 @@ def test_what_makes_no_load_is_refused_in_one_line(rows: str, old: str, new: str
         loaded(tmp_path, changed(BRAKE, old, new) if old else BRAKE)
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.slow
+def test_a_limit_on_the_worst_mean_is_one_on_every_point(tmp_path: Path) -> None:
+    """Least unbalance under it, and under a limit at each operating point: the same design, and the same price."""
+    problem = laufruhe.load(PROBLEMS / "car-four-willans.toml")
+    text = (PROBLEMS / "car-four-willans.toml").read_text(encoding="utf-8")
+    text = text[: text.index("[objective]")].replace("unbalance = {", 'radius = "30 mm"\nunbalance = {')
+    (tmp_path / "car-four-fuel.csv").write_text((PROBLEMS / "car-four-fuel.csv").read_text("utf-8"), encoding="utf-8")
+    least = text + '[objective]\nminimise = "balancer mass"\n'
+    most = 'max = "700 N"\n'
+    joint = laufruhe.solve(loaded(tmp_path, least + f'[[constraints]]\nlimit = "worst mean mount force"\n{most}'))
+    each = "".join(
+        f'[[constraints]]\nname = "{k}"\nlimit = "mean mount force"\n{most}operating_points = ["{point.name}"]\n'
+        for k, point in enumerate(problem.points)
+    )
+    apart = laufruhe.solve(loaded(tmp_path, least + each))
+    assert joint.certificate.kind is apart.certificate.kind is Proof.GLOBAL
+    assert joint.objective.value == pytest.approx(apart.objective.value, rel=2e-4)
+    prices = sum(limit.shadow_price for limit in apart.limits)
+    assert joint.limits[0].shadow_price == pytest.approx(prices, rel=1e-2)
