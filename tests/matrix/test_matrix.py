@@ -11,7 +11,7 @@ from lanes import first_fast
 from matrix.cells import Cell, cells
 from matrix.claims import judged
 
-SHARE, FAST = 80, 10
+SHARE, FAST = 50, 10
 
 
 def _chosen() -> list[Cell]:

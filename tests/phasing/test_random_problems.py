@@ -47,7 +47,7 @@ OTHER_SEEDS = [seed for seed in range(120) if Writer(seed).mounts not in (RIGID,
 OPEN_SEEDS = [seed for seed in range(50) if Writer(seed).mounts == OPEN]
 
 
-@pytest.mark.parametrize("seed", first_fast(RIGID_SEEDS, 16, long=(60, 102, 121, 154, 155)))
+@pytest.mark.parametrize("seed", first_fast(RIGID_SEEDS, 16, long=(36, 60, 102, 111, 121, 154, 155)))
 def test_on_rigid_mounts(tmp_path, seed):
     problem = problem_of(tmp_path, seed)
     if problem is not None:
