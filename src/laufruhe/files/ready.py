@@ -17,7 +17,7 @@ from laufruhe.files.problem_file import SCHEMA
 STUDY_SCHEMA = "laufruhe-study.schema.json"
 SCHEMAS = (SCHEMA, STUDY_SCHEMA)
 _PACKAGE = Path(__file__).parents[1]
-_LIST = "uses.csv"
+_LIST, _OTHER = "uses.csv", "other uses"
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,10 @@ def folder() -> Path:
 def ready() -> dict[str, Ready]:
     """All of them by name, those of one use together."""
     with (folder() / _LIST).open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    uses = list(dict.fromkeys(row["use"] for row in rows))
-    rows.sort(key=lambda row: uses.index(row["use"]))
-    return {row["problem"]: _found(row["problem"], row["use"]) for row in rows}
+        use_of = {row["problem"]: row["use"] for row in csv.DictReader(stream)}
+    use_of |= {path.stem: _OTHER for path in sorted(folder().glob("*.toml")) if path.stem not in use_of}
+    uses = list(dict.fromkeys(use_of.values()))
+    return {name: _found(name, use) for name, use in sorted(use_of.items(), key=lambda pair: uses.index(pair[1]))}
 
 
 def ready_named(name: str) -> Ready:
