@@ -130,8 +130,12 @@ class ThrowWaves:
             kept |= {order for order, rest, share in told if rest > share**2 * tail[0]}
         return tuple(sorted(kept))
 
+    def left_out(self, measure: Measure) -> float:
+        """What the orders that are left out amount to at most, wherever the throws stand."""
+        return sum(self._left_out(measure, k) for k in range(len(self.parts))) if measure.is_load else 0.0
+
     def _left_out(self, measure: Measure, k: int) -> float:
-        """What the orders of a part that are left out amount to at most, wherever its throw stands."""
+        """Of one part."""
         total = 0.0
         for signal in self._signals(measure, k):
             sizes = np.linalg.norm(signal.coefficients[~orders_equal(signal.orders, self.numbers)], axis=-1)
@@ -147,7 +151,6 @@ class ThrowWaves:
         """A measure at equal steps over the period, means averaged about them so that bounds hold between (P7)."""
         fixed = self.rest.norm(measure, samples, averaged=True)
         waves = np.zeros((len(self.parts), len(self.orders), *fixed.constant.shape), complex)
-        left_out = 0.0
         for k, part in enumerate(self.parts):
             if measure.is_mass and part.cylinder is None:
                 h = self.orders.index(Fraction(1))
@@ -155,8 +158,7 @@ class ThrowWaves:
             if not measure.is_load:
                 continue
             waves[k] = self._waves(measure, self._alone[k].signals(measure.load), samples) * self._turned(part)
-            left_out += self._left_out(measure, k)
-        return WaveNorm(fixed, waves, left_out)
+        return WaveNorm(fixed, waves, self.left_out(measure))
 
     def _weights(self, measure: Measure, part: Moving) -> NDArray[np.complex128]:
         """Rows of the masses that ride on a throw, which turn with it."""

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.affine import AffineNorm, AffineProblem
+from laufruhe.errors import ModelError
+from laufruhe.load_models.affine import MOST_NUMBERS, AffineNorm, AffineProblem
 from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.machine.firing_windows import SLACK, FiringBounds, FiringWindow
 from laufruhe.numerics.norms import NORMS, Grid
@@ -61,6 +62,15 @@ class ThrowBox:
         return bool(np.all(self.upper - self.lower <= NARROWEST))
 
 
+@dataclass(frozen=True, eq=False)
+class _Turned:
+    """Norms with the whole turns of every cylinder, and how much orders and unbalances weigh in them."""
+
+    rows: AffineProblem
+    weights: Array
+    pulls: Array
+
+
 class ThrowPrograms:
     """Cone programs of boxes of throws.
 
@@ -84,7 +94,11 @@ class ThrowPrograms:
         ]
         self._limits = [(x, _small(waves.norm(x.measure, waves.samples(x.measure, samples)))) for x in problem.limits
                         if math.isfinite(x.maximum)]  # fmt: skip
-        self.samples, self._low = samples, self._told_apart()
+        sizes = [norm.waves[0].size * waves.throws for norm in (n for _, n in (*self._terms, *self._limits))]
+        if 2 * sum(sizes) > MOST_NUMBERS:
+            raise ModelError(f"{2e-6 * sum(sizes):.0f} million numbers at once")
+        self._low = self._told_apart()
+        self._turned: dict[tuple[int, ...], _Turned] = {}
         self._proofs: list[Multipliers] = []
         self.told: set[str] = set()
 
@@ -103,30 +117,36 @@ class ThrowPrograms:
 
     def program(self, window: FiringWindow) -> Program:
         """Of one order of firing."""
-        terms = tuple((weight, self._rows(norm, window)) for weight, norm in self._terms)
-        limits = [(limit.maximum + norm.left_out, self._rows(norm, window)) for limit, norm in self._limits]
-        names = [limit.name for limit, _ in self._limits]
-        if window.order:
-            limits.append((1.0, self._intervals(window)))
-            names.append("")
-        rows = AffineProblem(terms, tuple(limits), (), 1)
+        if window.laps not in self._turned:
+            self._turned[window.laps] = self._with_laps(window.laps)
+        own = self._turned[window.laps]
+        names = tuple(limit.name for limit, _ in self._limits)
+        if not window.order:
+            return Program(window, own.rows, names, own.weights, own.pulls)
+        rows = replace(own.rows, limits=(*own.rows.limits, (1.0, self._intervals(window))))
+        return Program(window, rows, (*names, ""), own.weights, own.pulls)
+
+    def _with_laps(self, laps: tuple[int, ...]) -> _Turned:
+        """Rows of all orders of firing that share these whole turns."""
+        terms = tuple((weight, self._rows(norm, laps)) for weight, norm in self._terms)
+        limits = tuple((limit.maximum + norm.left_out, self._rows(norm, laps)) for limit, norm in self._limits)
         count = len(self.waves.orders)
         weights, pulls = np.zeros((self.waves.throws, count)), np.zeros(self._riders.size)
-        for _, norm in (*terms, *limits[: len(self._limits)]):
+        for _, norm in (*terms, *limits):
             size = np.linalg.norm(norm.slope.reshape(norm.constant.size, -1), axis=0)
             own = size[self._riders.size :].reshape(self.waves.throws, 2 * count + 1)
             own = np.hypot(own[:, :count], own[:, count : 2 * count])
             weights += own / (float(own.max()) or 1.0)
             pulls += size[: self._riders.size] / (float(own.max()) or 1.0)
-        return Program(window, rows, tuple(names), weights, pulls)
+        return _Turned(AffineProblem(terms, limits, (), 1), weights, pulls)
 
-    def _rows(self, norm: WaveNorm, window: FiringWindow) -> AffineNorm:
-        """With the whole turns of a window, in columns."""
+    def _rows(self, norm: WaveNorm, laps: tuple[int, ...]) -> AffineNorm:
+        """With whole turns, in columns."""
         orders, throws, fixed = self.waves.numbers, self.waves.throws, norm.fixed
         k, d = fixed.constant.shape
         whole = np.zeros((throws, len(orders), k, d), complex)
         for part, wave in zip(self.waves.parts, norm.waves, strict=True):
-            lap = 0 if part.cylinder is None else window.laps[part.cylinder]
+            lap = 0 if part.cylinder is None else laps[part.cylinder]
             whole[part.pin] += wave * np.exp(-1j * math.tau * lap * orders)[:, None, None]
         slope = np.zeros((k, d, throws, 2 * len(orders) + 1))
         slope[..., : len(orders)] = np.moveaxis(whole.real, (0, 1), (2, 3))

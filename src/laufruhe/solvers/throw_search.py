@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ Improve = Callable[[Candidate], StarDesign | None]
 """The best design near a candidate, and only the allowed one."""
 
 MOST_WINDOWS = 6_000
-MOST_BOXES = 400
+MOST_BOXES = 300
 FEWEST_SAMPLES, MOST_SAMPLES = 96, 384
 # of the best design, that steps over the period may cost
 STEPS_COST = 1e-3
@@ -39,6 +40,8 @@ STEPS_COST = 1e-3
 SHARE = 0.5
 # windows that are tried for a crank that can be evaluated
 _MOST_REALISED = 50
+# of what steps cost, that a bound is beside the best design where more of them are taken
+_FINER = 1.5
 # boxes whose middle is tried: the first few, and one of so many
 _TRIED_FIRST, _TRIED_EACH, _MOST_TRIED = 2, 100, 5
 
@@ -67,17 +70,61 @@ class Searched:
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A box, and the set of shafts that it is of; all throws where it has no box."""
+    """A box, the steps that its bound has, and the set of shafts that it is of; all throws where it has no box."""
 
     bound: float
     box: ThrowBox | None = None
-    programs: ThrowPrograms | None = None
+    stage: _Stage | None = None
     left_out: tuple[str, ...] = ()
 
     @property
     def is_exact(self) -> bool:
         """Whether there is nothing left to cut."""
         return self.box is not None and self.box.is_exact
+
+
+class _Stage:
+    """Programs at so many steps over the period, and those at twice as many.
+
+    Parameters
+    ----------
+    make
+        Programs.
+    lost
+        Of the best design, that means lose by steps (P7).
+    value
+        Of the best design.
+    left_out
+        Of the objective, by the orders left out.
+    """
+
+    def __init__(
+        self, make: Callable[[int], ThrowPrograms], samples: int, lost: Callable[[int], float], value: float,
+        left_out: float,
+    ) -> None:  # fmt: skip
+        self._make, self._samples, self._lost, self._value, self._left_out = make, samples, lost, value, left_out
+
+    @cached_property
+    def programs(self) -> ThrowPrograms:
+        """With so many steps."""
+        return self._make(self._samples)
+
+    @cached_property
+    def cost(self) -> float:
+        """Share of the best design that no bound gets back."""
+        return (self._lost(self._samples) + self._left_out) / self._value
+
+    @cached_property
+    def next(self) -> _Stage | None:
+        """With twice as many; None where these are enough."""
+        if self._lost(self._samples) <= STEPS_COST * self._value or 2 * self._samples > MOST_SAMPLES:
+            return None
+        return _Stage(self._make, 2 * self._samples, self._lost, self._value, self._left_out)
+
+    @property
+    def last(self) -> _Stage:
+        """With the most."""
+        return self if self.next is None else self.next.last
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,32 +249,38 @@ class _Search:
         self._problem, self._phasing, self._improve = problem, phasing, improve
         self._seen = self._tried = 0
         self._best, self._not_met = _Best(best), set[str]()
-        # share of the best design that no bound gets back: steps over the period, orders left out
-        self.cost, self._samples = 0.0, FEWEST_SAMPLES
-        while best is not None and self._steps_cost(best) > STEPS_COST and 2 * self._samples <= MOST_SAMPLES:
-            self._samples *= 2
-        self.roots: list[tuple[ThrowPrograms, FiringWindow, tuple[str, ...]]] = []
+        self.roots: list[tuple[_Stage, FiringWindow, tuple[str, ...]]] = []
         free = all(decision.set.lower <= 0.0 for decision in problem.unbalances)
         for built in phasing.shafts.largest if free else phasing.shafts.allowed:
             left_out = phasing.without(built)
-            programs = self._programs(windows, left_out)
-            self.roots += [(programs, window, left_out) for window in windows]
-            if best is not None and best.value > 0.0:
-                self.cost = max(self.cost, self._steps_cost(best) + programs.left_out / best.value)
+            make, loss = self._programs(windows, left_out)
+            value = best.value if best is not None and best.value > 0.0 else math.inf
+            stage = _Stage(make, FEWEST_SAMPLES, lambda samples: self._steps_cost(best, samples), value, loss)
+            self.roots += [(stage, window, left_out) for window in windows]
 
-    def _steps_cost(self, best: StarDesign) -> float:
-        """Share of a design's value that means averaged about the steps lose (P7)."""
+    @property
+    def cost(self) -> float:
+        """Share of the best design that no bound gets back."""
+        return max(stage.last.cost for stage in {id(stage): stage for stage, _, _ in self.roots}.values())
+
+    def _steps_cost(self, best: StarDesign | None, samples: int) -> float:
+        """Of a design's value, that means averaged about the steps lose (P7)."""
+        if best is None:
+            return 0.0
         problem, found = best.result.problem, best.result.final
         lost = 0.0
         for term in problem.objective:
             if term.measure.is_load and term.measure.norm.averages:
                 signals = over(problem.engine.cycle.base_order, found.signals(term.measure.load))
-                averaged = [signal.averaged(signal.period / self._samples) for signal in signals]
-                rows = load_rows(term.measure, problem.points, averaged, found.engine, 4 * self._samples)
+                averaged = [signal.averaged(signal.period / samples) for signal in signals]
+                rows = load_rows(term.measure, problem.points, averaged, found.engine, 4 * samples)
                 lost += term.weight * max(found.value(term.measure) - rows.value, 0.0)
-        return lost / best.value if best.value > 0.0 else 0.0
+        return lost
 
-    def _programs(self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]) -> ThrowPrograms:
+    def _programs(
+        self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]
+    ) -> tuple[Callable[[int], ThrowPrograms], float]:
+        """Programs of boxes at so many steps over the period, and what their orders leave out of the objective."""
         phasing, layout = self._phasing, self._phasing.layout(*self._phasing.least_geometry)
         for k, window in enumerate(windows):
             candidate = replace(self.candidate(window, amid(window)), left_out=left_out)
@@ -242,7 +295,8 @@ class _Search:
             rides = rides_of(phasing, candidate)
             riders = Riders(replace(realised, limits=limits), rides, candidate.throws)
             waves = ThrowWaves(riders.problem, layout, rides)
-            return ThrowPrograms(waves, riders, firing_of(phasing), self._samples)
+            loss = sum(term.weight * waves.left_out(term.measure) for term in realised.objective)
+            return partial(ThrowPrograms, waves, riders, firing_of(phasing)), loss
         raise ModelError("no crank fires")
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
@@ -268,20 +322,27 @@ class _Search:
 
     def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | None, _Best | None]]:
         """Windows of all throws, halves of a box."""
-        if part.box is not None and part.programs is not None:
-            for half in part.programs.parts(part.box, self.cut(value)):
-                yield self._looked(part.programs, half, part.left_out)
-            return
-        for programs, window, left_out in self.roots:
-            cut = self.cut(min(value, self._best.value))
-            found = programs.box(programs.program(window), *window.box, part.bound, cut, is_new=True)
-            yield self._looked(programs, found, left_out)
+        box, stage, cut = part.box, part.stage, self.cut(value)
+        if box is None or stage is None:
+            for first, window, left_out in self.roots:
+                cut = self.cut(min(value, self._best.value))
+                programs = first.programs
+                found = programs.box(programs.program(window), *window.box, part.bound, cut, is_new=True)
+                yield self._looked(first, found, left_out)
+        elif stage.next is not None and part.bound > value * (1.0 - _FINER * stage.cost):
+            # more steps tell more than smaller boxes
+            programs = stage.next.programs
+            finer = programs.box(programs.program(box.program.window), box.lower, box.upper, part.bound, cut)
+            yield self._looked(stage.next, finer, part.left_out)
+        else:
+            for half in stage.programs.parts(box, cut):
+                yield self._looked(stage, half, part.left_out)
 
     def _looked(
-        self, programs: ThrowPrograms, found: ThrowBox | None, left_out: tuple[str, ...]
+        self, stage: _Stage, found: ThrowBox | None, left_out: tuple[str, ...]
     ) -> tuple[_Part | None, _Best | None]:
         """A box, and a better design near its middle."""
-        self._not_met |= programs.told
+        self._not_met |= stage.programs.told
         if found is None:
             return None, None
         self._seen += 1
@@ -292,7 +353,7 @@ class _Search:
             candidate = replace(self.candidate(window, nearest(window, found.middle)), left_out=left_out)
             improved = self._improve(candidate) if candidate.firing_order is not None else None
             self._best = self.better(self._best, _Best(improved))
-        return _Part(found.bound, found, programs, left_out), self._best if tried else None
+        return _Part(found.bound, found, stage, left_out), self._best if tried else None
 
     @staticmethod
     def better(best: _Best, found: _Best) -> _Best:
