@@ -20,7 +20,7 @@ from laufruhe.solvers import Status, solve
 from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.throw_boxes import ThrowPrograms
 from laufruhe.solvers.throw_riders import Riders
-from laufruhe.solvers.throw_search import firing_of, nearest, windows_of
+from laufruhe.solvers.throw_windows import firing_of, nearest, windows_of
 from phasing import engines
 
 GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "8 bar"\n'
