@@ -97,3 +97,18 @@ def test_wider_errors_are_never_better() -> None:
         found = worst_case([(1.0, wider)], COLUMNS, 1e-6)
         assert found.value >= last
         last = found.bound
+
+
+@pytest.mark.parametrize("discs", [1, 2])
+@pytest.mark.parametrize("name", ["mean", "maximum", "rms"])
+def test_turning_unbalances_add_up(name: str, discs: int) -> None:
+    """Alone they make the same force at every angle, wherever they point: no errors outside their discs are taken."""
+    phi = 2.0 * np.pi * np.arange(36) / 36
+    turned = np.stack([np.stack([np.cos(phi), -np.sin(phi)]), np.stack([np.sin(phi), np.cos(phi)])]).transpose(2, 0, 1)
+    slope = np.concatenate([(k + 1.0) * turned for k in range(discs)], axis=2)
+    norm = AffineNorm(NORMS[name], np.zeros((36, 2)), slope, Grid(np.full(36, 1.0 / 36.0), 36))
+    columns = tuple(slice(2 * k, 2 * k + 2) for k in range(discs))
+    found = worst_case([(1.0, norm)], columns, 1e-6)
+    assert found.bound == pytest.approx(sum(range(discs + 1)), rel=1e-6)
+    for own in columns:
+        assert np.hypot(*found.errors[own]) <= 1.0 + 1e-12

@@ -20,7 +20,8 @@ from laufruhe.problem.tolerance import Over, Tolerances
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
-from problem_files import MOUNTS, shaft
+from laufruhe.solvers.robust import decided_values
+from problem_files import MOUNTS, PROBLEMS, shaft
 
 ENGINE = """
 title = "Four in line"
@@ -211,3 +212,92 @@ def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None
 def test_what_is_not_decided_is_refused(read: Callable[[str], Problem], text: str, word: str) -> None:
     with pytest.raises(ModelError, match=word):
         solve(read(text + ROBUST))
+
+
+VEE = """
+title = "Vee-two"
+[engine]
+layout = "vee"
+bank_angle = 90
+cycle = "four-stroke"
+stroke = "80 mm"
+rod_ratio = 0.27
+reciprocating_mass = "0.5 kg ± 3 % normal"
+cylinder_spacing = "100 mm"
+cylinders = 2
+throws = [45]
+[[operating_points]]
+speed = "3000 rpm"
+"""
+WEIGHT = """
+[[counterweights]]
+name = "w"
+opposite_throw = 1
+unbalance = { between = ["0 kg m", "0.1 kg m"], tolerance = "3 %" }
+"""
+TWO_POINTS = '[[operating_points]]\nspeed = "1500 rpm"\nweight = 2\n[[operating_points]]\nspeed = "2500 rpm"\n'
+GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "80 bar"\nimep = "6 bar"\n'
+ELASTIC = """
+[block]
+mass = "300 kg"
+inertia = ["12 kg m^2", "25 kg m^2", "25 kg m^2"]
+[mounts]
+kind = "elastic"
+stiffness = ["400 N/mm", "300 N/mm", "500 N/mm"]
+loss_factor = 0.1
+"""
+
+
+def asked(quantity: str, samples: int = 48) -> str:
+    return f'[objective]\nminimise = "{quantity}"\n[fidelity]\nsamples = {samples}\n'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        VEE + WEIGHT + asked("rms shaking force"),
+        VEE + WEIGHT + asked("maximum shaking force"),
+        TEXT.replace(MOUNTS, ELASTIC + MOUNTS.replace("[mounts]", "")),
+        TEXT.replace('[[operating_points]]\nspeed = "2500 rpm"\n', TWO_POINTS),
+        TEXT.replace('stroke = "120 mm"', 'stroke = "120 mm"\nbore = "100 mm"').replace("= 48", "= 240") + GAS,
+    ],
+    ids=["vee", "vee, a peak", "elastic mounts", "two points", "gas"],
+)
+def test_crossed(read: Callable[[str], Problem], text: str) -> None:
+    """Proven, and no engine of a few hundred exceeds it."""
+    problem = read(text + ROBUST)
+    found = solve(replace(problem, tolerance=1e-3))
+    assert found.certificate is not None
+    assert found.certificate.kind is Proof.GLOBAL
+    values = decided_values(problem, found)
+    for z in problem.tolerances.draw(np.random.default_rng(4), 200):
+        own = problem.built(z)
+        value = objective_value(own, evaluate(own, own.design(values), found.final.samples))
+        assert value <= worst(found) * (1.0 + 1e-9)
+
+
+def test_what_bends_loads_is_drawn(read: Callable[[str], Problem]) -> None:
+    """Rod ratio and spacing: the worst of the engines drawn, said to be just that."""
+    text = TEXT.replace("rod_ratio = 0.26", 'rod_ratio = "0.26 ± 5 %"').replace('"125 mm"', '"125 mm ± 1 mm"')
+    problem = read(text + ROBUST + "engines = 30\n")
+    found = solve(problem)
+    assert found.objective is not None
+    assert found.robust is not None
+    assert found.certificate is not None
+    assert "worst of 30 drawn engines" in found.objective.name
+    assert "not of all" in found.certificate.method
+    assert not found.robust.exact
+    values = decided_values(problem, found)
+    built = (problem.built(z) for z in problem.tolerances.draw(np.random.default_rng(1), 30))
+    most = max(objective_value(own, evaluate(own, own.design(values), found.final.samples)) for own in built)
+    assert most == pytest.approx(worst(found), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_ready_problem() -> None:
+    """Proven to a thousandth."""
+    found = solve(replace(load(PROBLEMS / "tractor-four-robust.toml"), tolerance=1e-3))
+    assert worst(found) == pytest.approx(462.02, rel=1e-3)
+    assert found.robust is not None
+    assert found.robust.nominal.worst == pytest.approx(469.99, rel=1e-3)
+    assert found.robust.exceeding == 0

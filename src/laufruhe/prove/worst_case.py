@@ -70,10 +70,8 @@ def worst_case(
         Parts that the errors are divided into.
     """
     count = columns[-1].stop if columns else 0
-    random = np.random.default_rng(seed)
     start = np.zeros(count)
-    best = max((_climbed(terms, columns, z) for z in [start, *random.uniform(-1.0, 1.0, (STARTS, count))]),
-               key=lambda found: found[0])  # fmt: skip
+    best = max((_climbed(terms, columns, z) for z in _starts(columns, count, seed)), key=lambda found: found[0])
     if not count:
         return WorstCase(start, best[0], best[0], 0)
     whole = [Block(own, np.eye(own.stop - own.start)) for own in columns]
@@ -98,6 +96,15 @@ def worst_case(
                 heapq.heappush(queue, (-bound, next(order), middle, own, part.split))
     bound = max(best[0], -queue[0][0] if queue else best[0])
     return WorstCase(best[1], best[0], bound, nodes)
+
+
+def _starts(columns: Sequence[slice], count: int, seed: int) -> Array:
+    """No errors, and random ones that are allowed: a point of the square may lie outside the disc in it."""
+    starts = np.random.default_rng(seed).uniform(-1.0, 1.0, (STARTS + 1, count))
+    starts[0] = 0.0
+    for disc in columns:
+        starts[:, disc] /= np.maximum(np.hypot.reduce(starts[:, disc], axis=1), 1.0)[:, None]
+    return starts
 
 
 def _climbed(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float, Array]:

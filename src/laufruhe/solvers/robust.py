@@ -194,7 +194,8 @@ def _method(problem: Problem, found: Least) -> str:
     over, angles = problem.over or Over(), f"at {found.angles} angles; " if found.angles else ""
     cones = f"second-order cones over {found.scenarios} sets of errors {angles}" if angles else ""
     if over.share is not None:
-        return f"{cones}{over.engines} drawn engines, bounded by the drawing"
+        bounded = "bounded by the drawing" if problem.tolerances.is_affine else "without a bound"
+        return f"{cones}{over.engines} drawn engines, {bounded}"
     if problem.tolerances.is_affine:
         return f"{cones}every error bounded by branch and bound"
     return f"{cones}the worst of {over.engines} drawn engines, not of all"

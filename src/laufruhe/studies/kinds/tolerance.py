@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -20,13 +19,18 @@ from pydantic import Field, model_validator
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_tables import CaseTable
-from laufruhe.machine import Engine, Role, Rotor
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.modes import GRAVITY
-from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
+from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.present.numbers import percent
-from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.evaluation import evaluate, over
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.tolerance import AddedDrive, Drawing, Error, PistonDrive, Tolerances
+from laufruhe.problem.tolerance import Tolerance as Cause
+from laufruhe.prove.worst_case import worst_case
 from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
@@ -34,7 +38,8 @@ from laufruhe.studies.text import NEGLIGIBLE, Rows, Text, Verdict, number, said
 
 Array = NDArray[np.float64]
 
-ANGLES, DIRECTIONS, PIECE = 360, 720, 500
+ANGLES, PIECE = 360, 500
+MAXIMUM, CLOSE = NORMS["maximum"], 1e-5
 CAUSES = ("reciprocating masses", "unbalance", "alignment")
 SHARES = np.arange(201) / 200.0
 MOUNTED = 200
@@ -61,38 +66,58 @@ class TolerancesTable(Table):
             raise f.refusal("leave nothing to chance; give one above zero (alignment needs aligned_masses)")
         return self
 
-    def unbalances(self, random: np.random.Generator, builds: int) -> NDArray[np.complex128]:
-        """Unbalances that turn with the crank [kg m], even over their discs, shape (builds, planes + aligned)."""
-        most = np.array([self.unbalance] * self.planes + [mass * self.alignment for mass in self.aligned_masses])
-        sizes = most * np.sqrt(random.uniform(0.0, 1.0, (builds, len(most))))
-        return np.asarray(sizes * np.exp(2j * np.pi * random.uniform(0.0, 1.0, (builds, len(most)))))
+    def of(self, engine: Engine) -> Tolerances:
+        """What of an engine they move, one for each cause that has a size.
+
+        Balancing planes stand from the first throw to the last, what is centred on the crank at
+        the last: the end where power is taken off (C3).
+        """
+        front, rear = (pick(part.x for part in engine.slider_cranks) for pick in (max, min))
+        places = [float(x) for x in np.linspace(front, rear, self.planes)]
+        pistons = [Error(part.name, (PistonDrive(k, self.reciprocating_mass),))
+                   for k, part in enumerate(engine.slider_cranks)]  # fmt: skip
+        left = [_left(f"left unbalance {k + 1}", x, self.unbalance) for k, x in enumerate(places)]
+        aligned = [
+            _left(f"alignment {k + 1}", rear, mass * self.alignment) for k, mass in enumerate(self.aligned_masses)
+        ]
+        sizes = (self.reciprocating_mass, self.unbalance, self.alignment * sum(self.aligned_masses))
+        causes = zip(CAUSES, ("kg", "kg m", "kg m"), sizes, (pistons, left, aligned), strict=True)
+        return Tolerances(tuple(Cause(name, unit, size, tuple(errors)) for name, unit, size, errors in causes)).acting
 
 
-def _unit_forces(engine: Engine, speed: float) -> Array:
-    """Lateral and vertical force of one kilogram more on each piston, shape (cylinders, angles, 2)."""
-    forces = []
-    for part in engine.slider_cranks:
-        alone = replace(engine, slider_cranks=(replace(part, reciprocating_mass=1.0, rotating_mass=0.0),), rotors=())
-        forces.append(reciprocating_loads(alone, speed).sample(ANGLES * engine.cycle.turns)[:, 1:3])
-    return np.array(forces)
+def _left(name: str, x: float, most: float) -> Error:
+    """An unbalance at any angle."""
+    return Error(name, (AddedDrive(name, x, most),), 2)
+
+
+def _built(engine: Engine, tolerances: Tolerances, errors: Array) -> Engine:
+    return tolerances.built(Drawing(engine, (), (), ()), errors).engine
+
+
+def _added_forces(engine: Engine, speed: float, tolerances: Tolerances) -> Array:
+    """Lateral and vertical force that every error adds at its limit, shape (columns, angles, 2)."""
+    point, steps = OperatingPoint("", speed), ANGLES * engine.cycle.turns
+    engines = [engine, *(_built(engine, tolerances, z) for z in np.eye(tolerances.count))]
+    # over one and the same period: an engine without errors may repeat within it
+    loads = over(engine.cycle.base_order, [shaking_loads(one, point) for one in engines])
+    drawn, *each = (spectrum.sample(steps)[:, 1:3] for spectrum in loads)
+    return np.array([forces - drawn for forces in each]).reshape(tolerances.count, steps, 2)
 
 
 def worst_parts(engine: Engine, speed: float, tolerances: TolerancesTable) -> dict[str, float]:
-    """Largest free force [N] of each kind of tolerance, all of that kind at their limits.
+    """Largest free force [N] of each kind of tolerance, all of that kind at their limits: no errors exceed it (R4).
 
-    Unbalances may point anywhere, so the parts add up to the worst of all together. What
-    masses add up to is a sum of segments; its farthest point is sought by support functions
-    on directions half a degree apart, so it is 1e-5 low at most.
+    Unbalances may point anywhere, so the parts add up to the worst of all together.
     """
-    angles = np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
-    directions = np.stack([np.sin(angles), np.cos(angles)])
-    segments = np.abs(_unit_forces(engine, speed) @ directions).sum(axis=0) * tolerances.reciprocating_mass
-    sizes = (
-        float(segments.max()),
-        tolerances.planes * tolerances.unbalance * speed**2,
-        sum(tolerances.aligned_masses) * tolerances.alignment * speed**2,
-    )
-    return dict(zip(CAUSES, sizes, strict=True))
+    found, own = tolerances.of(engine), dict.fromkeys(CAUSES, 0.0)
+    added = _added_forces(engine, speed, found)
+    for cause in found.each:
+        slope = np.ascontiguousarray(np.moveaxis(added[found.columns_of(cause.name)], 0, -1))
+        nothing, steps = np.zeros(slope.shape[:2]), len(slope)
+        norm = AffineNorm(MAXIMUM, nothing, slope, Grid(np.full(steps, 1.0 / steps), steps))
+        columns = Tolerances((cause,)).columns
+        own[cause.name] = worst_case([(1.0, norm)], columns, CLOSE).bound
+    return own
 
 
 def random_forces(engine: Engine, speed: float, tolerances: TolerancesTable, builds: int, seed: int) -> Array:
@@ -100,42 +125,17 @@ def random_forces(engine: Engine, speed: float, tolerances: TolerancesTable, bui
 
     Masses are even over their tolerance, unbalances even over their disc.
     """
-    random = np.random.default_rng(seed)
-    unit = _unit_forces(engine, speed)
-    samples = unit.shape[1]
-    crank = np.exp(2j * np.pi * engine.cycle.turns * np.arange(samples) / samples)
-    peaks = []
+    found = tolerances.of(engine)
+    added, errors = _added_forces(engine, speed, found), found.draw(np.random.default_rng(seed), builds)
     # in pieces: all engines at once would take gigabytes
-    for start in range(0, builds, PIECE):
-        count = min(PIECE, builds - start)
-        masses = random.uniform(-1.0, 1.0, (count, len(unit))) * tolerances.reciprocating_mass
-        rotating = tolerances.unbalances(random, count).sum(axis=1) * speed**2
-        moved = np.tensordot(masses, unit, axes=1)
-        zeta = rotating[:, None] * crank
-        peaks.append(np.hypot(moved[..., 0] + zeta.imag, moved[..., 1] + zeta.real).max(axis=1))
-    return np.concatenate(peaks)
+    pieces = (np.tensordot(errors[k : k + PIECE], added, axes=1) for k in range(0, builds, PIECE))
+    return np.concatenate([np.hypot(forces[..., 0], forces[..., 1]).max(axis=1) for forces in pieces])
 
 
 def built(engine: Engine, tolerances: TolerancesTable, random: np.random.Generator) -> Engine:
-    """One engine out of many, for the exact model.
-
-    Balancing planes stand from the first throw to the last, what is centred on the crank at
-    the last: the end where power is taken off (C3).
-    """
-    front, rear = (pick(part.x for part in engine.slider_cranks) for pick in (max, min))
-    planes = [float(x) for x in np.linspace(front, rear, tolerances.planes)]
-    places = [*planes, *(rear for _ in tolerances.aligned_masses)]
-    (unbalances,) = tolerances.unbalances(random, 1)
-    more = random.uniform(-1.0, 1.0, len(engine.slider_cranks)) * tolerances.reciprocating_mass
-    pistons = tuple(
-        replace(part, reciprocating_mass=max(part.reciprocating_mass + float(change), 0.0))
-        for part, change in zip(engine.slider_cranks, more, strict=True)
-    )
-    left = tuple(
-        Rotor(f"left unbalance {k + 1}", x, complex(u), role=Role.THROW)
-        for k, (x, u) in enumerate(zip(places, unbalances, strict=True))
-    )
-    return replace(engine, slider_cranks=pistons, rotors=(*engine.rotors, *left))
+    """One engine out of many, for the exact model."""
+    found = tolerances.of(engine)
+    return _built(engine, found, found.draw(random, 1)[0])
 
 
 def mean_mount_forces(problem: Problem, tolerances: TolerancesTable, builds: int, seed: int) -> tuple[float, Array]:
