@@ -126,6 +126,7 @@ class Problem:
         ]
         names = list(self.phasing.open_names) if self.phasing is not None else []
         names += [decision.name + (" and angle" if decision.set.width > 1 else "") for decision in self.decisions]
+        names += [f"the {lot.kind} of every cylinder" for lot in self.assembly.lots] if self.assembly else []
         return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
 
     @property
