@@ -123,7 +123,8 @@ def _none(problem: Problem, phasing: Phasing, searched: Searched | None) -> Resu
             why = f"no crank keeps '{limit.name}', whatever else is decided"
             return no_star(problem, why, conflict=(limit.name,))
     names = " and ".join(f"'{limit.name}'" for limit in problem.limits) or "the bounds"
-    return no_star(problem, f"no crank was found that keeps {names}; relax them, or open more", Status.FAILED)
+    left = "" if searched is None else f", and {searched.boxes} boxes of throws do not exclude one; raise search.boxes"
+    return no_star(problem, f"no crank was found that keeps {names}{left}; relax them, or open more", Status.FAILED)
 
 
 def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> StarDesign | None:
