@@ -12,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from laufruhe.cli import app
+from laufruhe.errors import ModelError
 from laufruhe.physics.elastic_mounts import ResonanceError
 from laufruhe.plots import draw
 from laufruhe.problem.evaluation import evaluate, measured, objective_value
@@ -54,8 +55,11 @@ def test_only_what_stands_on_the_resonance_is_infinite(tmp_path: Path) -> None:
 def test_a_result_that_stays_on_the_resonance_shows_what_is_finite(tmp_path: Path) -> None:
     result = replace(state(resonant(tmp_path), to_start_from=True), status=Status.FAILED)
     drawn = draw(result, tmp_path)
-    assert drawn == ("transmissibility.png", "campbell.png", "modes.png", "run_up.png")
+    assert drawn == ("engine.png", "transmissibility.png", "campbell.png", "modes.png", "run_up.png")
     text = as_markdown(result, drawn, "")
+    for curves in (result.forces, result.orders):
+        with pytest.raises(ModelError, match="there are no finite loads"):
+            curves()
     assert "## Natural modes" in text
     assert "## Orders" not in text
     assert json.loads(as_json(result))["mounts"][0]["mean"] is None

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from laufruhe.errors import ModelError
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Side
@@ -173,7 +174,10 @@ class Result:
     @property
     def _with_loads(self) -> dict[str, Evaluation]:
         """Designs that have loads: one on an undamped resonance has none."""
-        return {name: design for name, design in self.designs.items() if not design.resonance}
+        found = {name: design for name, design in self.designs.items() if not design.resonance}
+        if not found:
+            raise ModelError(f"there are no finite loads: {self.final.resonance}; add damping")
+        return found
 
     @property
     def prices(self) -> dict[Side, float]:
