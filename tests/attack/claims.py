@@ -164,11 +164,14 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
         verdict.wrong.append(f"value {value:.9g} is worse than {given.objective:.9g} as given")
     if rival is None or rival.excess > 1e-6:
         return
-    if bound > rival.value * (1.0 + reading) + floor:
+    # what a rival passes a limit by is worth the limit's price
+    prices = (abs(float(np.nan_to_num(limit.shadow_price)) * limit.limit) for limit in result.limits)
+    passed = max(rival.excess, 0.0) * sum(prices)
+    if bound > rival.value * (1.0 + reading) + floor + passed:
         verdict.wrong.append(f"bound {bound:.9g}, a rival has {rival.value:.9g} {rival.told or ''}")
     over = (value - rival.value) / max(rival.value, floor)
-    unit = max(rival.value, floor)
-    if verdict.kind == "global" and value - rival.value > (GAP + reading + result.error_estimate) * unit + floor:
+    allowed = (GAP + reading + result.error_estimate) * max(rival.value, floor) + floor + passed
+    if verdict.kind == "global" and value - rival.value > allowed:
         verdict.wrong.append(f"global {value:.9g}, a rival has {rival.value:.9g} {rival.told or ''}")
     elif verdict.kind != "global":
         verdict.beaten = max(over, 0.0)
