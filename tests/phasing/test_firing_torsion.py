@@ -199,6 +199,26 @@ def turned_problem(problem: Problem, chain: Any) -> Problem:
     return replace(problem, engine=replace(problem.engine, torsion=chain))
 
 
+def test_a_peak_between_the_angles_breaks_its_limit() -> None:
+    """The search looks at a limit at its angles, the exact model between them: what breaks it there is no design."""
+    peak = {"minimise": "maximum shaft torque"}
+    coarse = {"fidelity": {"samples": 96, "gas_samples": 720}}
+    values = values_of(tables(objective=peak, **coarse))
+    rows = {order: evaluate(fired(tables(objective=peak, **coarse), order)) for order in values}
+    seen = {order: float(e.rows(fired(tables(objective=peak), order).objective[0].measure).value)
+            for order, e in rows.items()}  # fmt: skip
+    # between what the angles see of the least one and what it is
+    least = min(seen, key=seen.get)
+    allowed = 0.5 * (seen[least] + values[least])
+    assert seen[least] < 0.9999 * values[least]
+    limit = {"limit": "maximum shaft torque", "max": f"{allowed} N m"}
+    result = laufruhe.solve(problem_of(tables(constraints=[limit], **coarse)))
+    kept = [value for value in values.values() if value <= allowed]
+    assert (result.status in (Status.OPTIMAL, Status.FEASIBLE)) == bool(kept)
+    if kept:
+        assert result.final.excess(result.problem.limits) <= 1e-5
+
+
 def test_time_that_runs_out_proves_nothing() -> None:
     phasing = problem_of(tables()).phasing
     (family,), _ = families_of(phasing, by_firing=True)

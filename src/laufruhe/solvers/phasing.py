@@ -169,16 +169,23 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     fired = [(design, entry) for design, entry in zip(answer.designs, entries, strict=True) if entry.firing_orders]
     if not fired:
         return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
-    best, first = fired[0]
-    left_out = phasing.without(_needed(problem, phasing, best))
-    candidate = replace(best.candidate, firing_order=first.firing_orders[0].order, left_out=left_out)
-    result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem), phasing=None))
+    left = iter(fired)
+    for best, first in left:
+        left_out = phasing.without(_needed(problem, phasing, best))
+        candidate = replace(best.candidate, firing_order=first.firing_orders[0].order, left_out=left_out)
+        result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem), phasing=None))
+        # a peak may stand between the angles at which the search looks
+        if StarDesign(candidate, result).is_met:
+            break
+    else:
+        why = f"each of the {len(fired)} best star(s) breaks a limit between the angles that the search looks at"
+        return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
     value = result.objective.value if result.objective else best.value
     certificate = certified(
         value, answer.bound, nothing_of(problem), problem.tolerance, Reach.WHOLE,
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
     )  # fmt: skip
-    ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in fired[1:])]
+    ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]
     count = sum(family.size for family in families_of(phasing, problem.feels_order)[0])
     details = ranking_result(phasing, candidate, ranking, count, answer.looked_at, answer.method)
     return with_star(problem, phasing, result, candidate, certificate, details)
