@@ -74,9 +74,11 @@ def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
     SolverError
         If a solver stops without an answer.
     """
+    from dataclasses import replace
+
     from laufruhe.solvers import solve as decide
 
-    return decide(_problem(problem), time_limit=time_limit)
+    return decide(replace(_problem(problem), sharply=True), time_limit=time_limit)
 
 
 def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint] = ()) -> Result:

@@ -71,7 +71,7 @@ def solved(problem: Problem, listener: Listener) -> Result:
     from laufruhe.solvers import solve, state
 
     try:
-        return solve(problem, listener)
+        return solve(replace(problem, sharply=True), listener)
     except SolverError as error:
         return replace(state(problem, to_start_from=True), status=Status.FAILED, message=str(error))
 

@@ -70,6 +70,8 @@ class Problem:
         What is forbidden.
     fidelity
         What of the physics is kept.
+    sharply
+        Whether a gap within the tolerance is closed further where that is cheap beside a command (P10).
     tolerance
         Relative gap at which an optimum counts as proven.
     mount_numbers
@@ -106,6 +108,7 @@ class Problem:
     over: Over | None = None
     assembly: Assembly | None = None
     origin: Origin | None = field(default=None, compare=False, repr=False)
+    sharply: bool = False
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"

@@ -42,8 +42,8 @@ def beyond_mounts(problem: Problem) -> tuple[str, ...]:
 
 
 def solve_sharply(problem: Problem) -> Result:
-    """As `solve_unbalances`, with a gap that is a rounding where the optimum is smooth (P10)."""
-    return solve_unbalances(problem, sharply=True)
+    """As `solve_unbalances`, with a gap of a millionth where that is asked for and the optimum is smooth (P10)."""
+    return solve_unbalances(problem, problem.sharply)
 
 
 def solve_unbalances(problem: Problem, sharply: bool = False) -> Result:
