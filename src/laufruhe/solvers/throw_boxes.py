@@ -97,6 +97,9 @@ class ThrowPrograms:
         sizes = [norm.waves[0].size * waves.throws for norm in (n for _, n in (*self._terms, *self._limits))]
         if 2 * sum(sizes) > MOST_NUMBERS:
             raise ModelError(f"{2e-6 * sum(sizes):.0f} million numbers at once")
+        every = [norm for _, norm in (*self._terms, *self._limits)]
+        if not all(np.isfinite(norm.waves).all() and np.isfinite(norm.fixed.constant).all() for norm in every):
+            raise ModelError("a load on a resonance that nothing damps has no waves")
         self._low = self._told_apart()
         self._turned: dict[tuple[int, ...], _Turned] = {}
         self._proofs: list[Multipliers] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -119,6 +120,15 @@ class _Stage:
             return None
         return _Stage(self._make, 2 * self._samples, self._lost, self._value, self._left_out)
 
+    @cached_property
+    def finer(self) -> _Stage | None:
+        """The next, unless its numbers are too many to hold."""
+        if self.next is not None:
+            with suppress(ModelError):
+                _ = self.next.programs
+                return self.next
+        return None
+
     @property
     def last(self) -> _Stage:
         """With the most."""
@@ -158,6 +168,9 @@ def search_throws(
         return None if best is not None else Searched(math.inf, None, 0, ())
     try:
         search = _Search(problem, phasing, windows, improve, best)
+        for stage, _, _ in search.roots:
+            # what is too much to hold shows at once
+            _ = stage.programs
     except ModelError:
         # a throw alone may drive what no mount carries
         return None
@@ -275,11 +288,11 @@ class _Search:
                 programs = first.programs
                 found = programs.box(programs.program(window), *window.box, part.bound, cut, is_new=True)
                 yield self._looked(first, found, left_out)
-        elif stage.next is not None and part.bound > value * (1.0 - _FINER * stage.cost):
+        elif part.bound > value * (1.0 - _FINER * stage.cost) and stage.finer is not None:
             # more steps tell more than smaller boxes
-            programs = stage.next.programs
+            programs = stage.finer.programs
             finer = programs.box(programs.program(box.program.window), box.lower, box.upper, part.bound, cut)
-            yield self._looked(stage.next, finer, part.left_out)
+            yield self._looked(stage.finer, finer, part.left_out)
         else:
             for half in stage.programs.parts(box, cut):
                 yield self._looked(stage, half, part.left_out)
