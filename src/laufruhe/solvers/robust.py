@@ -46,8 +46,8 @@ COARSER = 4
 SAME = 1e-9
 JOINS = 0.1
 """Share of the tolerance by which an engine has to be worse than all in the program to join it."""
-MOST_DOUBLINGS = 3
-"""Of the angles of the fidelity, where its own leave a gap."""
+MOST_MARGINS, MOST_DOUBLINGS = 3, 3
+"""Times that limits are lowered, and that the angles of the fidelity are doubled, where its own leave a gap."""
 OUTER = 12
 """Rounds in which the engines that may be above are chosen anew."""
 
@@ -139,7 +139,7 @@ def solve_robust(problem: Problem, solve: Solve) -> Result:
     details = compared(problem, seeker, start, found.values, found.found, found.held, found.scenarios)
     timing = {"solve": solved - started, "compare": time.perf_counter() - solved}
     given = seeker.at(problem.start, proven=False)
-    return robust_result(problem, design, given, found.found, shown, details, timing)
+    return robust_result(problem, design, given, found.found, found.held, shown, details, timing)
 
 
 def _found(
@@ -210,7 +210,7 @@ class _Program:
         self.models: list[AffineModel] = []
         self.shares: list[float] = []
         self.held = Held()
-        self.margin = 0.0
+        self.margin, self.margins = 0.0, 0
         self.conflict: tuple[str, ...] = ()
 
     def add(self, errors: Sequence[Array]) -> bool:
@@ -293,9 +293,11 @@ def _least_worst(
             found.errors
         ):
             samples = max(samples, program.angles // COARSER)
+        elif found.excess > FEASIBLE and samples >= program.angles and program.margins < MOST_MARGINS:
+            # it knows all engines that hold this design, and peaks stand between its angles: limits a little lower
+            program.margin, program.margins = program.margin + 1.05 * found.excess, program.margins + 1
         else:
-            # the program knows all engines that hold this design: more angles, or limits a little lower
-            samples, program.margin = 2 * samples, program.margin + 1.05 * max(found.excess, 0.0)
+            samples, program.margin, program.margins = 2 * samples, 0.0, 0
             if samples > program.angles << MOST_DOUBLINGS:
                 break
             if samples > program.angles:

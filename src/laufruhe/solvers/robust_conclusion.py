@@ -20,7 +20,7 @@ from laufruhe.prove.certificate import Proof, certified
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.adversaries import Adversary, Found
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, decision_values, limit_values
-from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.result import LimitValue, ObjectiveValue, Result, Status
 from laufruhe.solvers.robust_result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
 
 Array = NDArray[np.float64]
@@ -154,8 +154,14 @@ def _taken(
     return total
 
 
+def _limited(own: LimitValue, worst: float, price: float, tolerance: float) -> LimitValue:
+    """A limit as the worst engine stands to it."""
+    active = worst >= own.limit * (1.0 - tolerance)
+    return replace(own, value=worst, active=active, shadow_price=price if active else 0.0)
+
+
 def robust_result(
-    problem: Problem, design: Design, given: Found, found: Found, shown: Shown, details: RobustResult,
+    problem: Problem, design: Design, given: Found, found: Found, held: Holding, shown: Shown, details: RobustResult,
     timing: dict[str, float],
 ) -> Result:  # fmt: skip
     """The result of a design whose objective and limits are those of built engines; `given` is of the one given."""
@@ -165,11 +171,13 @@ def robust_result(
         found.bound, shown.bound, nothing, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
     )
     worst = dict(found.limits)
+    prices: dict[Limit, float] = {}
+    for limit, price in (priced for own in held.prices for priced in own):
+        prices[limit] = prices.get(limit, 0.0) + price
     limits = tuple(
-        replace(own, value=worst[limit], active=worst[limit] >= own.limit * (1.0 - problem.tolerance))
-        if limit in worst else own
+        _limited(own, worst.get(limit, own.value), prices.get(limit, 0.0), problem.tolerance)
         for limit, own in zip(problem.limits, limit_values(problem, design.evaluation), strict=True)
-    )  # fmt: skip
+    )
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     broken = [limit.name for limit in problem.limits if worst.get(limit, 0.0) > limit.maximum * (1.0 + KEPT)]
     message = f"the best design found breaks {' and '.join(map(repr, broken)) or 'a limit'} in some engines"
