@@ -348,7 +348,6 @@ def test_every_figure_and_statement_is_on_the_page(
     assert {path.name for path in folder.glob("[!.]*")} == {
         "report.md",
         "report.html",
-        "tables.xlsx",
         *(f"{p.name}.{e}" for p in parts for e in p.ends),
     }
     page = (folder / "report.md").read_text(encoding="utf-8")
