@@ -86,7 +86,7 @@ def explained(result: Result) -> str:
     if c.kind is Proof.LOCAL:
         return (
             f"The best of the local optima found ({c.method}), with {figure(o.value, o.unit, 6)}. "
-            f"The optimality conditions, taken anew, hold with a residual of {c.kkt_residual:.1e}; "
+            f"Taken anew, {_conditions(c.kkt_residual)}; "
             f"that nothing better exists is proven only down to {figure(c.lower_bound, o.unit, 6)}."
         )
     origin = "was not taken from the solver but computed from the exact model"
@@ -95,6 +95,12 @@ def explained(result: Result) -> str:
     return (
         f"No design within the bounds and limits has less than {figure(c.lower_bound, o.unit, 6)}; "
         f"this one has {figure(o.value, o.unit, 6)}, a gap of {gap_text(c)} (proof: {c.kind}). "
-        f"The bound {origin} ({c.method}), "
-        f"and the optimality conditions hold with a residual of {c.kkt_residual:.1e}."
+        f"The bound {origin} ({c.method}), and {_conditions(c.kkt_residual)}."
     )
+
+
+def _conditions(residual: float) -> str:
+    """What is known of the optimality conditions; nothing of a design that no smooth search ended at."""
+    if not math.isfinite(residual):
+        return "no search ended at this design, so its optimality conditions are not known"
+    return f"the optimality conditions hold with a residual of {residual:.1e}"

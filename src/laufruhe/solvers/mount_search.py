@@ -110,9 +110,16 @@ class MountSearch:
         self._tighten()
 
     def again(self, places: Sequence[Array]) -> bool:
-        """From other mounts, with the unbalances found; whether a better design came of it."""
+        """From other mounts, with the unbalances found; whether a better design came of it.
+
+        The mounts themselves are judged too, where nothing else is open: a search may leave a good start.
+        """
         before = self.best
-        columns = self._points[0][1] if before is None else _point(before)[1]
+        columns = self._points[0][1] if before is None or before.optimum is None else _point(before)[1]
+        for place in places:
+            alone = None if self.problem.unbalances else judged_at(self.problem, place.tolist())
+            if alone is not None:
+                self._keep(Found(alone, self.joint))
         starts = [self.joint.start(place.tolist(), columns) for place in places]
         self._take(solve_nonlinear(self.joint.program, starts, self._workers, ITERATIONS))
         self._tighten()
