@@ -57,7 +57,9 @@ Each has a test in tests/faults since: recursion on deep tables, where a complai
 trace beyond the limit of Python's reader; whole numbers that no float holds, in sweeps and elsewhere; names
 that are no text in replications; control and bidirectional characters on the screen; lines of 5,000 characters
 and thousands of lines; units of hundreds of factors, seconds each; a search of even stars for 24 to 48
-cylinders that did not end; an empty list of orders; a matplotlibrc of the working folder.
+cylinders that did not end; an empty list of orders; a matplotlibrc of the working folder; a stroke
+of 1e-320 mm; a rod ratio that makes a rod longer than floats; an empty firing order; a tab in a study's title;
+keys that begin with a blank; `explain` of a flywheel.
 """
 
 

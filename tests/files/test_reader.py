@@ -86,6 +86,8 @@ BAD = [
         """engine." stroke" = "120 mm": is not a key here; did you mean 'stroke'?"""),
     bad("a length that no float can square", '"120 mm"', '"1e-320 mm"',
         """engine.stroke = "1e-320 mm": is below any engine; write for example "120 mm", or 0"""),
+    bad("a firing order of no cylinder", "[1, 3, 4, 2]", "[]",
+        "engine.firing_order = []: names no cylinder; name every cylinder once"),
     bad("misspelt table", "[objective]", "[objektive]",
         """objektive = {"minimise": "mean mount force"}: is not a key here; did you mean 'objective'?"""),
     bad("misspelt key of a tagged table", "imep =", "imp =",

@@ -200,6 +200,8 @@ def told_cylinders(table: EngineTable) -> list[tuple[str, int]]:
     """Keys that tell how many cylinders there are, and how many each tells."""
     throws, order, per_throw = table.throws, table.given_order, table.kind.cylinders_per_throw
     told = [("cylinders", table.cylinders)] if table.cylinders is not None else []
+    if order is not None and not order:
+        raise Refused("engine.firing_order", [], "names no cylinder", "name every cylinder once")
     told += [("firing_order", len(order))] if order is not None else []
     return told + ([("throws", len(throws) * per_throw)] if isinstance(throws, list) else [])
 
