@@ -99,3 +99,10 @@ def test_what_a_quantity_needs() -> None:
     del tables["torsion"]
     with pytest.raises(InputError, match=r"needs the diameter of a shaft; give one in \[torsion\]"):
         load_tables(tables, Path("five.toml"))
+
+
+def test_more_discs_than_a_shaft_has() -> None:
+    disc = {"end": "rear", "inertia": "0.1 kg m^2", "shaft": {"stiffness": "6e5 N m/rad"}}
+    discs = [{**disc, "name": f"disc {k}"} for k in range(61)]
+    with pytest.raises(InputError, match="has 61 discs, and at most 60 may be told beside the throws"):
+        changed(discs=discs)

@@ -21,6 +21,9 @@ from laufruhe.problem.sets import Interval
 
 T = TypeVar("T")
 
+# that a response over speed takes seconds for
+MOST_DISCS = 60
+
 
 class PieceTable(Table):
     """A round piece of a shaft."""
@@ -117,6 +120,9 @@ def torsion_of(
         if part.shaft != CRANKSHAFT:
             rule = f"is of one crankshaft, and {part.name} works on shaft '{part.shaft.name}'"
             raise Refused("torsion", None, rule, "leave it out")
+    if len(table.discs) > MOST_DISCS:
+        rule = f"has {len(table.discs)} discs, and at most {MOST_DISCS} may be told beside the throws"
+        raise Refused("torsion.discs", None, rule, "join those that turn together")
     opened, own = _Opened(), _throw_discs(table, parts, throws)
     ends = {end: [(k, disc) for k, disc in enumerate(table.discs) if disc.end == end] for end in ("front", "rear")}
     front, rear = ([_disc(disc, opened) for _, disc in ends[end]] for end in ("front", "rear"))
