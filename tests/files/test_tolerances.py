@@ -14,23 +14,16 @@ from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import Law, Scope
-from problem_files import MOUNTS, shaft
+from problem_files import FOUR, MOUNTS, changed, shaft
 
-TEXT = """
-title = "Four in line"
-[engine]
-layout = "inline"
-cycle = "four-stroke"
-stroke = "120 mm"
-rod_ratio = 0.26
-reciprocating_mass = "1.25 kg{}"
-cylinder_spacing = "125 mm"
-firing_order = [1, 3, 4, 2]
-[[operating_points]]
+TEXT = (
+    changed(FOUR, "1.25 kg", "1.25 kg{}")
+    + """[[operating_points]]
 speed = "3000 rpm"
 [objective]
 minimise = "rms mount force"
 """
+)
 
 
 def read(folder: Path, text: str) -> Problem:

@@ -21,25 +21,18 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.robust import decided_values
-from problem_files import MOUNTS, PROBLEMS, shaft
+from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft
 
-ENGINE = """
-title = "Four in line"
-[engine]
-layout = "inline"
-cycle = "four-stroke"
-stroke = "120 mm"
-rod_ratio = 0.26
-reciprocating_mass = "2 kg ± 2 %"
-cylinder_spacing = "125 mm"
-firing_order = [1, 3, 4, 2]
-[[operating_points]]
+ENGINE = (
+    changed(FOUR, "1.25 kg", "2 kg ± 2 %")
+    + """[[operating_points]]
 speed = "2500 rpm"
 [objective]
 minimise = "rms mount force"
 [fidelity]
 samples = 48
 """
+)
 OPEN = 'unbalance = { between = ["0 kg m", "0.05 kg m"], tolerance = "± 10 %" }\nradius = "20 mm"\n'
 TEXT = (
     ENGINE

@@ -43,6 +43,7 @@ from laufruhe.problem.channels.kinds import (
     Needs,
     NumberChannel,
     PlaceChannel,
+    of_what_moves,
 )
 from laufruhe.problem.channels.runs import OF_RUNS, RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.problem.channels.torsional import TORSIONAL
@@ -85,13 +86,7 @@ def _inside(
     name: str, unit: str, keys: tuple[str, ...], needs: Needs, places: Callable[[Engine], Sequence[str]],
     signal: Callable[[Engine, PointLoads], Spectrum], adds_up: bool = False,
 ) -> LoadChannel:  # fmt: skip
-    """A load inside the crankcase: of what moves, whatever the block stands on."""
-
-    def found(loads: PointLoads) -> Spectrum:
-        if loads.moving is None:
-            raise ValueError(f"of a wrench alone there is no {name}")
-        return signal(loads.moving, loads)
-
+    found = of_what_moves(name, signal)
     return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True, adds_up=adds_up)
 
 

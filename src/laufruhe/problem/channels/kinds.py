@@ -28,6 +28,17 @@ AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
 OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
+def of_what_moves(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -> Callable[[PointLoads], Spectrum]:
+    """A load inside the crankcase: of what moves, whatever the block stands on."""
+
+    def found(loads: PointLoads) -> Spectrum:
+        if loads.moving is None:
+            raise ValueError(f"of a wrench alone there is no {name}")
+        return signal(loads.moving, loads)
+
+    return found
+
+
 class Needs(StrEnum):
     """What an engine must have before a channel means anything."""
 

@@ -9,7 +9,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import torsion
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.asking import Answered, Asked
-from laufruhe.problem.channels.kinds import Needs, TorsionChannel, TwistChannel
+from laufruhe.problem.channels.kinds import Needs, TorsionChannel, TwistChannel, of_what_moves
 from laufruhe.problem.loads import PointLoads
 
 HIGHEST = 12.0
@@ -28,11 +28,9 @@ def _of_shafts(
     name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum], factors: torsion.Factors,
     places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Needs = Needs.TORSION,
 ) -> TwistChannel:  # fmt: skip
-    def found(loads: PointLoads) -> Spectrum:
-        if loads.moving is None:
-            raise ValueError(f"of a wrench alone there is no {name}")
-        return signal(loads.moving, loads.point, loads.fidelity).each(lambda values: values[:, :, None])
-
+    found = of_what_moves(
+        name, lambda moving, at: signal(moving, at.point, at.fidelity).each(lambda values: values[:, :, None])
+    )
     return TwistChannel(name, unit, needs=needs, signal=found, places=places, factors=factors)
 
 
