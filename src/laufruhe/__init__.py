@@ -1,4 +1,4 @@
-"""Laufruhe: the balance of piston engines, designed by optimisation and proven (docs/reference.md).
+"""Laufruhe: the balance of piston engines, designed by optimisation and proven (docs/reference/python.md).
 
 >>> import laufruhe
 >>> problem = laufruhe.load("problems/tractor-four-lanchester.toml")

@@ -39,7 +39,7 @@ def test_help_of_every_command_has_an_example(command: str) -> None:
 
 
 def test_every_command_is_documented() -> None:
-    page = (PROBLEMS.parent / "docs" / "command-line.md").read_text(encoding="utf-8")
+    page = (PROBLEMS.parent / "docs" / "reference" / "commands.md").read_text(encoding="utf-8")
     listed = re.findall(r"^  (\w+) ", run.invoke(app, ["-h"]).output.partition("Commands:")[2], re.MULTILINE)
     assert set(COMMANDS) <= set(listed)
     assert all(f"| `{name} " in page for name in COMMANDS)

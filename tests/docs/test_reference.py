@@ -13,7 +13,7 @@ from laufruhe.files.ready import copies
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "python.md"
 
 
 def test_answers_are_those_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -247,7 +247,7 @@ def test_ten_seeds_find_the_best_known_optimum_of_the_tractor(seed):
 @pytest.mark.validation
 @pytest.mark.parametrize("seed", [1])
 def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
-    """Its six modes stand on either side of a band in many ways; more seeds in docs/elastic-mounts.md."""
+    """Its six modes stand on either side of a band in many ways; more seeds in docs/theory/elastic-mounts.md."""
     problem = load(PROBLEMS / "powertrain-least-force.toml")
     problem = replace(problem, search=replace(problem.search, starts=2, seed=seed))
     assert solve_joint(problem).objective.value == pytest.approx(13.106325, rel=1e-5)

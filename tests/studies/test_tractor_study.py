@@ -27,7 +27,7 @@ FIGURES = list(parts_of("tractor-study"))
 SIZED = ["fig-12", "fig-15", "fig-17", "fig-22", "fig-25", "fig-28"]
 
 PRINTED, MEANT = "1.25 kg as printed", "2.25 kg"
-# statements that are not confirmed with the printed mass, and with the other; docs/tractor-study.md says why
+# statements that are not confirmed with the printed mass, and with the other; docs/findings/tractor-study.md says why
 NEVER = {"fig-25": ["Share of the force that frees the front mounts (eq. 29)"]}
 NOT_CONFIRMED = {
     PRINTED: {
@@ -329,7 +329,7 @@ def test_no_compression_ratio_saves_the_printed_mass(worth: Worth) -> None:
 
 
 def test_one_trace_meets_all_five_with_2_25_kg(worth: Worth) -> None:
-    """Compression ratio 18, as docs/tractor-study.md says; 1.25 kg meet the fall by the force pair alone."""
+    """Compression ratio 18, as docs/findings/tractor-study.md says; 1.25 kg meet the fall by the force pair alone."""
     allowed = {"twice": (1.7, 2.3), "cancel": (6.5, 7.5), "force": (-75, -65), "rest": (-58, -48), "share": (40, 60)}
     met = {
         mass: [low <= float(worth("reciprocating-mass", f"{name}_by").sel(m=mass, eps=18.0)) <= high

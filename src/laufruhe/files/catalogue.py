@@ -1,4 +1,4 @@
-"""Engines that were built: a problem names one and takes its figures as defaults (docs/engines.md)."""
+"""Engines that were built, whose figures a problem takes as defaults (docs/reference/engine-catalogue.md)."""
 
 from __future__ import annotations
 

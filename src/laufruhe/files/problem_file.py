@@ -1,4 +1,4 @@
-"""A whole problem file, and the JSON schema of it that ships with the package for editors (docs/problem-files.md)."""
+"""A whole problem file, and its JSON schema that ships with the package (docs/reference/problem-files.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The study file, and how it is read: scenes, what of them is swept, and what is compared (docs/studies.md)."""
+"""Study files and how they are read: scenes, sweeps and comparisons (docs/reference/study-files.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The keys of a replication: its cases, what the source states, and what is drawn (docs/studies.md)."""
+"""The keys of a replication: its cases, what the source states, and what is drawn (docs/reference/study-files.md)."""
 
 from __future__ import annotations
 
