@@ -224,3 +224,9 @@ def test_too_much_at_once_is_refused_in_a_line(tmp_path: Path) -> None:
 def test_a_measure_of_nothing(key: str, tmp_path: Path) -> None:
     limit = f'[[constraints]]\nlimit = "mean mount force"\nmax = "1 N"\n{key} = []\n'
     refused(written(tmp_path, scenes.GIVEN + limit), f"constraints[1].{key}", "is empty")
+
+
+def test_a_name_stands_on_one_line(tmp_path: Path) -> None:
+    for name, word in (("tab\\there", "tab"), ("two\\nlines", "lines")):
+        weight = f'[[counterweights]]\nname = "{name}"\nopposite_throw = 1\nunbalance = "1 kg m"\n'
+        refused(written(tmp_path, scenes.GIVEN + weight), "counterweights", "on one line", word)

@@ -28,6 +28,7 @@ _RULES = {
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",
     "dict_type": "must be a table",
+    "string_pattern_mismatch": "must be text on one line, without tabs",
 }
 
 

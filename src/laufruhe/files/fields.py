@@ -263,7 +263,7 @@ Side: TypeAlias = Annotated[
     str, BeforeValidator(_side), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
 ]
 Throws: TypeAlias = Annotated[list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]")]
-Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60)]
+Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\t\n]+$")]
 CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 Pair: TypeAlias = Annotated[list[T], Field(min_length=2, max_length=2)]
 Three: TypeAlias = Annotated[list[T], Field(min_length=3, max_length=3)]
