@@ -1,0 +1,40 @@
+"""The inventory of the sources names nothing that is not there, and leaves no row without a test or a reason."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/sources.md").read_text(encoding="utf-8")
+ROWS = [
+    [cell.strip() for cell in line.strip().strip("|").split("|")]
+    for line in PAGE.splitlines()
+    if line.startswith("| ") and not re.match(r"\| (in the source|---)", line)
+]
+PLACE = re.compile(r"`((?:src|tests|problems|docs|results)/[^`\s]+)`")
+
+
+def missing(place: str) -> bool:
+    """Whether a file is not there, or holds no test of this name."""
+    path, _, name = place.partition("::")
+    if not (ROOT / path).exists():
+        return True
+    return bool(name) and not re.search(rf"def {re.escape(name)}\(", (ROOT / path).read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0][:40])
+def test_every_row_is_held_or_says_why_not(row):
+    assert len(row) == 4
+    told, held = row[2:]
+    places = PLACE.findall(told + held)
+    assert [place for place in places if missing(place)] == []
+    is_hole = told.startswith("hole: ")
+    assert is_hole or any(place.startswith("tests/") for place in PLACE.findall(held))
+    assert not is_hole or len(told) > len("hole: a reason")
+
+
+def test_what_is_not_there_is_found():
+    assert missing("tests/docs/test_sources.py::test_of_nothing")
+    assert missing("src/nothing.py")
+    assert not missing("tests/docs/test_sources.py::test_what_is_not_there_is_found")
