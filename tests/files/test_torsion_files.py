@@ -12,7 +12,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import Torsion
 from laufruhe.machine.torsion import stiffness_of
-from laufruhe.physics.torsion import reduced_inertia
+from laufruhe.physics.reduced_inertia import inertia_of_discs, reduced_inertia
 from laufruhe.problem.problem import Problem
 from problem_files import PROBLEMS
 
@@ -106,3 +106,29 @@ def test_more_discs_than_a_shaft_has() -> None:
     discs = [{**disc, "name": f"disc {k}"} for k in range(61)]
     with pytest.raises(InputError, match="has 61 discs, and at most 60 may be told beside the throws"):
         changed(discs=discs)
+
+
+def test_the_inertia_of_all_that_turns_follows_from_the_discs() -> None:
+    """Where it is told twice both agree, the ring of an absorber counted or not; else one line says what differs."""
+    tables = tables_of(READY)
+    tables["constraints"] = [{"limit": "degree of irregularity", "max": "0.05"}]
+    engine = load_tables(tables, Path("five.toml")).engine
+    discs = inertia_of_discs(chain(load_tables(tables, Path("five.toml"))), engine.slider_cranks)
+    assert discs == pytest.approx(5 * (0.006 + 0.5 * 0.045**2) + 0.008 + 0.14, rel=1e-12)
+    told = {"flywheel": {"inertia": f"{1.005 * discs:.6g} kg m^2"}}
+    assert load_tables({**tables, **told}, Path("five.toml")).engine.flywheel is not None
+    ring = {"name": "d", "on": "pulley", "inertia": "0.1 kg m^2", "damping": "2 N m s/rad"}
+    opened = [{**disc, "inertia": {"between": ["0.1 kg m^2", "0.2 kg m^2"]}} for disc in tables["torsion"]["discs"]]
+    both = {"flywheel": {"inertia": f"{discs + 0.1:.6g} kg m^2"}}
+    assert load_tables({**tables, **both, "torsion": {**tables["torsion"], "absorbers": [ring]}}, Path("five.toml"))
+    free = {"flywheel": {"inertia": {"between": ["0.1 kg m^2", "0.2 kg m^2"]}}}
+    for more, said in (
+        (both, "differs from the 0.1831 kg m^2 that the discs of [torsion] have without pistons and rods"),
+        ({"fidelity": {"crank_inertia": "1 kg m^2"}}, 'fidelity.crank_inertia = "1 kg m^2": differs from'),
+        (free, "flywheel.inertia: is open, and the discs of [torsion] tell the inertia of all that turns"),
+        ({**told, "torsion": {**tables["torsion"], "discs": opened}}, "follows from torsion.pulley.inertia"),
+    ):
+        with pytest.raises(InputError) as caught:
+            load_tables({**tables, **more}, Path("five.toml"))
+        assert said in str(caught.value)
+        assert len(str(caught.value).splitlines()) == 1

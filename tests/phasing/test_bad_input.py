@@ -4,7 +4,7 @@ import pytest
 
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
-from laufruhe.solvers import solve
+from laufruhe.solvers import solve, state
 from laufruhe.solvers.result import Status
 from phasing import engines
 
@@ -20,6 +20,8 @@ OPEN = 'throws = "open"\nfiring_order = "open"'
         (6, "two-stroke", OPEN, "phases = 3", "inline", "phases = 3 conflicts with 6 throws.*stands on 6"),
         (4, "four-stroke", 'throws = [0, 90, 270, 180]\nfiring_order = "open"', "", "inline",
          r"throws \[0, 90, 270, 180\] deg contradict the firing intervals allowed, 180 to 180 deg; the most even"),
+        (3, "two-stroke", 'throws = [0, 120, 0]\nfiring_order = "open"', 'intervals = { min = "0 deg" }',
+         "inline", r"throws \[0, 120, 0\] deg let cylinders fire at once"),
         (6, "four-stroke", f"bank_angle = 90\n{OPEN}", "", "vee", "multiple of 120 deg, and they make 90 deg"),
         (6, "four-stroke", f"bank_angle = 90\nsplit_pin_angle = {{ between = [0, 20] }}\n{OPEN}", "", "vee",
          "no bank angle and split pin within the bounds let the firing be even"),
@@ -32,6 +34,10 @@ def test_infeasible_says_what_conflicts(tmp_path, cylinders, cycle, engine, phas
     with pytest.raises(AssertionError, match=said):
         raise AssertionError(result.message)
     assert "\n" not in result.message
+    if result.problem.phasing.throws is not None:
+        # what cannot fire as given is no design to evaluate either
+        given = state(result.problem)
+        assert (given.status, given.message) == (result.status, result.message)
 
 
 def test_limits_that_no_star_keeps_are_named(tmp_path):

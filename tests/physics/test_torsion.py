@@ -14,6 +14,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Absorber, Disc, Engine, OperatingPoint, Section, SliderCrank, Torsion
 from laufruhe.machine.torsion import stiffness_of
 from laufruhe.physics.fidelity import EXACT
+from laufruhe.physics.reduced_inertia import inertia_of_discs, reduced_inertia, turned_by
 from laufruhe.physics.torque import crank_torque
 from laufruhe.physics.torsion import (
     absorber_heat,
@@ -21,15 +22,14 @@ from laufruhe.physics.torsion import (
     main_orders,
     natural_modes,
     receptances,
-    reduced_inertia,
     section_stiffness,
     shaft_stress,
     shaft_torque,
     throw_torques,
-    turned_by,
     twist,
     vector_sums,
 )
+from laufruhe.physics.uneven_speed import moving_inertia
 from problem_files import PROBLEMS
 
 
@@ -118,6 +118,16 @@ def test_half_the_reciprocating_mass_turns_with_the_throw() -> None:
     rate = np.cos(phi) / (3.0 * np.cos(swing))
     expected = 0.05**2 + 2.0 * np.mean(speed**2) - 2e-4 * np.mean(rate**2)
     assert reduced_inertia(short) == pytest.approx(expected, rel=1e-9)
+
+
+def test_discs_and_pistons_hold_the_energy_of_all_that_turns() -> None:
+    """V14: mean energy of the chain as one rigid piece is that of the flywheel with pistons and rods beside it (F3)."""
+    engine = laufruhe.load(PROBLEMS / "inline-five-damper.toml").engine
+    angles = 2.0 * math.pi * np.arange(720) / 720
+    of_pistons = moving_inertia(engine, EXACT, angles)[0]
+    own = engine.torsion
+    beside = inertia_of_discs(own, engine.slider_cranks)
+    assert float(np.mean(beside + of_pistons)) == pytest.approx(sum(disc.inertia for disc in own.discs), rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["radial-seven", "vee-eight-cross", "boxer-four", "two-stroke-five"])

@@ -12,6 +12,7 @@ from scipy.optimize import differential_evolution
 import laufruhe
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.physics.torque import least_inertia
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
@@ -138,3 +139,28 @@ def test_what_is_refused() -> None:
     with pytest.raises(InputError, match="must be more than"):
         problem_of({"absorbers": [{"name": "d", "on": "pulley", "damping": "1 N m s/rad",
                                    "inertia": {"between": ["0 kg m^2", "1 kg m^2"]}}]})  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_disc_is_sized_for_irregularity_and_stress() -> None:
+    """The least inertia of all that turns is that of a bisection (T4), and no smaller disc keeps the degree."""
+    tables = tables_of(READY)["torsion"]
+    pulley, wheel = tables["discs"]
+    wheel = {**wheel, "inertia": {"between": ["0.05 kg m^2", "0.5 kg m^2"], "start": "0.14 kg m^2"}}
+    ring = {**tables["absorbers"][0], "inertia": "0.006 kg m^2"}
+    own = {"discs": [pulley, wheel], "absorbers": [ring]}
+    limits = [
+        {"limit": "degree of irregularity", "max": "1/60"},
+        {"limit": "rms shaft stress", "max": "20 N/mm^2"},
+    ]
+    problem = problem_of(own, constraints=limits, objective={"minimise": "flywheel inertia"}, tolerance=2e-3)
+    result = laufruhe.solve(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+    least = max(least_inertia(problem.engine, point, 1.0 / 60.0, problem.fidelity) for point in problem.points)
+    assert result.certificate.lower_bound <= least * (1.0 + 1e-9)
+    assert result.objective.value == pytest.approx(least, rel=2e-3)
+    assert result.limits[1].value <= 20e6
+    narrow = {**wheel, "inertia": {"between": ["0.05 kg m^2", "0.1 kg m^2"]}}
+    none = laufruhe.solve(problem_of({**own, "discs": [pulley, narrow]}, constraints=limits))
+    assert none.status is Status.INFEASIBLE
+    assert "degree of irregularity" in none.conflict

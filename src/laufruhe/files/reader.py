@@ -25,7 +25,7 @@ from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, complaints_of, key_path
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
-from laufruhe.files.flywheel import flywheel_of
+from laufruhe.files.flywheel import check_told_alike, flywheel_of
 from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of
 from laufruhe.files.mounts import mounts_of, run_of
@@ -260,6 +260,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke, brake)
     run = run_of(file.run_up, found.block, [point.name for point in points])
     engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run)
+    check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))
     scene, decisions = (
         Scene(engine, points),
         (*_of_pistons(file, table, cylinders), *collected.decisions, *found.decisions, *of_wheel, *of_chain),

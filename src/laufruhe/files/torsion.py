@@ -15,7 +15,7 @@ from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Absorber, Disc, Section, SliderCrank, Torsion
 from laufruhe.machine.layouts import Throw
 from laufruhe.machine.torsion import STEEL, stiffness_of
-from laufruhe.physics.torsion import reduced_inertia
+from laufruhe.physics.reduced_inertia import reduced_inertia
 from laufruhe.problem.decision import Decision, TorsionDrive
 from laufruhe.problem.sets import Interval
 

@@ -73,7 +73,7 @@ class Swing:
 
 def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Swing:
     """Work and inertia over the cycle; rotors, mounts and the flywheel itself are not in them."""
-    bare = replace(engine, rotors=(), mounts=(), bearings=(), flywheel=None)
+    bare = replace(engine, rotors=(), mounts=(), bearings=(), flywheel=None, torsion=None)
     return _found_swing(bare, point, fidelity)
 
 
@@ -90,10 +90,3 @@ def _found_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
 def irregularity(engine: Engine, point: OperatingPoint, inertia: float, fidelity: Fidelity = EXACT) -> float:
     """Degree of irregularity with an inertia beside pistons and rods [kg m2] (T3)."""
     return swing_of(engine, point, fidelity).irregularity(inertia)
-
-
-def turning_inertia(engine: Engine, fidelity: Fidelity) -> float | None:
-    """Inertia beside pistons and rods [kg m2], of an uneven speed or of the flywheel; None where none is told."""
-    if fidelity.is_uneven:
-        return fidelity.crank_inertia
-    return engine.flywheel.inertia if engine.flywheel else None

@@ -19,8 +19,9 @@ from laufruhe.machine import Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
-from laufruhe.physics.irregularity import swing_of, turning_inertia
+from laufruhe.physics.irregularity import swing_of
 from laufruhe.physics.mechanism import ComplexArray, Direction, Effect, resolved_orders
+from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.shaking_loads import star_loads
 from laufruhe.physics.wrench import ROLL
 

@@ -31,7 +31,6 @@ ComplexArray = NDArray[np.complex128]
 Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
 """Of a chain, by order [1] and speed [rad/s] what each section makes of its twist, shape (orders, sections)."""
 
-_STEPS = 1024
 _SINGULAR = 1e-13
 _FREE = 1e-9
 
@@ -53,33 +52,6 @@ class TorsionalModes:
     frequencies: Array
     shapes: Array
     rings: Array
-
-
-def reduced_inertia(part: SliderCrank) -> float:
-    """Mean over a turn of what piston and rod reduce to the crank, and the mass at its pin [kg m2] (V1; textbook 2.9).
-
-    With a long rod half the reciprocating mass at the crank radius.
-    """
-    return _reduced_inertia(replace(part, name="", x=0.0, throw=part.bank, firing_angle=0.0))
-
-
-@lru_cache(maxsize=256)
-def _reduced_inertia(part: SliderCrank) -> float:
-    motion = part.motion(np, 2.0 * math.pi * np.arange(_STEPS) / _STEPS)
-    swinging = sum(
-        mass * float(np.mean(np.abs(velocity * np.ones(_STEPS)) ** 2)) for mass, (_, velocity, _) in motion.points
-    )
-    turning = sum(
-        inertia * float(np.mean((rate * np.ones(_STEPS)) ** 2)) for inertia, (rate, _) in motion.swings if inertia
-    )
-    return part.rotating_mass * part.crank_radius**2 + swinging + turning
-
-
-def turned_by(chain: Torsion, before: Sequence[SliderCrank], after: Sequence[SliderCrank]) -> Torsion:
-    """The chain with other pistons and rods in place of those that its discs have (V1)."""
-    more = {a.name: reduced_inertia(b) - reduced_inertia(a) for a, b in zip(before, after, strict=True)}
-    discs = (replace(d, inertia=d.inertia + sum(more[name] for name in d.cylinders)) for d in chain.discs)
-    return replace(chain, discs=tuple(discs))
 
 
 def natural_modes(chain: Torsion, speed: float = 0.0) -> TorsionalModes:

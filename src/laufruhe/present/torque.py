@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from laufruhe.physics.irregularity import turning_inertia
+from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.solvers.result import Result
 
 

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, Protocol
 
 from laufruhe.machine import Engine, Mount
 from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.physics.reduced_inertia import turned_by
 from laufruhe.physics.rigid_body import turned_axes
-from laufruhe.physics.torsion import turned_by
 from laufruhe.problem.sets import Value
 
 STIFFNESS, LOSS, DAMPING, POSITION, TURNED = slice(0, 3), 3, slice(4, 7), slice(7, 10), slice(10, 13)

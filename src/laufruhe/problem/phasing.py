@@ -51,6 +51,11 @@ class Intervals:
         return min(intervals) >= self.least - slack and max(intervals) <= self.most + slack
 
     @property
+    def shown(self) -> str:
+        """In words."""
+        return f"{math.degrees(self.least):g} to {math.degrees(self.most):g} deg"
+
+    @property
     def forbid_unevenness(self) -> bool:
         """Whether only equal intervals are left."""
         return self.most - self.least <= 1e-9

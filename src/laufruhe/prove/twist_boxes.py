@@ -1,5 +1,7 @@
 """A lower bound of root mean squares of the crankshaft's twist over boxes of its discs, shafts and absorbers (V13).
 
+The inertia of all that turns, and how evenly it does, go one way with every disc (V14): a corner bounds them.
+
 The dynamic stiffness of an order is affine in inertia, stiffness and damping; of a diameter its stiffness is the
 coordinate. About the centre of a box, with A_i what half its side i changes,
 
@@ -15,13 +17,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Torsion
+from laufruhe.machine import Flywheel, Torsion
+from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torsion import (
     ComplexArray,
     dynamic_stiffness,
@@ -30,6 +33,7 @@ from laufruhe.physics.torsion import (
     receptances,
     throw_torques,
 )
+from laufruhe.problem.channels import Needs
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
@@ -105,6 +109,21 @@ class _Under:
         return max(found, 0.0) if math.isfinite(found) else 0.0
 
 
+class _OfInertia:
+    """The inertia of all that turns, or a degree of irregularity that falls with it (T9, V14)."""
+
+    def __init__(self, measure: Measure, evaluation: Evaluation) -> None:
+        if measure.channel.of_wheel is None:
+            raise TypeError(f"{measure.name} is not of the flywheel")
+        self._number, self._rises = measure.channel.of_wheel(measure, evaluation), measure.channel.rises
+        self._engine, self._fidelity = evaluation.engine, evaluation.fidelity
+
+    def least(self, chains: Sequence[Torsion]) -> float:
+        """On a box, of the chains of its lower corner, centre and upper corner."""
+        inertia = turning_inertia(replace(self._engine, torsion=chains[0 if self._rises else -1]), self._fidelity)
+        return 0.0 if inertia is None else self._number(Flywheel(inertia))
+
+
 class TwistBoxes:
     """Bounds of boxes of what is open of the crankshaft.
 
@@ -121,11 +140,13 @@ class TwistBoxes:
 
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
         self.problem, self.coordinates = problem, TwistCoordinates(problem)
-        rest = [term for term in problem.objective if not term.measure.is_twist]
+        rest = [t for t in problem.objective if not (t.measure.is_twist or _turns(t.measure))]
         self._constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         self._terms = [(t.weight, t.measure) for t in problem.objective if _is_square(t.measure)]
         self._limits = [(limit.maximum, limit.measure) for limit in problem.limits if _is_square(limit.measure)]
         self._numbers = [limit for limit in problem.limits if limit.measure.channel.of_modes]
+        self._turning = [(t.weight, _OfInertia(t.measure, evaluation)) for t in problem.objective if _turns(t.measure)]
+        self._uneven = [(x.maximum, _OfInertia(x.measure, evaluation)) for x in problem.limits if _turns(x.measure)]
         self._samples = evaluation.samples
         self._lines = [self._lines_at(loads) for loads in evaluation.loads]
 
@@ -138,7 +159,12 @@ class TwistBoxes:
     @property
     def has_terms(self) -> bool:
         """Whether anything minimised is bounded."""
-        return bool(self._terms)
+        return bool(self._terms or self._turning)
+
+    @property
+    def knows_all(self) -> bool:
+        """Whether all that is minimised is bounded from near by."""
+        return all(_is_square(term.measure) or _turns(term.measure) for term in self.problem.objective)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
@@ -153,6 +179,8 @@ class TwistBoxes:
             return math.inf, int(np.argmax(wide))
         centre, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         chains = [self.coordinates.chain(x) for x in (lower, centre, upper)]
+        if any(of.least(chains) > most * (1.0 + SLACK) for most, of in self._uneven):
+            return math.inf, int(np.argmax(wide))
         twists = [self._twist(lines, chains[1], centre, half) for lines in self._lines]
         if any(self._under(q, chains, twists).least > most * (1.0 + SLACK) for most, q in self._limits):
             return math.inf, int(np.argmax(wide))
@@ -162,7 +190,11 @@ class TwistBoxes:
         least = whole - float(np.abs(slopes).sum())
         least = max(least, 0.0) if math.isfinite(least) else 0.0
         pull = np.max([np.nan_to_num(twist.pull, nan=1.0, posinf=1.0) for twist in twists], axis=0)
-        return self._constant + least, int(np.argmax(pull + _SAME * wide))
+        turning = sum(weight * of.least(chains) for weight, of in self._turning)
+        if not self._terms:
+            # each goes one way with every inertia, and nothing else moves it
+            pull = wide
+        return self._constant + turning + least, int(np.argmax(pull + _SAME * wide))
 
     def _lines_at(self, loads: PointLoads) -> _Lines:
         """Orders that count anywhere in the bounds, by a look at their middle and corners."""
@@ -285,6 +317,10 @@ class TwistBoxes:
                 if np.any((low > a) & (high < b)):
                     return True
         return False
+
+
+def _turns(measure: Measure) -> bool:
+    return measure.channel.is_flywheel and measure.channel.needs is Needs.FLYWHEEL
 
 
 def _is_square(measure: Measure) -> bool:

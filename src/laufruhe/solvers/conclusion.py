@@ -20,7 +20,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.ranking import PhasingResult
+from laufruhe.solvers.ranking import PhasingResult, none_of_given
 from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible, objective_of
 
 Array = NDArray[np.float64]
@@ -160,7 +160,7 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
 
 
 def state(problem: Problem, to_start_from: bool = False) -> Result:
-    """The design as given, evaluated and not changed.
+    """The design as given, evaluated and not changed; infeasible where its throws have no firing order allowed.
 
     Parameters
     ----------
@@ -170,9 +170,12 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
     started = time.perf_counter()
     problem = problem if problem.over is None else problem.changed(over=None)
     evaluation = evaluate_start(problem) if to_start_from else evaluate(problem)
+    open_of = problem.phasing
+    why = none_of_given(open_of, open_of.throws) if open_of is not None and open_of.throws is not None else ""
     return Result(
         problem=problem,
-        status=Status.FEASIBLE,
+        status=Status.INFEASIBLE if why else Status.FEASIBLE,
+        message=why,
         objective=objective_of(problem, evaluation, evaluation),
         certificate=None,
         decisions=(),

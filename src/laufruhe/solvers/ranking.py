@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from laufruhe.machine import firing
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.turns import as_turn, star_sum
-from laufruhe.problem.phasing import Candidate, OrderCriterion
+from laufruhe.problem.phasing import Candidate, Intervals, OrderCriterion
 from laufruhe.problem.problem import Phasing, Problem
 
 ORDERS = (1, 2, 4)
@@ -183,6 +183,25 @@ def ranked_orders(
             found.append(_judged(phasing, layout, order, turns, intervals))
     found.sort(key=lambda o: (*(o.by(criterion) for criterion in phasing.criteria), o.order))
     return tuple(found)
+
+
+def none_of_given(phasing: Phasing, throws: Sequence[float]) -> str:
+    """Why throws as given have no firing order; empty where they have one."""
+    given = Candidate(tuple(throws), phasing.firing_order, *phasing.least_geometry)
+    if ranked_orders(phasing, given):
+        return ""
+    orders = ranked_orders(replace(phasing, intervals=Intervals(0.0, math.inf)), given)
+    shown = ", ".join(f"{math.degrees(angle):g}" for angle in throws)
+    if not orders:
+        return f"throws [{shown}] deg let cylinders fire at once, and in a firing order each has its turn"
+    nearest = min(orders, key=lambda o: max(o.intervals) - min(o.intervals))
+    text = f"throws [{shown}] deg contradict the firing intervals allowed, {phasing.intervals.shown}"
+    return f"{text}; the most even order of these throws has intervals {ends_of(nearest.intervals)}"
+
+
+def ends_of(intervals: Sequence[float]) -> str:
+    """Shortest and longest of some firing intervals, in words."""
+    return f"from {abs(math.degrees(min(intervals))):.6g} to {math.degrees(max(intervals)):.6g} deg"
 
 
 def told_orders(

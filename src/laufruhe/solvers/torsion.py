@@ -69,8 +69,8 @@ class _Program:
 def solve_torsion(problem: Problem) -> Result:
     """The best discs, shafts and absorbers found, with what boxes prove; or the limits that none keeps.
 
-    Root mean squares of up to three numbers are decided to a proven optimum. What else is asked has a
-    bound by the root mean squares in it alone.
+    Root mean squares, inertia and irregularity are decided to a proven optimum of up to three numbers. What else
+    is asked has a bound by these in it alone.
     """
     started = time.perf_counter()
     initial = evaluate(problem)
@@ -181,9 +181,8 @@ def _shown(program: _Program, boxes: TwistBoxes, divided: Divided, design: Desig
         left = left - float(share) * scale / steep * slopes[1 + k]
     widths = program.upper - program.lower
     by_name = {d.name: np.array([left[k] / widths[k]]) for k, d in enumerate(problem.decisions)}
-    exact = boxes.coordinates.is_exact and all(t.measure.is_twist and t.measure.norm.is_euclidean
-                                               for t in problem.objective)  # fmt: skip
-    method = f"local programs; lower bound of the root mean squares on {divided.boxes} boxes of discs and shafts"
+    exact = boxes.coordinates.is_exact and boxes.knows_all
+    method = f"local programs; lower bound on {divided.boxes} boxes of discs and shafts"
     # of a design that breaks a limit nothing is proven
     is_bounded = design.excess <= KEPT and boxes.coordinates.is_exact
     bound = divided.bound if is_bounded else 0.0

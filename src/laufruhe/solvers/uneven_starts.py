@@ -23,7 +23,7 @@ from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, bounded_stars
 from laufruhe.problem.problem import Phasing
-from laufruhe.solvers.ranking import ranked_orders
+from laufruhe.solvers.ranking import ends_of, none_of_given, ranked_orders
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.star_families import families_of
 
@@ -100,7 +100,7 @@ def _given(phasing: Phasing) -> list[list[int]] | None:
 
 def none_fires(phasing: Phasing) -> tuple[str, bool]:
     """Why no crank and firing order keeps the intervals allowed, and whether that is proven."""
-    allowed = f"{math.degrees(phasing.intervals.least):g} to {math.degrees(phasing.intervals.most):g} deg"
+    allowed = phasing.intervals.shown
     if not phasing.intervals.holds([phasing.even_interval]):
         even = f"{math.degrees(phasing.even_interval):g}"
         return (
@@ -108,14 +108,14 @@ def none_fires(phasing: Phasing) -> tuple[str, bool]:
             f"phasing.intervals allows {allowed}"
         ), True
     if phasing.throws is not None:
-        return _none_of_given(phasing, phasing.throws, allowed), True
+        return none_of_given(phasing, phasing.throws), True
     if not phasing.continuous:
         return f"no star exists: {families_of(phasing)[1]}", True
     text = f"no crank and firing order keeps the firing intervals allowed, {allowed}"
     patterns, complete = _slots(phasing).patterns(_given(phasing))
     if not patterns or patterns[0].broken <= _KEPT:
         return text, False
-    shown = _ends_of(patterns[0].intervals(phasing.cycle))
+    shown = ends_of(patterns[0].intervals(phasing.cycle))
     text += f"; the most even crank {'' if complete else 'found '}has intervals {shown}"
     if phasing.bank is not None:
         step = 360.0 / (phasing.cylinders // math.gcd(phasing.cycle.turns, phasing.cylinders))
@@ -124,22 +124,6 @@ def none_fires(phasing: Phasing) -> tuple[str, bool]:
             f"multiple of {step:g} deg"
         )
     return text, complete
-
-
-def _none_of_given(phasing: Phasing, throws: Sequence[float], allowed: str) -> str:
-    """Why throws as given have no firing order."""
-    free = replace(phasing, intervals=Intervals(0.0, math.inf))
-    orders = ranked_orders(free, Candidate(tuple(throws), None, *phasing.least_geometry))
-    shown = ", ".join(f"{math.degrees(angle):g}" for angle in throws)
-    text = f"throws [{shown}] deg contradict the firing intervals allowed, {allowed}"
-    if not orders:
-        return text
-    nearest = min(orders, key=lambda o: max(o.intervals) - min(o.intervals))
-    return f"{text}; the most even order of these throws has intervals {_ends_of(nearest.intervals)}"
-
-
-def _ends_of(intervals: Sequence[float]) -> str:
-    return f"from {abs(math.degrees(min(intervals))):.6g} to {math.degrees(max(intervals)):.6g} deg"
 
 
 def _best_cranks(phasing: Phasing, patterns: Sequence[FiringPattern]) -> list[Candidate]:

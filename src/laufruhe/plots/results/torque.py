@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.irregularity import swing_of, turning_inertia
+from laufruhe.physics.irregularity import swing_of
+from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
 from laufruhe.plots.speed_axis import RPM
 from laufruhe.plots.style import FAINT, GREEN, INK, ORANGE, PALE, SKY, entry, headed, page, series_of

@@ -6,7 +6,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from laufruhe.machine import Flywheel
-from laufruhe.physics.irregularity import Swing, swing_of, turning_inertia
+from laufruhe.physics.irregularity import Swing, swing_of
+from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import Needs, NumberChannel, OfWheel
 from laufruhe.problem.decision import Kind
@@ -25,8 +26,10 @@ class FlywheelChannel(NumberChannel):
     of_torque: bool = False
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """The flywheel, and all that moves the torque where that counts."""
-        return Kind.FLYWHEEL in kinds or (self.of_torque and bool({Kind.STAR, Kind.PISTON} & set(kinds)))
+        """The flywheel, discs where it follows from them, and all that moves the torque where that counts."""
+        moving = {Kind.FLYWHEEL} | ({Kind.STAR, Kind.PISTON} if self.of_torque else set())
+        # a rim is no disc of the crankshaft
+        return bool((moving | ({Kind.TORSION} if self.needs is Needs.FLYWHEEL else set())) & set(kinds))
 
 
 def _found(
