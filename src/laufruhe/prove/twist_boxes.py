@@ -33,7 +33,6 @@ from laufruhe.physics.torsion import (
     receptances,
     throw_torques,
 )
-from laufruhe.problem.channels import Needs
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
@@ -320,7 +319,7 @@ class TwistBoxes:
 
 
 def _turns(measure: Measure) -> bool:
-    return measure.channel.is_flywheel and measure.channel.needs is Needs.FLYWHEEL
+    return measure.channel.of_inertia
 
 
 def _is_square(measure: Measure) -> bool:

@@ -29,7 +29,7 @@ class FlywheelChannel(NumberChannel):
         """The flywheel, discs where it follows from them, and all that moves the torque where that counts."""
         moving = {Kind.FLYWHEEL} | ({Kind.STAR, Kind.PISTON} if self.of_torque else set())
         # a rim is no disc of the crankshaft
-        return bool((moving | ({Kind.TORSION} if self.needs is Needs.FLYWHEEL else set())) & set(kinds))
+        return bool((moving | ({Kind.TORSION} if self.of_inertia else set())) & set(kinds))
 
 
 def _found(

@@ -132,6 +132,11 @@ class Channel:
         """Whether it goes one way with every number of the flywheel."""
         return self.of_wheel is not None
 
+    @property
+    def of_inertia(self) -> bool:
+        """Whether it goes one way with the inertia of all that turns, whatever that is made of."""
+        return self.is_flywheel and self.needs is Needs.FLYWHEEL
+
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Whether it may change with decisions of these kinds."""
         return bool(set(kinds) - UNFELT)
