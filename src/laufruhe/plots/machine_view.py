@@ -15,7 +15,8 @@ from matplotlib.patches import Circle, Patch, Rectangle, Wedge
 
 from laufruhe.machine import Engine, Rotor, Shaft, SliderCrank
 from laufruhe.machine.rotor import Role
-from laufruhe.plots.style import AFTER, FAINT, GREY, INK, ORANGE, entry, entry_of_dots
+from laufruhe.plots.style import AFTER, GREY, ORANGE, entry, entry_of_dots
+from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import changed
 from laufruhe.solvers.result import Result
 

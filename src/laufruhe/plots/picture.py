@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.plots import style
-from laufruhe.plots.style import as_svg, heading, page, save
+from laufruhe.plots.style import as_svg, heading, page, save, styled
 from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
@@ -31,6 +31,7 @@ _MORE = {
 }
 
 
+@styled()
 def draw(picture: Picture) -> Figure:
     """The figure of a description."""
     rows = -(-len(picture.panels) // picture.columns)

@@ -7,7 +7,8 @@ from typing import Any
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from laufruhe.plots.style import FAINT, VERMILION, entry
+from laufruhe.plots.style import VERMILION, entry
+from laufruhe.plots.words import FAINT
 from laufruhe.present.mounting import MountingFacts
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit

@@ -1,7 +1,8 @@
 """What all pictures share: page, colours, fonts, and the words around the data.
 
-Figures are made without pyplot and laid out in inches: both cost a third of the time
-that a picture takes.
+A picture is made under `styled()`, begins with a `page` of panels and ends with `headed` (or `heading`), which gives
+the page the margins that all that was drawn needs: nothing can stand outside it. Figures are made without pyplot and
+laid out in inches: both cost a third of the time that a picture takes.
 """
 
 from __future__ import annotations
@@ -15,12 +16,16 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.transforms import Bbox
 
+from laufruhe.plots.words import FAINT, FONT, INK, SMALL, fitted, round_ticks, width_of, wrapped
 from laufruhe.present.measures import changed, load_designs
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
@@ -29,20 +34,35 @@ from laufruhe.solvers.result import Result
 GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
 PURPLE, PALE = "#CC79A7", "#8fc4e8"
 BEFORE, AFTER = GREY, BLUE
-INK, FAINT = "#222222", "#666666"
 DPI = 150
-LEFT, RIGHT, TOP, BOTTOM = 0.85, 0.3, 1.2, 0.85
 GAP = 0.42
-NARROWEST = 6.4
+NARROWEST, WIDEST = 6.4, 10.2
+"""Of a page [inch]: the widest stands in a report at its own size, so its letters do too."""
+EDGE = 0.3
+"""Around all that is on a page [inch]."""
+_BELOW_HEAD, _ABOVE_FOOT = 0.22, 0.2
+_TITLE, _ENGINE = 13.0, 10.0
+_LINE = 1.35 / 72.0
+"""Height of a line of text of one point [inch]."""
+_HANDLE, _APART = 1.6, 1.6
 
 # names and titles are the user's: a dollar sign in them starts no formula
 _SETTINGS: Any = {
-    "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 9.0, "axes.titlesize": 10.0,
+    "font.family": "sans-serif", "font.sans-serif": [FONT], "font.size": SMALL, "axes.titlesize": 10.0,
     "axes.edgecolor": FAINT, "axes.labelcolor": INK, "axes.linewidth": 0.8, "axes.spines.top": False,
     "axes.spines.right": False, "axes.axisbelow": True, "axes.grid": True, "grid.color": "#e4e4e4",
     "grid.linewidth": 0.7, "text.color": INK, "xtick.color": FAINT, "ytick.color": FAINT, "path.simplify": True,
-    "text.parse_math": False,
+    "text.parse_math": False, "legend.fontsize": SMALL, "svg.hashsalt": "laufruhe",
 }  # fmt: skip
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Fonts and colours of all that is drawn meanwhile; a decorator of what makes a figure."""
+    with mpl.rc_context(_SETTINGS), warnings.catch_warnings():
+        # a name in a script that the font lacks shows boxes; the tables have it right
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        yield
 
 
 @dataclass(frozen=True)
@@ -62,7 +82,7 @@ def page(
     lead: float = 0.0,
     across: float | None = None,
 ) -> Page:
-    """Panels of one size [inch] with room for a heading above and a source line below.
+    """Panels of one size [inch]; margins come with the heading.
 
     Parameters
     ----------
@@ -74,32 +94,62 @@ def page(
         Above each panel, for a heading of its own [inch].
     """
     across = gap if across is None else across
-    wide = max(LEFT + RIGHT + columns * panel[0] + (columns - 1) * across, NARROWEST)
-    high = TOP + BOTTOM + rows * (panel[1] + lead) + (rows - 1) * gap
-    with mpl.rc_context(_SETTINGS):
+    wide = columns * panel[0] + (columns - 1) * across
+    high = rows * (panel[1] + lead) + (rows - 1) * gap
+    with styled():
         figure = Figure(figsize=(wide, high), dpi=DPI, facecolor="white")
         FigureCanvasAgg(figure)
         panels = []
         for k in range(rows * columns if count is None else count):
             row, column = divmod(k, columns)
-            left = LEFT + column * (panel[0] + across)
-            bottom = BOTTOM + (rows - 1 - row) * (panel[1] + lead + gap)
+            left, bottom = column * (panel[0] + across), (rows - 1 - row) * (panel[1] + lead + gap)
             panels.append(figure.add_axes((left / wide, bottom / high, panel[0] / wide, panel[1] / high)))
+            for axis in (panels[-1].xaxis, panels[-1].yaxis):
+                round_ticks(axis)
     return Page(figure, tuple(panels))
 
 
-def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], source: str) -> None:
-    """Title, one line that says what is seen, the legend, and where the data come from."""
-    wide, high = figure.get_size_inches()
-    left = 0.3 / wide
-    figure.text(left, 1 - 0.2 / high, fitted(title, wide, 13), size=13, weight="bold", va="top", color=INK)
-    figure.text(left, 1 - 0.49 / high, fitted(lines, wide, 9), size=9, va="top", color=FAINT)
-    columns = _legend_columns([str(artist.get_label()) for artist in legend], wide)
-    figure.legend(
-        handles=list(legend), loc="upper left", bbox_to_anchor=(left, 1 - 0.65 / high), ncols=columns, frameon=False,
-        fontsize=9, borderpad=0.2, borderaxespad=0.0, handlelength=1.6, columnspacing=1.6, labelcolor=INK,
-    )  # fmt: skip
-    figure.text(left, 0.14 / high, fitted(source, wide, 7), size=7, va="bottom", color=FAINT)
+def heading(
+    figure: Figure, title: str, lines: str, legend: Sequence[Artist], source: str, engine: str = "", clear: float = 0.0
+) -> None:
+    """Title, the engine, what is seen, the legend, and where the data come from; the page grows around it all.
+
+    Parameters
+    ----------
+    clear
+        Kept free above the panels for what has no extent of its own [inch].
+    """
+    with styled():
+        drawn = Bbox.union([box for axes in figure.axes if (box := axes.get_tightbbox()) is not None])
+        inside = drawn.transformed(figure.dpi_scale_trans.inverted())
+        wide = max(inside.width + 2.0 * EDGE, NARROWEST)
+        room = wide - 2.0 * EDGE
+        words = [(title, _TITLE, "bold", INK), (engine, _ENGINE, "normal", INK), (lines, SMALL, "normal", FAINT)]
+        head = [(wrapped(text, room, size, weight), size, weight, ink) for text, size, weight, ink in words if text]
+        foot = wrapped(source, room)
+        rows, columns = _legend_shape([str(artist.get_label()) for artist in legend], room)
+        above = sum(len(text) * size * _LINE + 0.03 for text, size, _, _ in head) + rows * 1.05 * SMALL * _LINE
+        below = EDGE + len(foot) * SMALL * _LINE + _ABOVE_FOOT
+        high = EDGE + above + _BELOW_HEAD + clear + inside.height + below
+        _moved(figure, (wide, high), (EDGE - inside.x0, below - inside.y0))
+        top, left = high - EDGE, EDGE / wide
+        for text, size, weight, ink in head:
+            figure.text(left, top / high, "\n".join(text), size=size, weight=weight, va="top", color=ink,
+                        linespacing=1.2)  # fmt: skip
+            top -= len(text) * size * _LINE + 0.03
+        if legend:
+            _legend(figure, legend, room, columns, (left, top / high))
+        figure.text(left, EDGE / high, "\n".join(foot), size=SMALL, va="bottom", color=FAINT, linespacing=1.2)
+
+
+def _moved(figure: Figure, size: tuple[float, float], by: tuple[float, float]) -> None:
+    """A page of another size, its panels as large as before and moved by so much [inch]."""
+    before = figure.get_size_inches()
+    places = [axes.get_position(original=True) for axes in figure.axes]
+    figure.set_size_inches(size)
+    for axes, box in zip(figure.axes, places, strict=True):
+        corner = (np.array([box.x0, box.y0]) * before + by) / size
+        axes.set_position((*corner, *(np.array([box.width, box.height]) * before / size)))
 
 
 def headed(drawn: Page, result: Result, title: str, lines: str, legend: Sequence[Artist], note: str = "") -> Figure:
@@ -107,23 +157,29 @@ def headed(drawn: Page, result: Result, title: str, lines: str, legend: Sequence
     problem = result.problem
     described = f"Engine: {problem.source}. " if problem.source else ""
     source = f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
-    heading(drawn.figure, title, lines, legend, source)
+    heading(drawn.figure, title, lines, legend, source, problem.title)
     return drawn.figure
 
 
-def _legend_columns(labels: Sequence[str], inches: float) -> int:
-    """Entries side by side: all of them, or half where the figure is too narrow for one row."""
-    letters = sum(len(label) for label in labels)
-    handles_and_gaps = 4.0 * len(labels)
-    fits = 9.0 / 72.0 * (0.53 * letters + handles_and_gaps) <= inches - 0.6
-    return len(labels) if fits else -(-len(labels) // 2)
+def _legend(figure: Figure, entries: Sequence[Artist], room: float, columns: int, at: tuple[float, float]) -> Legend:
+    legend = figure.legend(
+        handles=list(entries), loc="upper left", bbox_to_anchor=at, ncols=columns, frameon=False, fontsize=SMALL,
+        borderpad=0.2, borderaxespad=0.0, handlelength=_HANDLE, columnspacing=_APART, labelcolor=INK,
+    )  # fmt: skip
+    for text in legend.get_texts():
+        text.set_text(fitted(text.get_text(), room - 2.6 * SMALL / 72.0))
+    return legend
 
 
-def fitted(text: str, inches: float, points: float) -> str:
-    """Text cut to one line of a figure this wide; DejaVu Sans takes half its size a letter."""
-    most = int((inches - 0.6) * 72.0 / (0.53 * points))
-    text = " ".join(text.split())
-    return text if len(text) <= most else text[: most - 1].rstrip() + "…"
+def _legend_shape(labels: Sequence[str], room: float) -> tuple[int, int]:
+    """Rows and columns of a legend: as many entries side by side as there is room for."""
+    size = SMALL / 72.0
+    for columns in range(len(labels), 0, -1):
+        split = [list(part) for part in np.array_split(list(labels), columns)]
+        wide = sum(max(map(width_of, part)) + (_HANDLE + 0.8 + _APART) * size for part in split)
+        if wide - _APART * size <= room or columns == 1:
+            return max(map(len, split)), columns
+    return 0, 1
 
 
 def point_name(result: Result, k: int) -> str:
@@ -168,24 +224,16 @@ def save(figure: Figure, path: Path) -> None:
     if path.suffix == ".svg":
         path.write_text(as_svg(figure), encoding="utf-8", newline="\n")
         return
-    with _drawing({}):
+    with styled():
         figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 4})
 
 
 def as_svg(figure: Figure) -> str:
     """The picture as SVG, letters as outlines, the same every time."""
     drawn = io.StringIO()
-    with _drawing({"svg.hashsalt": "laufruhe"}):
+    with styled():
         figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
     return drawn.getvalue()
-
-
-@contextmanager
-def _drawing(more: Any) -> Iterator[None]:
-    with mpl.rc_context({**_SETTINGS, **more}), warnings.catch_warnings():
-        # a name in a script that the font lacks shows boxes; the tables have it right
-        warnings.filterwarnings("ignore", message="Glyph .* missing from")
-        yield
 
 
 def thin(values: Iterable[float]) -> float:

@@ -11,9 +11,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import NDArray
-from scipy.optimize import isotonic_regression
 
-from laufruhe.plots.style import FAINT, INK, Page, heading, page
+from laufruhe.plots.style import Page, heading, page, styled
+from laufruhe.plots.words import FAINT, INK, spread
 from laufruhe.studies.trade import Row, Trade
 
 Array = NDArray[np.float64]
@@ -32,6 +32,7 @@ def has_picture(found: Trade) -> bool:
     return any(row.error > 0.0 for row in found.rows)
 
 
+@styled()
 def figure(found: Trade) -> Figure:
     """One panel: evaluation time of another design against error, the front joined."""
     drawn = page(1, 1, (PANEL[0] + NAMES, PANEL[1]))
@@ -93,19 +94,9 @@ def _name(axes: Axes, rows: tuple[Row, ...], times: Array, errors: Array) -> Non
     low, high = np.log10(axes.get_ylim())
     # of dots at one height the nearest to the names is named lowest: no line crosses another dot's name
     heights = (np.log10(errors) - low) / (high - low) - 1e-6 * np.argsort(np.argsort(times))
-    for row, time, error, height in zip(rows, times, errors, _spread(heights, NAME_HEIGHT), strict=True):
+    for row, time, error, height in zip(rows, times, errors, spread(heights, NAME_HEIGHT), strict=True):
         axes.annotate(
             row.name, (time, error), xytext=(1.03, height), textcoords="axes fraction", fontsize=7, va="center",
             ha="left", color=INK, annotation_clip=False, zorder=1,
             arrowprops={"arrowstyle": "-", "color": "#c4c4c4", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 3.0},
         )  # fmt: skip
-
-
-def _spread(heights: Array, least: float) -> Array:
-    """Heights in 0 ... 1 at least so far apart, their order kept, moved by the least squares."""
-    order = np.argsort(heights)
-    steps = least * np.arange(len(heights))
-    moved = np.clip(isotonic_regression(heights[order] - steps).x, 0.0, 1.0 - steps[-1])
-    spread = np.empty(len(heights))
-    spread[order] = moved + steps
-    return spread

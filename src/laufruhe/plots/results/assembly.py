@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from laufruhe.plots.style import AFTER, BEFORE, INK, SKY, entry, headed, page
+from laufruhe.plots.style import AFTER, BEFORE, SKY, entry, headed, page, styled
+from laufruhe.plots.words import INK
 from laufruhe.present.measures import objective_unit
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.robust_result import SHARES
@@ -17,6 +18,7 @@ def applies(result: Result) -> bool:
     return result.assembly is not None
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Share of assemblies that stay below, and where the best one, the given one and mean parts stand."""
     found, objective = result.assembly, result.objective

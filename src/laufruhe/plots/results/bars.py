@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from laufruhe.plots.style import FAINT, Series, fitted, headed, page, series_of, thin
+from laufruhe.plots.style import Series, headed, page, series_of, styled, thin
+from laufruhe.plots.words import FAINT, fitted
 from laufruhe.present.measures import Array, hardest_point, has_mount_forces
 from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import Evaluation, measured
@@ -18,6 +19,7 @@ WIDTH = 0.36
 applies = has_mount_forces
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """One group of bars for each mount and one for all; one row for each operating point."""
     several = range(len(result.problem.points))

@@ -13,7 +13,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from laufruhe.plots.style import FAINT, INK, ORANGE, entry_of_dots, fitted, headed, page, point_name, series_of, thin
+from laufruhe.plots.style import ORANGE, entry_of_dots, headed, page, point_name, series_of, styled, thin
+from laufruhe.plots.words import FAINT, INK, fitted
 from laufruhe.present.measures import BEARINGS, Array, has_loads, load_designs, places_of
 from laufruhe.problem.evaluation import samples_of
 from laufruhe.solvers.result import Result
@@ -31,6 +32,7 @@ def applies(result: Result) -> bool:
     return BEARINGS in places_of(result) and has_loads(result)
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """A column a bearing, all to one scale: above as the block feels it, below as the crankshaft does."""
     k, series = _hardest(result), series_of(result, loads=True)

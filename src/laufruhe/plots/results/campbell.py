@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, limits_on, mark_points, order_entries
-from laufruhe.plots.style import AFTER, FAINT, INK, entry, entry_of_dots, headed, page
+from laufruhe.plots.style import AFTER, entry, entry_of_dots, headed, page, styled
+from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import number
@@ -24,6 +25,7 @@ NAMES = 1.5
 applies = is_elastic
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Where an order meets a natural frequency, speed is critical."""
     facts, top = facts_of(result.final), fastest(result)

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from laufruhe.machine import Engine
-from laufruhe.plots.style import FAINT, INK, Series, entry, fitted, headed, page, series_of
+from laufruhe.plots.style import Series, entry, headed, page, series_of, styled
+from laufruhe.plots.words import FAINT, INK, fitted
 from laufruhe.present.measures import Array, hardest_point, has_loads
 from laufruhe.solvers.result import Result
 
@@ -49,6 +50,7 @@ class Row:
         return f"{only} {self.label.split()[-1]}" if only else self.label
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """A column an operating point; a row each for shaking force, roll moment, rocking couple, and every mount."""
     shown, mounts, series = _points(result), _mounts(result), series_of(result, loads=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from laufruhe.plots.machine_view import THICKNESS, Scene, framed, front_view, legend_of, reaches, side_view
-from laufruhe.plots.style import headed, page
+from laufruhe.plots.style import headed, page, styled
 from laufruhe.solvers.result import Result
 
 
@@ -14,6 +14,7 @@ def applies(result: Result) -> bool:
     return bool(result.final.engine.slider_cranks)
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """End and side view of the design at the firing dead centre of cylinder 1."""
     scene = Scene.of(result)

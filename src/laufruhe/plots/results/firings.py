@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from laufruhe.plots.style import AFTER, BEFORE, headed, page
+from laufruhe.plots.style import AFTER, BEFORE, headed, page, styled
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.solvers.ranking import PhasingResult, RankedOrder
 from laufruhe.solvers.result import Result
@@ -19,6 +19,7 @@ SHOWN = 6
 applies = has_ranking
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Firing orders as bars over one working cycle, a segment from each firing to the next."""
     shown = _shown(ranking_of(result))

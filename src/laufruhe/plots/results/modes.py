@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.plots.style import INK, entry, headed, page, series_of
+from laufruhe.plots.style import entry, headed, page, series_of, styled
+from laufruhe.plots.words import INK
 from laufruhe.present.mounting import MountingFacts, facts_of, is_elastic
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
@@ -15,6 +16,7 @@ from laufruhe.solvers.result import Result
 applies = is_elastic
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Kinetic-energy share of every motion in every mode."""
     series = series_of(result)

@@ -12,19 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from laufruhe.machine import Mount
-from laufruhe.plots.style import (
-    FAINT,
-    INK,
-    Page,
-    Series,
-    entry_of_dots,
-    fitted,
-    headed,
-    page,
-    point_name,
-    series_of,
-    thin,
-)  # fmt: skip
+from laufruhe.plots.style import Page, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
+from laufruhe.plots.words import FAINT, INK, fitted
 from laufruhe.present.measures import Array, hardest_point, has_mount_forces
 from laufruhe.present.numbers import trimmed
 from laufruhe.problem.evaluation import samples_of
@@ -36,6 +25,7 @@ PANEL = 2.9
 applies = has_mount_forces
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """One panel for each mount, all to one scale."""
     k, series = hardest_point(result), series_of(result, loads=True)

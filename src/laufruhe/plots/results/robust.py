@@ -5,7 +5,8 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from laufruhe.plots.style import AFTER, BEFORE, FAINT, INK, entry, headed, page, thin
+from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled, thin
+from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
@@ -20,6 +21,7 @@ def applies(result: Result) -> bool:
     return result.robust is not None
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """What share of engines stays below, design by design, over bars of what tolerances cost."""
     found, unit = result.robust, objective_unit(result)

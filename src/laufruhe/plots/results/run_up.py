@@ -7,7 +7,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from laufruhe.plots.speed_axis import LIMIT, RPM, limits_on
-from laufruhe.plots.style import INK, entry, headed, page, series_of
+from laufruhe.plots.style import entry, headed, page, series_of, styled
+from laufruhe.plots.words import INK
 from laufruhe.present.mounting import is_elastic
 from laufruhe.present.numbers import figure as words
 from laufruhe.present.run_up import run_of, run_point, shown_runs
@@ -20,6 +21,7 @@ _ROWS = (("largest force [N]", RUN_FORCE), ("largest travel [mm]", RUN_TRAVEL), 
 applies = is_elastic
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Envelope of force, travel and roll over speed."""
     drawn = page(3, 1, (6.8, 1.7), gap=0.3)

@@ -11,7 +11,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from laufruhe.numerics.spectrum import order_amplitude
-from laufruhe.plots.style import FAINT, headed, page, point_name, series_of
+from laufruhe.plots.style import headed, page, point_name, series_of, styled
+from laufruhe.plots.words import FAINT
 from laufruhe.present.measures import Array, hardest_point, has_loads, main_load, mount_orders, padded
 from laufruhe.problem.loads import PointLoads
 from laufruhe.solvers.result import Result
@@ -25,6 +26,7 @@ NOTHING = 1e-9
 applies = has_loads
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Mount forces by order; of an engine without mounts, the shaking force and its couples."""
     k, series = hardest_point(result), series_of(result, loads=True)

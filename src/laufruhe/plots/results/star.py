@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from laufruhe.plots.style import AFTER, BEFORE, FAINT, INK, entry, headed, page
+from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled
+from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import number
 from laufruhe.solvers.ranking import RankedStar
@@ -21,6 +22,7 @@ SAME = math.radians(1.0)
 applies = has_ranking
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """The best stars: end view from the front, side view with every throw at its height."""
     phasing = ranking_of(result)

@@ -15,7 +15,8 @@ from laufruhe.physics.irregularity import swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
 from laufruhe.plots.speed_axis import RPM
-from laufruhe.plots.style import FAINT, GREEN, INK, ORANGE, PALE, SKY, entry, headed, page, series_of
+from laufruhe.plots.style import GREEN, ORANGE, PALE, SKY, entry, headed, page, series_of, styled
+from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import Array, has_loads
 from laufruhe.present.numbers import number
 from laufruhe.present.torque import asks_torque
@@ -33,6 +34,7 @@ def applies(result: Result) -> bool:
     return asks_torque(result) and has_loads(result)
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Torque part by part, its work about the mean, the crank speed, and what orders the torque is made of."""
     engine, fidelity = result.final.engine, result.problem.fidelity

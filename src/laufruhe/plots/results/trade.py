@@ -7,7 +7,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from laufruhe.plots.style import AFTER, BEFORE, FAINT, entry, headed, page
+from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled
+from laufruhe.plots.words import FAINT
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
@@ -20,6 +21,7 @@ def applies(result: Result) -> bool:
     return has_ranking(result) and len(ranking_of(result).trade) > 1
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """What uneven firing buys, and what no design with that freedom goes under."""
     trade = ranking_of(result).trade

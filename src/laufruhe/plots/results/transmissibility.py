@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, limits_on, mark_points, order_entries
-from laufruhe.plots.style import FAINT, INK, entry, headed, page, series_of
+from laufruhe.plots.style import entry, headed, page, series_of, styled
+from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import hardest_point
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.speed_curves import fastest, speeds_of, transmissibility_of
@@ -18,6 +19,7 @@ from laufruhe.solvers.result import Result
 applies = is_elastic
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Foundation over exciting force by order and speed, with limits and operating points."""
     facts, series = facts_of(result.final), series_of(result, loads=True)

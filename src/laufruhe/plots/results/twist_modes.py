@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 from laufruhe.physics.torsion import chain_of
 from laufruhe.plots.speed_axis import LIMIT, RPM, limits_on, mark_points
-from laufruhe.plots.style import AFTER, FAINT, GREEN, INK, ORANGE, entry, entry_of_dots, headed, page
+from laufruhe.plots.style import AFTER, GREEN, ORANGE, entry, entry_of_dots, headed, page, styled
+from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import changed
 from laufruhe.present.numbers import number
 from laufruhe.present.torsion import TorsionFacts, facts_of, is_twisted, speed_range
@@ -23,6 +24,7 @@ COLOURS = (AFTER, ORANGE, GREEN)
 applies = is_twisted
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """To the left how far each disc swings, to the right critical speeds, dots as large as their vector sums."""
     low, high = speed_range(result)

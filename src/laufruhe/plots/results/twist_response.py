@@ -9,7 +9,8 @@ from matplotlib.patches import Patch
 
 from laufruhe.physics.torsion import chain_of
 from laufruhe.plots.speed_axis import LIMIT, RPM, mark_points
-from laufruhe.plots.style import FAINT, entry, headed, page, series_of
+from laufruhe.plots.style import entry, headed, page, series_of, styled
+from laufruhe.plots.words import FAINT
 from laufruhe.present.numbers import number
 from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range, speeds_between, torque_over_speed
 from laufruhe.solvers.result import Result
@@ -19,6 +20,7 @@ applies = is_twisted
 MOST = 40.0
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Half of the peak to peak torque: thick in the section that has most, thin in all others of the last design."""
     low, high = speed_range(result)

@@ -1,0 +1,140 @@
+"""Words and numbers in pictures: how wide they are, where they break, their colour, and where they find room."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.colors import to_rgb
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import text_to_path
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
+from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
+
+Array = NDArray[np.float64]
+INK, FAINT = "#222222", "#5c5c5c"
+FONT = "DejaVu Sans"
+SMALL = 9.0
+"""No letter of a picture is smaller [points]."""
+THIN_SPACE = "\u2009"
+_POINTS = 72.0
+_ROUND = (1.0, 2.0, 5.0, 10.0)
+LARGE = 1e4
+"""Numbers from here on are given in thousands of their unit."""
+
+
+@lru_cache(maxsize=4096)
+def width_of(text: str, size: float = SMALL, weight: str = "normal") -> float:
+    """Of one line of text [inch]."""
+    font = FontProperties(family=FONT, size=size, weight=weight)
+    return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]) / _POINTS
+
+
+def fitted(text: str, inches: float, size: float = SMALL) -> str:
+    """Text cut to one line of this width."""
+    text = " ".join(text.split())
+    if width_of(text, size) <= inches:
+        return text
+    kept = next((k for k in range(len(text) - 1, 0, -1) if width_of(f"{text[:k]}…", size) <= inches), 0)
+    return f"{text[:kept].rstrip()}…"
+
+
+def wrapped(text: str, inches: float, size: float = SMALL, weight: str = "normal") -> list[str]:
+    """Text broken into lines of this width; a word that is wider alone is cut."""
+    lines: list[str] = []
+    for word in text.split():
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and width_of(longer, size, weight) <= inches:
+            lines[-1] = longer
+        else:
+            lines.append(fitted(word, inches, size))
+    return lines
+
+
+def contrast(one: str, other: str) -> float:
+    """Between two colours, 1 to 21, as WCAG 2 counts it."""
+    low, high = sorted(_luminance(colour) for colour in (one, other))
+    return (high + 0.05) / (low + 0.05)
+
+
+def ink_on(colour: str) -> str:
+    """Dark or white, whichever is read better on a colour."""
+    return max((INK, "#ffffff"), key=lambda ink: contrast(ink, colour))
+
+
+def _luminance(colour: str) -> float:
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+    return float(np.dot((0.2126, 0.7152, 0.0722), linear))
+
+
+def spread(places: Array, least: float, low: float = 0.0, high: float = 1.0) -> Array:
+    """Places between two ends at least so far apart, their order kept, moved by the least squares."""
+    if len(places) == 0:
+        return places
+    order = np.argsort(places, kind="stable")
+    steps = least * np.arange(len(places))
+    moved = np.clip(isotonic_regression(places[order] - steps).x, low, max(high - steps[-1], low))
+    found = np.empty(len(places))
+    found[order] = moved + steps
+    return found
+
+
+def beside(axes: Axes, heights: Sequence[float], texts: Sequence[str], size: float = SMALL) -> None:
+    """Names of horizontal lines, right of the panel: none covers another, and each is joined to its line."""
+    low, high = axes.get_ylim()
+    least = 1.3 * size / _POINTS / (axes.bbox.height / axes.figure.dpi)
+    places = spread((np.asarray(heights, dtype=float) - low) / (high - low), least)
+    for height, place, text in zip(heights, places, texts, strict=True):
+        leader = {"arrowstyle": "-", "color": FAINT, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate(
+            text, (1.0, height), (1.035, place), axes.get_yaxis_transform(), "axes fraction", size=size, color=INK,
+            va="center", ha="left", annotation_clip=False, arrowprops=leader,
+        )  # fmt: skip
+
+
+def in_thousands(largest: float, unit: str) -> tuple[float, str]:
+    """What numbers up to this size are multiplied by, and the unit that they then have: kN from 10 000 N on."""
+    return (1e-3, f"k{unit}") if abs(largest) >= LARGE else (1.0, unit)
+
+
+def empty(axes: Axes, words: str) -> None:
+    """A panel with nothing in it says why."""
+    axes.set_yticks([])
+    axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", color=FAINT, size=SMALL)
+
+
+def rows_of(count: int, most: int) -> int:
+    """Side by side in as few rows as hold at most so many each, all about as long: 8 of at most 6 are 4 and 4."""
+    return math.ceil(count / math.ceil(count / most)) if count else 1
+
+
+class PlainNumbers(ScalarFormatter):
+    """Numbers of an axis in full, thousands apart from 10 000 on, as SI writes them."""
+
+    def __init__(self) -> None:
+        super().__init__(useOffset=False, useMathText=False)
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The text of a tick."""
+        return grouped(str(super().__call__(x, pos)))
+
+
+def grouped(number: str) -> str:
+    """A number with its thousands apart where it has five digits or more before the point."""
+    whole, point, rest = number.partition(".")
+    digits = whole.lstrip("-−")
+    if not digits.isdecimal() or len(digits) < 5:
+        return number
+    return whole[: len(whole) - len(digits)] + f"{int(digits):,}".replace(",", THIN_SPACE) + point + rest
+
+
+def round_ticks(axis: Axis, most: int = 6, **more: Any) -> None:
+    """Ticks at steps of 1, 2 or 5, their numbers in full."""
+    axis.set_major_locator(MaxNLocator(most, steps=_ROUND, **more))
+    axis.set_major_formatter(PlainNumbers())
