@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import blamed_on, measured
+from laufruhe.files.complaints import Refused, all_different, blamed_on, measured
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Table
-from laufruhe.machine import PressureTrace
-from laufruhe.machine.gas import GasModel, Seiliger, Wiebe
+from laufruhe.machine import (
+    Chamber,
+    Chambers,
+    Cycle,
+    GasModel,
+    PressureTrace,
+    Pump,
+    Seiliger,
+    SliderCrank,
+    Steam,
+    Wiebe,
+)
+from laufruhe.machine.gas import AMBIENT_PRESSURE
 
 
 class ChargeTable(Table):
@@ -58,24 +71,116 @@ class TraceTable(Table):
     crankcase_pressure: f.PositivePressure | None = None
 
 
-GasTable: TypeAlias = Annotated[SeiligerTable | WiebeTable | TraceTable, Field(discriminator="model")]
+class SteamTable(Table):
+    """An indicator diagram of straight lines and hyperbolas, its points parts of the stroke."""
+
+    makes: ClassVar = Steam
+    admission: f.PositivePressure
+    back_pressure: f.PositivePressure
+    cut_off: f.Part = Field(description="Where admission ends, from the dead centre.")
+    release: f.Part = f.told("Where the outlet opens.", 1.0)
+    compression: f.Part = f.told("Where the outlet closes on the way back, from the dead centre.", 0.0)
+    lead: f.Part = f.told("Where fresh steam enters on the way back.", 0.0)
+    clearance: f.NonNegative = f.told("Volume left at the dead centre, over that of the stroke.", 0.05)
+    exponent: f.Positive = f.told("Of expansion and compression; 1, a hyperbola, unless told.", 1.0)
 
 
-def gas_of(table: GasTable | None, folder: Path) -> GasModel | None:
+class PumpTable(Table):
+    """A piston pump."""
+
+    makes: ClassVar = Pump
+    suction: f.PositivePressure
+    delivery: f.PositivePressure
+
+
+class SideTraceTable(Table):
+    """A measured trace of one side: crank angle from where its chamber is smallest, and absolute pressure."""
+
+    file: str
+    pressure_unit: str = "bar"
+    angle_unit: str = "deg"
+
+
+class ChamberTable(Table):
+    """A space on one side of a piston, or of a further piston on the same rod."""
+
+    name: f.Name | None = None
+    cylinders: list[f.CylinderNumber] | None = f.told("Whose rods carry such a piston; all where left out.")
+    end: Literal["head", "crank"] = Field(description="head drives the piston towards the crank, crank away from it.")
+    bore: f.PositiveLength
+    rod: f.NonNegativeLength = f.told("Diameter of the piston rod where it passes through this end.", 0.0)
+    steam: SteamTable | None = None
+    pump: PumpTable | None = None
+    trace: SideTraceTable | None = None
+
+
+class ChambersTable(Table):
+    """Chambers on both sides of the pistons: steam engines, pumps, and both on one rod."""
+
+    model: Literal["chambers"]
+    crankcase_pressure: f.PositivePressure | None = f.told("Of the air around.")
+    chambers: Annotated[list[ChamberTable], Field(min_length=1, max_length=100)]
+
+
+GasTable: TypeAlias = Annotated[SeiligerTable | WiebeTable | TraceTable | ChambersTable, Field(discriminator="model")]
+
+
+def needs_bore(table: GasTable | None) -> bool:
+    """Whether the gas acts on the bore of [engine]; chambers have their own."""
+    return table is not None and not isinstance(table, ChambersTable)
+
+
+def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]) -> GasModel | None:
     """The working gas, a trace's file beside the problem file in `folder`."""
     if table is None:
         return None
+    air = AMBIENT_PRESSURE if table.crankcase_pressure is None else table.crankcase_pressure
     with blamed_on("gas"):
+        if isinstance(table, ChambersTable):
+            return Chambers(_chambers(table, folder, cycle, parts), air)
         if isinstance(table, TraceTable):
-            return _trace(table, folder)
+            return replace(_trace(table, folder, "gas"), crankcase_pressure=air)
         made: GasModel = table.makes(**table.model_dump(exclude={"model"}, exclude_none=True))
         return made
 
 
-def _trace(table: TraceTable, folder: Path) -> PressureTrace:
+def _chambers(
+    table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]
+) -> tuple[Chamber, ...]:  # fmt: skip
+    if cycle is not Cycle.TWO_STROKE:
+        raise Refused("engine.cycle", str(cycle), "has chambers that work once a turn", 'write "two-stroke"')
+    if any(one.faces(other) for one in parts for other in parts):
+        rule = "has pistons that share a chamber, and chambers here are between a piston and a cylinder head"
+        raise Refused("engine.layout", None, rule, "list the pistons on cylinders of their own, or leave gas out")
+    found = tuple(_chamber(own, k, folder, parts) for k, own in enumerate(table.chambers))
+    all_different([chamber.name for chamber in found], "gas.chambers", "chambers have one name")
+    return found
+
+
+def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCrank]) -> Chamber:
+    where = f"gas.chambers[{k + 1}]"
+    given = {key: own for key in ("steam", "pump", "trace") if (own := getattr(table, key)) is not None}
+    if len(given) != 1:
+        rule = "says nothing of its pressure" if not given else f"is said to be {' and '.join(given)}"
+        raise Refused(where, None, rule, "give one of steam, pump and trace")
+    ((key, diagram),) = given.items()
+    numbers = table.cylinders if table.cylinders is not None else range(1, len(parts) + 1)
+    for number in numbers:
+        if number > len(parts):
+            rule = f"is none of {len(parts)} cylinder(s)"
+            raise Refused(f"{where}.cylinders", str(number), rule, "count them from 1")
+    with blamed_on(f"{where}.{key}"):
+        made = (
+            _trace(diagram, folder, f"{where}.trace") if key == "trace" else diagram.makes(**diagram.model_dump())
+        )  # fmt: skip
+    names = tuple(parts[number - 1].name for number in numbers)
+    with blamed_on(f"{where}.rod"):
+        return Chamber(table.name or f"chamber {k + 1}", names, table.end, table.bore, table.rod, made)
+
+
+def _trace(table: TraceTable | SideTraceTable, folder: Path, key: str) -> PressureTrace:
     """Crank angles and absolute pressures of a CSV file."""
-    angle = measured(f"1 {table.angle_unit}", "rad", "gas.angle_unit", table.angle_unit)
-    pressure = measured(f"1 {table.pressure_unit}", "Pa", "gas.pressure_unit", table.pressure_unit)
-    pairs = rows_of(table.file, folder / table.file, "gas.file", ("crank angle", "pressure"))
-    extra = {} if table.crankcase_pressure is None else {"crankcase_pressure": table.crankcase_pressure}
-    return PressureTrace(tuple(a * angle for a, _ in pairs), tuple(p * pressure for _, p in pairs), **extra)
+    angle = measured(f"1 {table.angle_unit}", "rad", f"{key}.angle_unit", table.angle_unit)
+    pressure = measured(f"1 {table.pressure_unit}", "Pa", f"{key}.pressure_unit", table.pressure_unit)
+    pairs = rows_of(table.file, folder / table.file, f"{key}.file", ("crank angle", "pressure"))
+    return PressureTrace(tuple(a * angle for a, _ in pairs), tuple(p * pressure for _, p in pairs))

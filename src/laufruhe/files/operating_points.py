@@ -14,8 +14,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, all_different, one_of
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.friction import Brake
-from laufruhe.machine import Cycle, OperatingPoint, PressureTrace
-from laufruhe.machine.gas import GasModel
+from laufruhe.machine import Cycle, GasModel, OperatingPoint, Seiliger, Wiebe
 from laufruhe.physics.seiliger_cycle import motored_cycle
 
 MOST_POINTS = 200
@@ -105,7 +104,7 @@ def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, wher
         return None
     if not table.motored and table.imep is None:
         return gas
-    if gas is None or isinstance(gas, PressureTrace):
+    if not isinstance(gas, Seiliger | Wiebe):
         key = "motored" if table.motored else "imep"
         raise Refused(f"{where}.{key}", None, "needs [gas] with model seiliger or wiebe", "give that, or leave it out")
     return motored_cycle(gas, cycle) if table.imep is None else replace(gas, imep=table.imep)

@@ -27,7 +27,7 @@ from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import check_told_alike, flywheel_of
 from laufruhe.files.friction import Brake
-from laufruhe.files.gas import gas_of
+from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.mounts import mounts_of, run_of
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
@@ -247,7 +247,7 @@ def _refused(path: Path, where: str, rule: str, remedy: str) -> InputError:
 def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False, *, path: Path) -> Problem:
     """The problem of a file whose [engine] has this table in its place."""
     told = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
-    cylinders, throws = moving_parts(table, gas=file.gas is not None and any(point.gas for point in told))
+    cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and any(point.gas for point in told))
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
@@ -257,7 +257,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
     chain, of_chain = torsion_of(file.torsion, cylinders, throws)
     brake = _brake(file, cylinders, cycle, path.parent)
-    points = operating_points(told, gas_of(file.gas, path.parent), cycle, table.stroke, brake)
+    points = operating_points(told, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
     run = run_of(file.run_up, found.block, [point.name for point in points])
     engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run)
     check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))

@@ -16,6 +16,7 @@ import numpy as np
 from laufruhe.load_models.lines import Lines, turned
 from laufruhe.machine import GasModel, OperatingPoint, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.gas_cycle import alike_under
 from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.problem.problem import Problem
 
@@ -63,7 +64,7 @@ class GasMoments:
     def _series(self, gas: GasModel, k: int) -> Spectrum:
         """Of one cylinder, the orders that matter."""
         parts, fidelity = self._problem.engine.slider_cranks, self._problem.fidelity
-        alike = next(j for j, other in enumerate(parts) if _mechanism(other) == _mechanism(parts[k]))
+        alike = next(j for j, other in enumerate(parts) if alike_under(gas, other) == alike_under(gas, parts[k]))
         if (gas, alike) not in self._kept:
             whole = fidelity.kept(gas_coefficients(gas, parts[alike], self._problem.engine.cycle, fidelity))
             self._kept[gas, alike] = _felt(whole, lambda _: 1.0, self._left_out)
@@ -75,10 +76,6 @@ def _felt(series: Spectrum, gain: Callable[[float], float], left_out: float) -> 
     sizes = np.abs(series.coefficients) * [gain(float(h)) for h in series.orders]
     tail = np.sqrt(np.cumsum(sizes[::-1] ** 2)[::-1])
     return Spectrum(series.base, series.coefficients[: max(int((tail > left_out * tail[0]).sum()), 1)])
-
-
-def _mechanism(part: SliderCrank) -> tuple[object, ...]:
-    return part.crank_radius, part.rod_length, part.offset, part.bore
 
 
 def _turns(part: SliderCrank) -> int:

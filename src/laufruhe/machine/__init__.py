@@ -2,9 +2,10 @@
 
 from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block
+from laufruhe.machine.chambers import Chamber, Chambers, GasModel, Pump, Steam
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.flywheel import Arms, Flywheel, Rim
-from laufruhe.machine.gas import Charge, GasModel, PressureTrace, Seiliger, Wiebe
+from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, Wiebe
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.run import Run
@@ -17,6 +18,8 @@ __all__ = [
     "Arms",
     "Bearing",
     "Block",
+    "Chamber",
+    "Chambers",
     "Charge",
     "Cycle",
     "Disc",
@@ -26,6 +29,7 @@ __all__ = [
     "Mount",
     "OperatingPoint",
     "PressureTrace",
+    "Pump",
     "Rim",
     "Rod",
     "Role",
@@ -35,6 +39,7 @@ __all__ = [
     "Seiliger",
     "Shaft",
     "SliderCrank",
+    "Steam",
     "Torsion",
     "Wiebe",
 ]

@@ -11,8 +11,8 @@ from fractions import Fraction
 from laufruhe.errors import ModelError
 from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block
+from laufruhe.machine.chambers import GasModel
 from laufruhe.machine.flywheel import Flywheel
-from laufruhe.machine.gas import GasModel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
 from laufruhe.machine.run import Run

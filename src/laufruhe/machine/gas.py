@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from laufruhe.errors import ModelError
 
@@ -199,9 +198,6 @@ class PressureTrace:
                 f"{where} has the pressure {pressure * 1e-5:g} bar, which must be positive and finite; "
                 "give absolute pressures"
             )
-
-
-GasModel: TypeAlias = Seiliger | Wiebe | PressureTrace
 
 
 def _check_pressures(gas: Charge | PressureTrace, *names: str) -> None:

@@ -27,7 +27,7 @@ from laufruhe.machine import Bearing, Cycle, Engine, GasModel, OperatingPoint, R
 from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
 from laufruhe.numerics.turns import as_turn, cis, star_sum
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import pressure_at, pressure_breaks
+from laufruhe.physics.gas_cycle import pressure_breaks, thrust_at
 from laufruhe.physics.mechanism import resolved_orders
 from laufruhe.physics.shaking_loads import order_index, rotor_loads, rotor_wrench, spread
 
@@ -261,7 +261,7 @@ def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fideli
 
     def loads(angles: Array) -> Array:
         alpha = part.fires_at + part.shaft.ratio * angles
-        along = -part.piston_area * (pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure)
+        along = thrust_at(gas, part, cycle, angles)
         return np.stack([along, -along * _tangent(part, alpha)], axis=1)
 
     from_firing = bent_spectrum(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))

@@ -24,7 +24,7 @@ from laufruhe.machine import Charge, Cycle, SliderCrank
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-_JUMP_WIDTH = 1e-11
+JUMP_WIDTH = 1e-11
 
 
 def swept_volume(part: SliderCrank, angles: FloatArray) -> FloatArray:
@@ -102,8 +102,8 @@ class ChargedCylinder:
 
     def pressure(self, closed: Callable[[FloatArray], FloatArray], angles: FloatArray) -> FloatArray:
         """Pressure over the cycle from that of the closed period, the mean of both sides at a jump [Pa]."""
-        before = self._one_sided(closed, angles - _JUMP_WIDTH)
-        after = self._one_sided(closed, angles + _JUMP_WIDTH)
+        before = self._one_sided(closed, angles - JUMP_WIDTH)
+        after = self._one_sided(closed, angles + JUMP_WIDTH)
         return 0.5 * (before + after)
 
     def _one_sided(self, closed: Callable[[FloatArray], FloatArray], angles: FloatArray) -> FloatArray:

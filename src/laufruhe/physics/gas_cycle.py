@@ -7,18 +7,23 @@ four-stroke cycle includes its gas exchange.
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Cycle, GasModel, PressureTrace, Seiliger, SliderCrank
+from laufruhe.machine import Chambers, Cycle, GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.physics.cylinder_volume import dead_centres
 from laufruhe.physics.pressure_trace import trace_pressure
 from laufruhe.physics.seiliger_cycle import cut_off_angle, seiliger_pressure
 from laufruhe.physics.wiebe_cycle import wiebe_pressure
+from laufruhe.physics.working_chambers import chambers_breaks, chambers_thrust
+
+OneChamber: TypeAlias = Seiliger | Wiebe | PressureTrace
 
 
-def cylinder_pressure(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:
+def cylinder_pressure(gas: OneChamber, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:
     """Absolute cylinder pressure [Pa] at equal steps of the crank angle from the firing dead centre, shape (samples,).
 
     Raises
@@ -29,7 +34,7 @@ def cylinder_pressure(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: i
     return pressure_at(gas, part, cycle, cycle.angle * np.arange(samples) / samples)
 
 
-def pressure_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """As `cylinder_pressure`, at any crank angles from the firing dead centre [rad], shape of `angles`."""
     if isinstance(gas, PressureTrace):
         return trace_pressure(gas, cycle, angles)
@@ -38,11 +43,25 @@ def pressure_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[
     return wiebe_pressure(gas, part, cycle, angles)
 
 
+def thrust_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Force of the gas on a piston rod, along the axis and away from the crank [N], as `pressure_at` (B1, G14)."""
+    if isinstance(gas, Chambers):
+        return chambers_thrust(gas, part, angles)
+    return np.asarray(-part.piston_area * (pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure))
+
+
+def alike_under(gas: GasModel, part: SliderCrank) -> Hashable:
+    """Equal where the gas drives two cylinders alike, each from its own dead centre."""
+    return part.path, tuple(chamber.drive for chamber in gas.of(part)) if isinstance(gas, Chambers) else part.bore
+
+
 def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:
     """Angles from the firing dead centre at which a derivative of the pressure jumps [rad] (G13).
 
     Ends of strokes, where valves open and heat comes at once; cut-off; begin and end of a burn; points of a trace.
     """
+    if isinstance(gas, Chambers):
+        return chambers_breaks(gas, part)
     if isinstance(gas, PressureTrace):
         return np.array(gas.angles)
     top, bottom = dead_centres(part)

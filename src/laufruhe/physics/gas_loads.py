@@ -15,7 +15,7 @@ from laufruhe.numerics.corners import joined
 from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
 from laufruhe.numerics.turns import Turn, as_turn, star_sum
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import pressure_at, pressure_breaks
+from laufruhe.physics.gas_cycle import alike_under, pressure_breaks, thrust_at
 from laufruhe.physics.wrench import ROLL
 
 
@@ -25,7 +25,7 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
     # equal mechanisms differ only in when they fire
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
     for part in engine.slider_cranks:
-        alike[part.path, part.bore, part.shaft.ratio].append(part)
+        alike[alike_under(gas, part), part.shaft.ratio].append(part)
     total = Spectrum(engine.cycle.base_order, np.zeros((1, 6), dtype=complex))
     for parts in alike.values():
         torque = gas_coefficients(gas, parts[0], engine.cycle, fidelity)
@@ -63,7 +63,7 @@ def _one_cylinder(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) 
 
 
 def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:
-    """Torque of one cylinder's gas on the engine's output, -n A (p - p_crankcase) ds/dalpha (L5).
+    """Torque of one cylinder's gas on the engine's output, n P ds/dalpha, P = -A (p - p_crankcase) (L5).
 
     Returns
     -------
@@ -74,6 +74,5 @@ def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> 
 
 def _torque_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """As `gas_torque`, at any crank angles from the firing dead centre [rad]."""
-    pressure = pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure
     alpha = part.fires_at + part.shaft.ratio * angles
-    return np.asarray(-part.shaft.ratio * part.piston_area * pressure * part.velocity(np, alpha))
+    return np.asarray(part.shaft.ratio * thrust_at(gas, part, cycle, angles) * part.velocity(np, alpha))

@@ -7,6 +7,7 @@ PICTURES = {
     "polar": "Force of the engine on each mount over one cycle, drawn as the path of its tip.",
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
+    "indicator": "Indicator diagrams of steam cylinders and pumps, and the force on each rod over its stroke.",
     "torque": "Torque of gas, pistons and rods, its work and its orders, and the speed that a flywheel makes of it.",
     "bearings": "Force on each main bearing over a cycle, as block and crankshaft feel it, and where they wear.",
     "twist_modes": "How the crankshaft swings in its natural modes, and the speeds at which orders meet them.",

@@ -1,0 +1,205 @@
+"""Working chambers on the two sides of a piston, and on further pistons of the same rod: steam, pumps, traces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.gas import AMBIENT_PRESSURE, PressureTrace, Seiliger, Wiebe
+from laufruhe.machine.slider_crank import SliderCrank
+
+ENDS: Mapping[str, int] = {"head": 1, "crank": -1}
+"""Ends of a cylinder, and which way the pressure there drives the piston: 1 towards the crank."""
+
+
+@dataclass(frozen=True)
+class Steam:
+    """An indicator diagram of straight lines and hyperbolas (G15; Roetscher, Fig. 1051).
+
+    Points are parts of the stroke from the dead centre at which this chamber is smallest.
+
+    Attributes
+    ----------
+    admission, back_pressure
+        Absolute [Pa].
+    cut_off
+        Where admission ends.
+    release
+        Where the outlet opens; from there the pressure falls evenly to the dead centre.
+    compression
+        Where the outlet closes on the way back.
+    lead
+        Where fresh steam enters on the way back; from there the pressure rises evenly to the dead centre.
+    clearance
+        Volume that is left at the dead centre, over that of the stroke.
+    exponent
+        Of expansion and compression; 1 is a hyperbola.
+
+    Raises
+    ------
+    ModelError
+        If points are out of order, or nothing is left to be compressed into.
+    """
+
+    admission: float
+    back_pressure: float
+    cut_off: float
+    release: float = 1.0
+    compression: float = 0.0
+    lead: float = 0.0
+    clearance: float = 0.05
+    exponent: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("admission", "back_pressure"):
+            _check_pressure(name, getattr(self, name))
+        if not 0.0 <= self.cut_off <= self.release <= 1.0:
+            raise ModelError(
+                f"cut_off {self.cut_off:g} and release {self.release:g} are out of order; on the way out steam is cut "
+                "off, expands, and is released, each a part of the stroke from 0 to 1"
+            )
+        if not 0.0 <= self.lead <= self.compression <= 1.0:
+            raise ModelError(
+                f"compression {self.compression:g} and lead {self.lead:g} are out of order; on the way back the outlet "
+                "closes before fresh steam enters, each a part of the stroke from 1 to 0"
+            )
+        if not 0.0 <= self.clearance < math.inf:
+            raise ModelError(f"clearance {self.clearance:g} must not be negative; give a part of the stroke volume")
+        if not 0.0 < self.exponent <= 5.0:
+            raise ModelError(f"exponent {self.exponent:g} must be over 0 and at most 5; 1 is a hyperbola")
+        for name, begin, end in (("cut_off", self.cut_off, self.release), ("lead", self.lead, self.compression)):
+            if begin + self.clearance == 0.0 and begin < end:
+                raise ModelError(f"the chamber vanishes at the dead centre; give a clearance, or {name} more than 0")
+
+    @property
+    def turning_points(self) -> tuple[tuple[float, bool], ...]:
+        """Where the diagram bends: part of the stroke, and whether on the way out."""
+        return (self.cut_off, True), (self.release, True), (self.compression, False), (self.lead, False)
+
+    @property
+    def mean_pressure(self) -> float:
+        """Area of the diagram over its length [Pa], in closed form (G16)."""
+        released = self.admission * self._fallen(self.cut_off, self.release)
+        squeezed = self.back_pressure * self._fallen(self.compression, self.lead)
+        out = self.admission * (self.cut_off + self._work(self.cut_off, self.release))
+        out += 0.5 * (released + self.back_pressure) * (1.0 - self.release)
+        back = self.back_pressure * (1.0 - self.compression - self._work(self.compression, self.lead))
+        return out - back - 0.5 * (squeezed + self.admission) * self.lead
+
+    def _fallen(self, begin: float, end: float) -> float:
+        return ((begin + self.clearance) / (end + self.clearance)) ** self.exponent if begin != end else 1.0
+
+    def _work(self, begin: float, end: float) -> float:
+        """Integral of ((begin + c) / (x + c))^n from begin to end."""
+        if begin == end:
+            return 0.0
+        first, log = begin + self.clearance, math.log((end + self.clearance) / (begin + self.clearance))
+        power = self.exponent - 1.0
+        return first * (-math.expm1(-power * log) / power if power else log)
+
+
+@dataclass(frozen=True)
+class Pump:
+    """A piston pump: one pressure while its chamber grows, another while it shrinks (G17; Roetscher, Fig. 1053).
+
+    Attributes
+    ----------
+    suction, delivery
+        Absolute [Pa].
+    """
+
+    suction: float
+    delivery: float
+    turning_points: ClassVar[tuple[tuple[float, bool], ...]] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("suction", "delivery"):
+            _check_pressure(name, getattr(self, name))
+
+    @property
+    def mean_pressure(self) -> float:
+        """Area of the diagram over its length [Pa]; negative, a pump takes work."""
+        return self.suction - self.delivery
+
+
+Diagram: TypeAlias = Steam | Pump | PressureTrace
+
+
+@dataclass(frozen=True)
+class Chamber:
+    """A space that a piston makes larger and smaller once a turn.
+
+    Attributes
+    ----------
+    cylinders
+        Names of the slider-cranks whose rods carry such a piston.
+    end
+        "head" presses the piston towards the crank, "crank" away from it.
+    bore, rod
+        Diameters of the piston, and of the piston rod where it passes through this end [m].
+    """
+
+    name: str
+    cylinders: tuple[str, ...]
+    end: str
+    bore: float
+    rod: float
+    diagram: Diagram
+
+    def __post_init__(self) -> None:
+        if self.end not in ENDS:
+            raise ModelError(f"{self.name}: end '{self.end}' must be {' or '.join(ENDS)}")
+        if not 0.0 <= self.rod < self.bore:
+            raise ModelError(
+                f"{self.name}: the chamber vanishes, its rod of {1e3 * self.rod:g} mm fills the bore of "
+                f"{1e3 * self.bore:g} mm; give a thinner rod"
+            )
+
+    @property
+    def area(self) -> float:
+        """That the pressure acts on [m2], F' or F'' of eq. 296."""
+        return math.pi / 4.0 * (self.bore - self.rod) * (self.bore + self.rod)
+
+    @property
+    def drive(self) -> Hashable:
+        """What it does to a piston, whatever it is called and whichever cylinders have it."""
+        return self.end, self.bore, self.rod, self.diagram
+
+    @property
+    def side(self) -> int:
+        """1 where pressure drives the piston towards the crank, else -1."""
+        return ENDS[self.end]
+
+
+@dataclass(frozen=True)
+class Chambers:
+    """All working chambers of a machine.
+
+    Attributes
+    ----------
+    crankcase_pressure
+        Of the air around, on the ends of the piston rods [Pa].
+    """
+
+    chambers: tuple[Chamber, ...]
+    crankcase_pressure: float = AMBIENT_PRESSURE
+
+    def __post_init__(self) -> None:
+        _check_pressure("crankcase_pressure", self.crankcase_pressure)
+        if not self.chambers:
+            raise ModelError("there is no chamber; list one at least")
+
+    def of(self, part: SliderCrank) -> tuple[Chamber, ...]:
+        """Chambers whose pistons are on the rod of a slider-crank."""
+        return tuple(chamber for chamber in self.chambers if part.name in chamber.cylinders)
+
+
+GasModel: TypeAlias = Seiliger | Wiebe | PressureTrace | Chambers
+
+
+def _check_pressure(name: str, pressure: float) -> None:
+    if not 0.0 < pressure < math.inf:
+        raise ModelError(f"{name} {pressure * 1e-5:g} bar must be positive and finite; give an absolute pressure")

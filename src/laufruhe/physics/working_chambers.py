@@ -1,0 +1,123 @@
+"""Forces of steam, pumps and traces on both sides of pistons, all on one rod (G14-G17).
+
+A diagram is over the piston's travel x from the dead centre at which its chamber is smallest, once on
+the way out and once on the way back; what its pressure is over that of the air around drives the rod.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Chamber, Chambers, Cycle, PressureTrace, Pump, SliderCrank, Steam
+from laufruhe.numerics.roots import rising_root
+from laufruhe.physics.cylinder_volume import JUMP_WIDTH, dead_centres, swept_volume
+from laufruhe.physics.pressure_trace import trace_pressure
+
+FloatArray = NDArray[np.float64]
+
+
+def chambers_thrust(gas: Chambers, part: SliderCrank, angles: FloatArray) -> FloatArray:
+    """P = -sum of +-F (p - p_0) along the axis of a cylinder, away from the crank [N] (G14; eq. 296).
+
+    Parameters
+    ----------
+    angles
+        Crank angles from the dead centre of the cylinder [rad].
+    """
+    total = np.zeros(np.shape(angles))
+    for chamber in gas.of(part):
+        total -= chamber.side * chamber.area * (chamber_pressure(chamber, part, angles) - gas.crankcase_pressure)
+    return total
+
+
+def chambers_breaks(gas: Chambers, part: SliderCrank) -> FloatArray:
+    """Angles from the dead centre of the cylinder at which a derivative of a pressure jumps [rad]."""
+    return np.array(sorted({angle for chamber in gas.of(part) for angle in _breaks(chamber, part)}))
+
+
+def chamber_pressure(chamber: Chamber, part: SliderCrank, angles: FloatArray) -> FloatArray:
+    """Absolute pressure [Pa], the mean of both sides at a jump, shape of `angles`."""
+
+    def at(own: FloatArray) -> FloatArray:
+        smallest, largest = _ends(chamber, part)
+        local = np.mod(own - smallest, math.tau)
+        pressures = PRESSURES[type(chamber.diagram)]
+        return pressures(chamber.diagram, chamber_travel(chamber, part, own), local < largest - smallest, local)
+
+    return 0.5 * (at(angles - JUMP_WIDTH) + at(angles + JUMP_WIDTH))
+
+
+def chamber_travel(chamber: Chamber, part: SliderCrank, angles: FloatArray) -> FloatArray:
+    """Part of the stroke from where a chamber is smallest, 0 to 1."""
+    swept = np.clip(swept_volume(part, angles), 0.0, 1.0)
+    return swept if chamber.side > 0 else 1.0 - swept
+
+
+def _ends(chamber: Chamber, part: SliderCrank) -> tuple[float, float]:
+    """Angles at which a chamber is smallest, and largest after it."""
+    top, bottom = dead_centres(part)
+    return (top, bottom) if chamber.side > 0 else (bottom, top + math.tau)
+
+
+def _breaks(chamber: Chamber, part: SliderCrank) -> list[float]:
+    smallest, largest = _ends(chamber, part)
+    if isinstance(chamber.diagram, PressureTrace):
+        return [smallest + angle for angle in chamber.diagram.angles]
+    ends = {True: (smallest, largest), False: (smallest + math.tau, largest)}
+
+    def meets(place: float, out: bool) -> float:
+        begin, end = ends[out]
+
+        def beyond(share: float) -> float:
+            angle = np.array([begin + share * (end - begin)])
+            return float(chamber_travel(chamber, part, angle)[0]) - place
+
+        return begin + rising_root(beyond, 0.0, 1.0) * (end - begin)
+
+    turning = [meets(place, out) for place, out in chamber.diagram.turning_points if 0.0 < place < 1.0]
+    return [smallest, largest, *turning]
+
+
+def _steam(diagram: Steam, travel: FloatArray, out: NDArray[np.bool_], _: FloatArray) -> FloatArray:
+    """Admission, expansion and release on the way out, exhaust, compression and lead on the way back (G15)."""
+    released = _expanded(diagram, diagram.admission, diagram.cut_off, np.asarray(diagram.release))
+    squeezed = _expanded(diagram, diagram.back_pressure, diagram.compression, np.asarray(diagram.lead))
+    way = (travel - diagram.release) / (1.0 - diagram.release if diagram.release < 1.0 else 1.0)
+    falling = released + np.maximum(way, 0.0) * (diagram.back_pressure - released)
+    opening = 1.0 - travel / (diagram.lead if diagram.lead > 0.0 else 1.0)
+    rising = squeezed + np.maximum(opening, 0.0) * (diagram.admission - squeezed)
+    behind_cut_off = np.clip(travel, diagram.cut_off, diagram.release)
+    expanding = _expanded(diagram, diagram.admission, diagram.cut_off, behind_cut_off)
+    closed = np.clip(travel, diagram.lead, diagram.compression)
+    squeezing = _expanded(diagram, diagram.back_pressure, diagram.compression, closed)
+    on_way_out = np.where(travel <= diagram.release, expanding, falling)
+    return np.where(out, on_way_out, np.where(travel >= diagram.lead, squeezing, rising))
+
+
+def _expanded(diagram: Steam, pressure: float, begin: float, end: FloatArray) -> FloatArray:
+    """p ((begin + c) / (end + c))^n, with nothing to expand the pressure itself."""
+    volume = end + diagram.clearance
+    shrinking = np.where(volume > 0.0, (begin + diagram.clearance) / np.where(volume > 0.0, volume, 1.0), 1.0)
+    return np.asarray(pressure * shrinking**diagram.exponent)
+
+
+def _pump(diagram: Pump, _: FloatArray, out: NDArray[np.bool_], __: FloatArray) -> FloatArray:
+    """Suction while the chamber grows, delivery while it shrinks (G17)."""
+    return np.where(out, diagram.suction, diagram.delivery)
+
+
+def _trace(diagram: PressureTrace, _: FloatArray, __: NDArray[np.bool_], local: FloatArray) -> FloatArray:
+    """A measured trace of one side, over the crank angle from where its chamber is smallest (G12)."""
+    return trace_pressure(diagram, Cycle.TWO_STROKE, local)
+
+
+PRESSURES: Mapping[type, Callable[[Any, FloatArray, NDArray[np.bool_], FloatArray], FloatArray]] = {
+    Steam: _steam,
+    Pump: _pump,
+    PressureTrace: _trace,
+}
