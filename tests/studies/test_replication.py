@@ -29,7 +29,7 @@ READY = {
     "replication-three-mounts": (12, []),
     "replication-crank-pin": (8, ["Gas force (first line)"]),
     "replication-worked-diesel": (
-        13,
+        20,
         [
             "Piston area (A3)",
             "A2 of the mean pressure of 4 at (G b5)",

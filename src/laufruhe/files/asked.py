@@ -41,6 +41,7 @@ _PLACES = {
     "bearings": "main bearing",
     "cylinders": "cylinder",
     "sections": "shaft section",
+    "webs": "web",
 }
 _KEYS = ("operating_points", "orders", *_PLACES, "direction_weights", "motions", "frequency", "of")
 _ROUNDING = 1e-9
@@ -54,6 +55,7 @@ class QuantityTable(Table):
     bearings: list[str] | None = None
     cylinders: list[str] | None = None
     sections: list[str] | None = f.told("Of the crankshaft, named after the discs that they join.")
+    webs: list[str] | None = f.told("And journals beside them: cylinder 1 front, cylinder 1 rear ...")
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     direction_weights: f.Three[f.NonNegative] | None = None

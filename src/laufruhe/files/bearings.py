@@ -9,7 +9,7 @@ from pydantic import Field
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest
-from laufruhe.files.fields import Name, Table
+from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Bearing, Shaft, SliderCrank
 
 
@@ -19,8 +19,8 @@ class MainBearingTable(Table):
     x: f.Length
     name: Name | None = f.told("Its number from the front where left out.")
     shaft: str = CRANKSHAFT.name
-    diameter: f.PositiveLength | None = f.told("Of the journal; needed for a pressure, and for friction power.")
-    width: f.PositiveLength | None = Field(default=None, description="Of the journal; needed for a pressure.")
+    diameter: f.OpenPositiveLength | None = f.told("Of the journal; needed for a pressure, and for friction power.")
+    width: f.OpenPositiveLength | None = Field(default=None, description="Of the journal; needed for a pressure.")
     friction: f.NonNegative | None = f.told("Coefficient of friction; needed for friction power.")
 
 
@@ -35,8 +35,9 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
         if table.friction is not None and table.diameter is None:
             rule = "rubs on a journal whose diameter is missing"
             raise Refused(f"{where}.friction", table.friction, rule, "add diameter")
-        name, size = table.name or str(k + 1), (table.diameter, table.width)
-        bearing = Bearing(name, table.x, *size, table.friction, shafts[table.shaft])
+        name = table.name or str(k + 1)
+        size = [None if each is None else Open.of(each).start for each in (table.diameter, table.width)]
+        bearing = Bearing(name, table.x, size[0], size[1], table.friction, shafts[table.shaft])
         for other in found:
             _check_apart(bearing, other, where)
         if any(part.shaft == bearing.shaft and part.x == bearing.x for part in parts):

@@ -38,8 +38,13 @@ class RodTable(Table):
 class BigEndTable(Table):
     """The rod's bearing on the crank pin."""
 
-    diameter: f.PositiveLength
-    width: f.PositiveLength
+    diameter: f.OpenPositiveLength
+    width: f.OpenPositiveLength
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Diameter and width, where they start if they are open."""
+        return Open.of(self.diameter).start, Open.of(self.width).start
 
 
 class ShaftTable(Table):
@@ -104,7 +109,7 @@ class EngineTable(Table):
     bore: f.PositiveLength | None = f.told("Needed with gas.")
     stroke: f.PositiveLength
     rod_ratio: f.NonNegative | None = f.told("Crank radius over rod length; 0 is a Scotch yoke.")
-    rod_length: f.PositiveLength | None = None
+    rod_length: f.OpenPositiveLength | None = None
     offset: f.Length = f.told("Of the pin's path from the crank axis.", 0.0)
     reciprocating_mass: f.OpenMass = Field(
         description="Per cylinder, with the rod's share unless [engine.rod] is given."
@@ -241,7 +246,7 @@ def _mechanism(table: EngineTable) -> tuple[Mechanism, Rod | None]:
         rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit,
         offset=table.offset,
         bore=table.bore,
-        big_end=None if table.big_end is None else (table.big_end.diameter, table.big_end.width),
+        big_end=None if table.big_end is None else table.big_end.size,
     )
     return mechanism, rod
 
@@ -257,7 +262,7 @@ def _rod(table: EngineTable, length: float) -> Rod | None:
 
 def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
     """Crank radius and rod length [m] from stroke, offset and one of rod ratio and rod length."""
-    ratio, length = table.rod_ratio, table.rod_length
+    ratio, length = table.rod_ratio, None if table.rod_length is None else Open.of(table.rod_length).start
     one_of(table, "engine", "rod_ratio", "rod_length", shown=ratio)
     with blamed_on("engine.offset"):
         radius = radius_for_stroke(table.stroke, table.offset, rod_length=length, rod_ratio=ratio or 0.0)

@@ -257,6 +257,7 @@ TorsionalDampings: TypeAlias = Annotated[list[float], OneOrEach(TorsionalDamping
 Frequency: TypeAlias = Annotated[float, Number("Hz", above=0.0)]
 OpenLossFactor: TypeAlias = Annotated[float | Open, Number("", least=0.0, most=10.0, openable=True)]
 OpenPositiveLength: TypeAlias = Annotated[float | Open, Number("m", above=0.0, openable=True)]
+OpenNonNegativeLength: TypeAlias = Annotated[float | Open, Number("m", least=0.0, openable=True)]
 OpenLength: TypeAlias = Annotated[float | Open, Number("m", openable=True)]
 OpenStiffness: TypeAlias = Annotated[float | Open, Number("N/m", least=0.0, openable=True)]
 OpenDamping: TypeAlias = Annotated[float | Open, Number("N s/m", least=0.0, openable=True)]

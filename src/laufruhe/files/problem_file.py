@@ -22,6 +22,7 @@ from laufruhe.files.mounts import BlockTable, MountsTable, RunUpTable
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
+from laufruhe.files.running_gear import RunningGearTable
 from laufruhe.files.tolerances import RobustTable, TolerancesTable
 from laufruhe.files.torsion import TorsionTable
 
@@ -54,6 +55,7 @@ class ProblemFile(Table):
     block: BlockTable | None = None
     run_up: RunUpTable | None = None
     main_bearings: list[MainBearingTable] = Field(default_factory=list)
+    running_gear: RunningGearTable | None = None
     torsion: TorsionTable | None = None
     flywheel: FlywheelTable | None = None
     counterweights: list[CounterweightTable] = Field(default_factory=list)

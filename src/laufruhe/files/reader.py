@@ -33,6 +33,7 @@ from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
+from laufruhe.files.running_gear import size_decisions, weighed
 from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbers
 from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Cycle, Engine, SliderCrank
@@ -248,22 +249,26 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     """The problem of a file whose [engine] has this table in its place."""
     told = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
     cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and any(point.gas for point in told))
+    bearings = bearings_of(file.main_bearings, cylinders)
+    gear, cylinders, throws = weighed(file.running_gear, cylinders, throws, bearings)
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
     found = mounts_of(file.mounts, file.block)
     cycle = cycle_of(table)
-    bearings = bearings_of(file.main_bearings, cylinders)
     rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
     chain, of_chain = torsion_of(file.torsion, cylinders, throws)
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(told, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
     run = run_of(file.run_up, found.block, [point.name for point in points])
-    engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run)
+    engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run, gear)
+    of_sizes = size_decisions(file.running_gear, table, file.main_bearings, bearings)
+    if of_sizes and gear is not None and gear.density is not None:
+        _check_factors(file, "counts masses that follow from sizes, which are open")
     check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))
     scene, decisions = (
         Scene(engine, points),
-        (*_of_pistons(file, table, cylinders), *collected.decisions, *found.decisions, *of_wheel, *of_chain),
+        (*_of_pistons(file, table, cylinders), *collected.decisions, *found.decisions, *of_wheel, *of_chain, *of_sizes),
     )
     objective = objective_of(file.objective, scene)
     _check_decided(decisions)
@@ -292,18 +297,18 @@ def _of_pistons(file: ProblemFile, table: EngineTable, parts: Sequence[SliderCra
     mass = table.piston_mass
     if not mass.is_open:
         return []
-    factors = [k for k, weight in enumerate(file.counterweights, 1) if weight.factor_key is not None]
-    if factors:
-        rule, remedy = (
-            "counts the reciprocating mass, which is open",
-            "give the counterweights a mass, or fix the other",
-        )
-        raise Refused(
-            f"counterweights[{factors[0]}].{file.counterweights[factors[0] - 1].factor_key}", None, rule, remedy
-        )
+    _check_factors(file, "counts the reciprocating mass, which is open")
     own = [row.reciprocating_mass is None for row in table.slider_cranks] or [True] * len(parts)
     drives = tuple(MassDrive(part.name) for part, follows in zip(parts, own, strict=True) if follows)
     return [Decision("reciprocating mass", "kg", Interval(*mass.bounds), mass.start, drives)]
+
+
+def _check_factors(file: ProblemFile, rule: str) -> None:
+    """Refuse weights whose size follows from masses that are open."""
+    for k, weight in enumerate(file.counterweights, 1):
+        if weight.factor_key is not None:
+            remedy = "give the counterweights a mass, or fix the other"
+            raise Refused(f"counterweights[{k}].{weight.factor_key}", None, rule, remedy)
 
 
 def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:

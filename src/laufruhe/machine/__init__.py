@@ -9,6 +9,7 @@ from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, Wiebe
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.run import Run
+from laufruhe.machine.running_gear import Bolts, PistonPin, RunningGear, Shank, Webs
 from laufruhe.machine.slider_crank import Rod, SliderCrank
 from laufruhe.machine.torsion import Absorber, Disc, Section, Torsion
 
@@ -18,6 +19,7 @@ __all__ = [
     "Arms",
     "Bearing",
     "Block",
+    "Bolts",
     "Chamber",
     "Chambers",
     "Charge",
@@ -28,6 +30,7 @@ __all__ = [
     "GasModel",
     "Mount",
     "OperatingPoint",
+    "PistonPin",
     "PressureTrace",
     "Pump",
     "Rim",
@@ -35,11 +38,14 @@ __all__ = [
     "Role",
     "Rotor",
     "Run",
+    "RunningGear",
     "Section",
     "Seiliger",
     "Shaft",
+    "Shank",
     "SliderCrank",
     "Steam",
     "Torsion",
+    "Webs",
     "Wiebe",
 ]

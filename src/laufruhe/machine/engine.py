@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
 
@@ -16,6 +17,7 @@ from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
 from laufruhe.machine.run import Run
+from laufruhe.machine.running_gear import Moving, RunningGear, Size
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.machine.torsion import Torsion
 from laufruhe.numerics.spectrum import as_order
@@ -85,6 +87,8 @@ class Engine:
         What turns with the crank; None where nothing is asked of it.
     run
         How it is run up and shut down; None where nothing is said of that.
+    gear
+        Sizes of its running gear; None where nothing is asked of them.
     """
 
     name: str
@@ -97,6 +101,7 @@ class Engine:
     torsion: Torsion | None = None
     flywheel: Flywheel | None = None
     run: Run | None = None
+    gear: RunningGear | None = None
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "bearings"):
@@ -130,6 +135,18 @@ class Engine:
                 f"{part.name} fires at {math.degrees(part.firing_angle):g} deg, "
                 f"{math.degrees(math.remainder(crank_angle, math.tau)):g} deg from its dead centre"
             )
+
+    @property
+    def moving(self) -> Moving:
+        """What sizes move."""
+        return Moving(self.gear, self.slider_cranks, self.rotors, self.bearings)
+
+    def resized(self, sizes: Mapping[Size, float]) -> Engine:
+        """The engine with sizes in place of its own, and the masses of these."""
+        found = self.moving.resized(sizes)
+        return replace(
+            self, gear=found.gear, slider_cranks=found.parts, rotors=found.rotors, bearings=found.bearings
+        )  # fmt: skip
 
     @property
     def shafts(self) -> tuple[Shaft, ...]:

@@ -182,25 +182,22 @@ def beam_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
 SHARES = {"cut": lever_shares, "beam": beam_shares}
 
 
-def bearing_pressures(engine: Engine, forces: Spectrum) -> Spectrum:
-    """Force over projected area of every main bearing [Pa] (B5; textbook, example 3)."""
-    areas = np.array([bearing.area for bearing in engine.bearings])
-    return forces.each(lambda own: own / areas[:, None])
+def bearing_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """One over the projected area of every main bearing [1/m2] (B5; textbook, example 3)."""
+    return np.array([1.0 / bearing.area for bearing in engine.bearings])
 
 
-def crank_pin_pressures(engine: Engine, forces: Spectrum) -> Spectrum:
-    """Force over projected area of every rod's bearing on its pin [Pa] (B5; textbook, example 3)."""
-    areas = np.array([part.big_end_area for part in engine.slider_cranks])
-    return forces.each(lambda own: own / areas[:, None])
+def crank_pin_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """One over the projected area of every rod's bearing on its pin [1/m2] (B5; textbook, example 3)."""
+    return np.array([1.0 / part.big_end_area for part in engine.slider_cranks])
 
 
-def friction_loads(engine: Engine, point: OperatingPoint, forces: Spectrum) -> Spectrum:
-    """Force times coefficient of friction times speed of the journal of every main bearing [W] (B7).
+def drag_factors(engine: Engine, point: OperatingPoint) -> Array:
+    """Coefficient of friction times speed of the journal of every main bearing [m/s] (B7).
 
-    Its length is the power that turns to heat there.
+    Times the force it is the power that turns to heat there.
     """
-    drags = point.speed * np.array([bearing.drag for bearing in engine.bearings])
-    return forces.each(lambda own: own * drags[:, None])
+    return point.speed * np.array([bearing.drag for bearing in engine.bearings])
 
 
 def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:

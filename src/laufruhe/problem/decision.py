@@ -28,6 +28,7 @@ from laufruhe.problem.drives import (
     Numbers,
     PlaceDrive,
     RotorDrive,
+    SizeDrive,
     TorsionDrive,
     mount_of,
 )
@@ -50,6 +51,7 @@ __all__ = [
     "Numbers",
     "PlaceDrive",
     "RotorDrive",
+    "SizeDrive",
     "TorsionDrive",
     "domains_of",
     "mount_of",

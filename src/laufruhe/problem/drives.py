@@ -8,6 +8,7 @@ from enum import IntEnum
 from typing import Any, ClassVar, Protocol
 
 from laufruhe.machine import Engine, Mount
+from laufruhe.machine.running_gear import Size
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.reduced_inertia import turned_by
 from laufruhe.physics.rigid_body import turned_axes
@@ -35,6 +36,8 @@ class Kind(IntEnum):
     """Every load is affine in it, not so the inertia that turns."""
     TORSION = 8
     """Nothing but the twist of the crankshaft feels it."""
+    SIZE = 9
+    """Of the running gear: stresses fall with it, and masses follow (Z2)."""
 
 
 @dataclass
@@ -53,6 +56,8 @@ class Numbers:
         Inertia of the rest, mean diameter, width and height of a rim; changes of reciprocating masses by name [kg].
     torsion
         Of discs, sections and absorbers of the crankshaft, by their name and that of the number.
+    sizes
+        Changes of sizes of the running gear, by the same [m].
     """
 
     unbalances: dict[str, Any] = field(default_factory=dict)
@@ -61,6 +66,7 @@ class Numbers:
     flywheel: list[Any] = field(default_factory=list)
     pistons: dict[str, Any] = field(default_factory=dict)
     torsion: dict[tuple[str, str], Any] = field(default_factory=dict)
+    sizes: dict[Size, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
@@ -87,8 +93,13 @@ class Numbers:
             # a sum of changes may leave a bound of zero by a rounding
             masses = (max(part.reciprocating_mass + float(self.pistons.get(part.name, 0.0)), 0.0) for part in parts)
             parts = tuple(replace(part, reciprocating_mass=mass) for part, mass in zip(parts, masses, strict=True))
-            torsion = None if torsion is None else turned_by(torsion, given.slider_cranks, parts)
-        return replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, torsion=torsion)
+        found = replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel)
+        if self.sizes:
+            own = given.moving.sizes
+            found = found.resized({size: own[size] + float(self.sizes.get(size, 0.0)) for size in own})
+        if torsion is not None and (self.pistons or self.sizes):
+            torsion = turned_by(torsion, given.slider_cranks, found.slider_cranks)
+        return replace(found, torsion=torsion)
 
 
 class Drive(Protocol):
@@ -190,6 +201,19 @@ class MassDrive:
     def move(self, numbers: Numbers, change: Any) -> None:
         """Of the slider-crank."""
         numbers.pistons[self.part] = numbers.pistons.get(self.part, 0.0) + change.real
+
+
+@dataclass(frozen=True)
+class SizeDrive:
+    """One size of the running gear += change."""
+
+    size: Size
+    kind: ClassVar[Kind] = Kind.SIZE
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the size."""
+        numbers.sizes[self.size] = numbers.sizes.get(self.size, 0.0) + change.real
 
 
 @dataclass(frozen=True)

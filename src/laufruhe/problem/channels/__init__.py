@@ -9,15 +9,16 @@ a file asks no names.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from laufruhe.machine import Engine, Role
 from laufruhe.machine.clearances import Span, distances, reaches
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.bearing_loads import (
-    bearing_pressures,
-    crank_pin_pressures,
-    friction_loads,
+    bearing_factors,
+    crank_pin_factors,
+    drag_factors,
     main_bearing_forces,
     pin_forces,
     piston_pin_forces,
@@ -43,9 +44,12 @@ from laufruhe.problem.channels.kinds import (
     Needs,
     NumberChannel,
     PlaceChannel,
+    SizeChannel,
+    SizedChannel,
     of_what_moves,
 )
 from laufruhe.problem.channels.runs import OF_RUNS, RUN_FORCE, RUN_TRAVEL, RUN_TWIST
+from laufruhe.problem.channels.sizes import OF_SIZES, names_of_bearings, names_of_cylinders, sized
 from laufruhe.problem.channels.torsional import TORSIONAL
 from laufruhe.problem.loads import PointLoads
 
@@ -62,6 +66,8 @@ __all__ = [
     "Needs",
     "NumberChannel",
     "PlaceChannel",
+    "SizeChannel",
+    "SizedChannel",
 ]
 
 
@@ -84,22 +90,14 @@ def _on_mounts(name: str, unit: str, needs: Needs, signal: Callable[[PointLoads]
 
 def _inside(
     name: str, unit: str, keys: tuple[str, ...], needs: Needs, places: Callable[[Engine], Sequence[str]],
-    signal: Callable[[Engine, PointLoads], Spectrum], adds_up: bool = False,
+    signal: Callable[[Engine, PointLoads], Spectrum],
 ) -> LoadChannel:  # fmt: skip
     found = of_what_moves(name, signal)
-    return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True, adds_up=adds_up)
+    return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True)
 
 
 def _names_of_mounts(engine: Engine) -> Sequence[str]:
     return [mount.name for mount in engine.mounts]
-
-
-def _names_of_bearings(engine: Engine) -> Sequence[str]:
-    return [bearing.name for bearing in engine.bearings]
-
-
-def _names_of_cylinders(engine: Engine) -> Sequence[str]:
-    return [part.name for part in engine.slider_cranks]
 
 
 def mounting_in(engine: Engine) -> ElasticMounting:
@@ -147,13 +145,12 @@ SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3), lever=0)
 ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), lever=1)
 ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4))
 MAIN_BEARING_FORCE = _inside(
-    "main-bearing force", "N", AT_BEARINGS, Needs.BEARINGS, _names_of_bearings,
+    "main-bearing force", "N", AT_BEARINGS, Needs.BEARINGS, names_of_bearings,
     lambda moving, at: main_bearing_forces(moving, at.point, at.fidelity),
 )  # fmt: skip
-MAIN_BEARING_PRESSURE = _inside(
-    "main-bearing pressure", "Pa", AT_BEARINGS, Needs.BEARINGS, _names_of_bearings,
-    lambda moving, at: bearing_pressures(moving, main_bearing_forces(moving, at.point, at.fidelity)),
-)  # fmt: skip
+MAIN_BEARING_PRESSURE = sized(
+    "main-bearing pressure", "Pa", AT_BEARINGS, Needs.BEARINGS, names_of_bearings, main_bearing_forces, bearing_factors
+)
 CRANK_TORQUE = _inside(
     "crank torque", "N m", ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",),
     lambda moving, at: crank_torque(moving, at.point, at.fidelity).each(lambda values: values[:, None, None]),
@@ -163,27 +160,24 @@ STORED_WORK = _inside(
     lambda moving, at: crank_torque(moving, at.point, at.fidelity).integral.each(lambda values: values[:, None, None]),
 )  # fmt: skip
 CRANK_PIN_FORCE = _inside(
-    "crank-pin force", "N", AT_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
+    "crank-pin force", "N", AT_CYLINDERS, Needs.NOTHING, names_of_cylinders,
     lambda moving, at: pin_forces(moving, at.point, at.fidelity),
 )  # fmt: skip
-
-CRANK_PIN_PRESSURE = _inside(
-    "crank-pin pressure", "Pa", AT_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
-    lambda moving, at: crank_pin_pressures(moving, pin_forces(moving, at.point, at.fidelity)),
-)  # fmt: skip
+CRANK_PIN_PRESSURE = sized(
+    "crank-pin pressure", "Pa", AT_CYLINDERS, Needs.NOTHING, names_of_cylinders, pin_forces, crank_pin_factors
+)
 SIDE_FORCE = _inside(
-    "side force", "N", IN_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
+    "side force", "N", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
     lambda moving, at: piston_pin_forces(moving, at.point, at.fidelity).each(lambda values: values[..., 1:]),
 )  # fmt: skip
 ROD_FORCE = _inside(
-    "rod force", "N", IN_CYLINDERS, Needs.NOTHING, _names_of_cylinders,
+    "rod force", "N", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
     lambda moving, at: piston_pin_forces(moving, at.point, at.fidelity),
 )  # fmt: skip
-FRICTION_POWER = _inside(
-    "friction power", "W", OF_BEARINGS, Needs.BEARINGS, _names_of_bearings,
-    lambda moving, at: friction_loads(moving, at.point, main_bearing_forces(moving, at.point, at.fidelity)),
+FRICTION_POWER = replace(
+    sized("friction power", "W", OF_BEARINGS, Needs.BEARINGS, names_of_bearings, main_bearing_forces, drag_factors),
     adds_up=True,
-)  # fmt: skip
+)
 
 COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))
 BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
@@ -220,6 +214,6 @@ CHANNELS: Mapping[str, Channel] = {
         MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE, SIDE_FORCE,
         FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
         TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
-        *OF_RUNS, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *TORSIONAL,
+        *OF_RUNS, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES, *TORSIONAL,
     )
 }  # fmt: skip

@@ -7,10 +7,14 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import ClassVar, TypeAlias
 
-from laufruhe.machine import Engine, Flywheel, Role
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Engine, Flywheel, OperatingPoint, Role
 from laufruhe.machine.clearances import Span
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.strength import Factor
 from laufruhe.physics.torsion import Factors, unit_factors
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.decision import Kind
@@ -25,6 +29,7 @@ AT_SECTIONS = (*ON_BLOCK, "sections")
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
     (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
 )
+AT_WEBS = (*ON_BLOCK, "webs")
 OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
@@ -196,6 +201,24 @@ class LoadChannel(Channel):
 
 
 @dataclass(frozen=True, eq=False)
+class SizedChannel(LoadChannel):
+    """A load inside the crankcase, times factors of the sizes of the running gear (Z1).
+
+    Attributes
+    ----------
+    of_sizes
+        These factors of an engine at an operating point, one for each place, or for each of its components.
+    """
+
+    of_sizes: Factor = field(kw_only=True)
+
+    def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64]:
+        """Of every place and component."""
+        found = self.of_sizes(engine, point)
+        return found if found.ndim > 1 else found[:, None]
+
+
+@dataclass(frozen=True, eq=False)
 class TwistChannel(LoadChannel):
     """A load that makes the crankshaft twist: of when every cylinder fires, and of no unbalance."""
 
@@ -207,7 +230,7 @@ class TwistChannel(LoadChannel):
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Throws and firing order, the inertia of the pistons, discs and shafts."""
-        return bool({Kind.STAR, Kind.PISTON, Kind.TORSION} & set(kinds))
+        return bool({Kind.STAR, Kind.PISTON, Kind.TORSION, Kind.SIZE} & set(kinds))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,6 +261,15 @@ class NumberChannel(Channel):
 
 
 @dataclass(frozen=True, eq=False)
+class SizeChannel(NumberChannel):
+    """A number of sizes alone, that goes one way with each of them."""
+
+    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
+        """By sizes."""
+        return Kind.SIZE in kinds
+
+
+@dataclass(frozen=True, eq=False)
 class MountChannel(NumberChannel):
     """A block on its mounts."""
 
@@ -258,7 +290,7 @@ class TorsionChannel(NumberChannel):
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Discs, shafts and pistons; what excites them is a matter of throws and firing order too."""
-        return bool({Kind.PISTON, Kind.TORSION} & set(kinds)) or (self.of_loads and Kind.STAR in kinds)
+        return bool({Kind.PISTON, Kind.TORSION, Kind.SIZE} & set(kinds)) or (self.of_loads and Kind.STAR in kinds)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,12 +24,18 @@ from laufruhe.studies.replication.expressions import check_among
 ORDERS = (1.0, 2.0, 4.0, 6.0)
 FORCE, COUPLE = slice(0, 3), slice(4, 6)
 DECISION = "decision "
-PLACES = ("mount", "bearing", "cylinder", "section")
-DIRECTIONS = {1: ("", ()), 2: ("axis", ("along", "across")), 3: ("direction", ("forward", "left", "up"))}
+PLACES = ("mount", "bearing", "cylinder", "section", "web")
+_AXES = ("forward", "left", "up")
+DIRECTIONS = {
+    1: ("", ()),
+    2: ("axis", ("along", "across")),
+    3: ("direction", _AXES),
+    4: ("direction", (*_AXES, "torsion")),
+}
 """Names of the components of a load, by how many it has."""
 DIMENSIONS = (
     "angle", "axis", "bearing", "cylinder", "direction", "firing", "mode", "motion", "mount", "number", "order",
-    "section", "turns",
+    "section", "turns", "web",
 )  # fmt: skip
 """Along which quantities may lie."""
 

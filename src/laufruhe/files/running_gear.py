@@ -1,0 +1,150 @@
+"""[running_gear] of a problem file: sizes of webs, rods, piston pins and bolts, and what of all sizes is decided."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from laufruhe import units
+from laufruhe.files import fields as f
+from laufruhe.files.bearings import MainBearingTable
+from laufruhe.files.complaints import Refused, blamed_on
+from laufruhe.files.engine import EngineTable
+from laufruhe.files.fields import Open, Table
+from laufruhe.machine import CRANKSHAFT, Bearing, Bolts, PistonPin, RunningGear, Shank, SliderCrank, Webs
+from laufruhe.machine.layouts import Throw
+from laufruhe.machine.running_gear import BIG_END, ROD_LENGTH, STEEL, Moving, Size, on
+from laufruhe.numerics.turns import as_turn, cis
+from laufruhe.problem.decision import Decision, SizeDrive
+from laufruhe.problem.sets import Interval
+
+
+class WebsTable(Table):
+    """The two webs beside every pin."""
+
+    width: f.OpenPositiveLength = Field(description="Across the shaft.")
+    thickness: f.OpenPositiveLength = Field(description="Along the shaft.")
+
+
+class ShankTable(Table):
+    """The round shank of every rod."""
+
+    diameter: f.OpenPositiveLength
+    bore: f.NonNegativeLength = 0.0
+
+
+class PistonPinTable(Table):
+    """The pin of every piston."""
+
+    diameter: f.OpenPositiveLength
+    bore: f.OpenNonNegativeLength = 0.0
+    length: f.OpenPositiveLength
+    in_bosses: Annotated[float, f.Number("", above=0.0, most=0.95)] = f.told(
+        "Share of the length that the bosses hold, the rod the rest.", 0.5
+    )
+    span: f.PositiveLength | None = f.told("Between the middles of the bosses; by that share where left out.")
+
+
+class BoltsTable(Table):
+    """The bolts of every big end."""
+
+    count: Annotated[int, Field(ge=1, le=12)] = 2
+    diameter: f.OpenPositiveLength = Field(description="At the root of the thread.")
+
+
+class RunningGearTable(Table):
+    """Sizes of the running gear that stresses hang on; crank pins are big ends, journals main bearings."""
+
+    density: f.Density | None = f.told("Adds the masses of these parts and of the crank pins to those of [engine].")
+    elastic_modulus: f.PositivePressure = STEEL
+    webs: WebsTable | None = None
+    rod: ShankTable | None = None
+    piston_pin: PistonPinTable | None = None
+    bolts: BoltsTable | None = None
+
+
+def weighed(
+    table: RunningGearTable | None, parts: tuple[SliderCrank, ...], throws: tuple[Throw, ...],
+    bearings: tuple[Bearing, ...],
+) -> tuple[RunningGear | None, tuple[SliderCrank, ...], tuple[Throw, ...]]:  # fmt: skip
+    """Sizes at the start of what is open, and slider-cranks and throws with their masses (Z2)."""
+    if table is None:
+        return None, parts, throws
+    gear = _gear_of(table, parts, throws)
+    bare = Moving(gear, parts, (), bearings)
+    ways, size = dict(gear.throws).values(), bare.throw_unbalance
+    heavy = tuple(replace(t, unbalance=t.unbalance + size * way) for t, way in zip(throws, ways, strict=True))
+    return gear, bare.weighed().parts, heavy
+
+
+def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> RunningGear:
+    if table.density is not None and any(type(p) is not SliderCrank or p.shaft != CRANKSHAFT for p in parts):
+        rule = "weighs running gear of plain slider-cranks on one crankshaft"
+        raise Refused("running_gear.density", units.shown(table.density, "kg/m^3"), rule, "give the masses in [engine]")
+    with blamed_on("running_gear"):
+        return RunningGear(
+            table.elastic_modulus,
+            table.density,
+            None if table.webs is None else Webs(_start(table.webs.width), _start(table.webs.thickness)),
+            None if table.rod is None else Shank(_start(table.rod.diameter), table.rod.bore),
+            None if table.piston_pin is None else _piston_pin(table.piston_pin),
+            None if table.bolts is None else Bolts(table.bolts.count, _start(table.bolts.diameter)),
+            tuple((f"throw {k + 1}", cis(as_turn(throw.angle))) for k, throw in enumerate(throws)),
+        )
+
+
+def _start(value: float | Open) -> float:
+    return Open.of(value).start
+
+
+def _piston_pin(table: PistonPinTable) -> PistonPin:
+    bore, diameter = Open.of(table.bore), Open.of(table.diameter)
+    if bore.upper >= diameter.lower:
+        shown, rule = units.shown(bore.upper, "m"), f"does not fit into a pin of {units.shown(diameter.lower, 'm')}"
+        raise Refused("running_gear.piston_pin.bore", shown, rule, "make it smaller")
+    return PistonPin(diameter.start, bore.start, _start(table.length), table.in_bosses, table.span)
+
+
+def _opened(
+    table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[MainBearingTable], built: Sequence[Bearing]
+) -> Iterator[tuple[str, Size, Any]]:
+    """Every size that may be open: its name, the number of the engine that it is, and what stands in the file."""
+    yield "engine.rod_length", ROD_LENGTH, engine.rod_length
+    for key in ("diameter", "width"):
+        if engine.big_end is not None:
+            yield f"engine.big_end.{key}", (BIG_END, key), getattr(engine.big_end, key)
+        for row, bearing in zip(bearings, built, strict=True):
+            yield f"{bearing.name}.{key}", (on(bearing), key), getattr(row, key)
+    for name in ("webs", "rod", "piston_pin", "bolts") if table else ():
+        part = getattr(table, name)
+        for key in type(part).model_fields if part is not None else ():
+            yield f"running_gear.{name}.{key}", (name, key), getattr(part, key)
+
+
+def size_decisions(
+    table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[MainBearingTable], built: Sequence[Bearing]
+) -> list[Decision]:
+    """The decisions about sizes that are open."""
+    found = []
+    for name, size, value in _opened(table, engine, bearings, built):
+        if isinstance(value, Open) and value.is_open:
+            found.append(Decision(name, "m", Interval(*value.bounds), value.start, (SizeDrive(size),)))
+    if found and engine.rod is not None and isinstance(engine.rod_length, Open):
+        raise Refused("engine.rod_length", None, "is open, and [engine.rod] is of one length", "fix it")
+    if any(decision.name == "engine.rod_length" for decision in found):
+        _check_rod(engine)
+    return found
+
+
+def _check_rod(engine: EngineTable) -> None:
+    """Every rod length allowed lets the crank turn."""
+    shortest = Open.of(engine.rod_length or math.inf).lower
+    if engine.kind.is_free or engine.offset:
+        raise Refused("engine.rod_length", None, "is decided in layouts without offset", "fix it, or take a layout")
+    if shortest <= 0.5 * engine.stroke:
+        shown = units.shown(shortest, "m")
+        raise Refused("engine.rod_length", shown, "does not let the crank turn", "raise its lower bound")

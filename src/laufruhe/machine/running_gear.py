@@ -1,0 +1,290 @@
+"""Sizes of the running gear beside its pins and journals: webs, rod shank, piston pin and bolts, and what they weigh.
+
+Crank pins are the big ends of the rods, journals the main bearings. What hangs on the sizes is written once here:
+moduli and areas of sections, and masses (Z1, Z2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import TypeAlias
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.bearing import Bearing
+from laufruhe.machine.rotor import Rotor
+from laufruhe.machine.slider_crank import SliderCrank
+
+Size: TypeAlias = tuple[str, str]
+"""Name of a part, and of its number."""
+
+STEEL = 210e9
+"""Elastic modulus where none is given [Pa]."""
+PARTS, MOVED = ("webs", "rod", "piston_pin", "bolts"), ("width", "thickness", "diameter", "bore", "length")
+BIG_END, ROD_LENGTH, _ACROSS = "big end", ("rod", "length"), ("diameter", "width")
+
+
+@dataclass(frozen=True)
+class Webs:
+    """Two webs of a rectangular section beside every pin.
+
+    Attributes
+    ----------
+    width, thickness
+        Across the shaft and along it [m].
+    """
+
+    width: float
+    thickness: float
+
+    @property
+    def modulus(self) -> float:
+        """Against bending out of the plane of the web, b h^2 / 6 [m3]."""
+        return self.width * self.thickness**2 / 6.0
+
+    @property
+    def area(self) -> float:
+        """Of the section [m2]."""
+        return self.width * self.thickness
+
+
+@dataclass(frozen=True)
+class Shank:
+    """Round shank of a rod, as long as the rod.
+
+    Attributes
+    ----------
+    diameter, bore
+        [m].
+    """
+
+    diameter: float
+    bore: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_hollow("rod", self.diameter, self.bore)
+
+    @property
+    def area(self) -> float:
+        """Of the section [m2]."""
+        return ring_area(self.diameter, self.bore)
+
+    @property
+    def inertia(self) -> float:
+        """Second moment of the section [m4]."""
+        return 0.5 * self.diameter * round_modulus(self.diameter, self.bore)
+
+
+@dataclass(frozen=True)
+class PistonPin:
+    """A floating pin: part of its length in the small end of the rod, the rest in the two bosses of the piston.
+
+    Attributes
+    ----------
+    diameter, bore, length
+        [m].
+    in_bosses
+        Share of the length that the bosses hold.
+    span
+        Between the middles of the bosses [m]; by the share where it is not given.
+    """
+
+    diameter: float
+    bore: float
+    length: float
+    in_bosses: float = 0.5
+    given_span: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_hollow("piston pin", self.diameter, self.bore)
+
+    @property
+    def span(self) -> float:
+        """Between the middles of the bosses [m]."""
+        return self.length * (1.0 - 0.5 * self.in_bosses) if self.given_span is None else self.given_span
+
+    @property
+    def boss_area(self) -> float:
+        """Projected area in both bosses [m2]."""
+        return self.diameter * self.length * self.in_bosses
+
+
+@dataclass(frozen=True)
+class Bolts:
+    """Bolts that hold the cap of a big end.
+
+    Attributes
+    ----------
+    diameter
+        At the root of the thread [m].
+    """
+
+    count: int
+    diameter: float
+
+    @property
+    def area(self) -> float:
+        """Of all of them [m2]."""
+        return self.count * ring_area(self.diameter, 0.0)
+
+
+@dataclass(frozen=True)
+class RunningGear:
+    """What is alike at every throw.
+
+    Attributes
+    ----------
+    density
+        Of the steel [kg/m3]; None where the sizes add nothing to the masses as given.
+    throws
+        Names of the rotors that pins and webs are, and which way each throw points (C4).
+    """
+
+    elastic_modulus: float = STEEL
+    density: float | None = None
+    webs: Webs | None = None
+    rod: Shank | None = None
+    piston_pin: PistonPin | None = None
+    bolts: Bolts | None = None
+    throws: tuple[tuple[str, complex], ...] = ()
+
+    def part(self, name: str) -> Webs | Shank | PistonPin | Bolts:
+        """One of its parts, which it must have."""
+        found: Webs | Shank | PistonPin | Bolts | None = getattr(self, name)
+        if found is None:
+            raise ModelError(f"the running gear has no {name.replace('_', ' ')}; add it to [running_gear]")
+        return found
+
+    def scaled(self, length: float, density: float) -> RunningGear:
+        """The same in another size, of another density."""
+        longer: dict[str, object] = {}
+        for name in PARTS:
+            own = getattr(self, name)
+            if own is not None:
+                sizes = {f.name: getattr(own, f.name) for f in fields(own) if f.name not in ("count", "in_bosses")}
+                longer[name] = replace(own, **{k: None if v is None else v * length for k, v in sizes.items()})
+        heavy = None if self.density is None else self.density * density
+        return replace(self, density=heavy, **longer)  # type: ignore[arg-type]
+
+    def rod_masses(self, part: SliderCrank) -> tuple[float, float, float]:
+        """What shank and piston pin add to a slider-crank (Z2).
+
+        Returns
+        -------
+        Reciprocating and rotating mass [kg], and the inertia deficit of a straight shank [kg m2].
+        """
+        density, length = self.density or 0.0, part.rod_length
+        shank = 0.0 if self.rod is None or math.isinf(length) else density * self.rod.area * length
+        pin = self.piston_pin
+        ring = 0.0 if pin is None else density * ring_area(pin.diameter, pin.bore) * pin.length
+        return 0.5 * shank + ring, 0.5 * shank, -shank * length**2 / 6.0 if shank else 0.0
+
+    def throw_unbalance(self, radius: float, big_end: tuple[float, float] | None, journal: float) -> float:
+        """Of crank pin and both webs [kg m] (Z2).
+
+        Parameters
+        ----------
+        journal
+            Diameter of the main bearings [m]: the web about it turns about its own middle.
+        """
+        across, width = big_end or (0.0, 0.0)
+        found = ring_area(across, 0.0) * width * radius
+        if self.webs is not None:
+            found += self.webs.area * ((radius + 0.5 * across) ** 2 - 0.25 * journal**2)
+        return (self.density or 0.0) * found
+
+
+@dataclass(frozen=True)
+class Moving:
+    """What sizes move: of an engine all that turns, reciprocates or carries."""
+
+    gear: RunningGear | None
+    parts: tuple[SliderCrank, ...]
+    rotors: tuple[Rotor, ...]
+    bearings: tuple[Bearing, ...]
+
+    def weighed(self, sense: float = 1.0) -> Moving:
+        """With the masses of the running gear added to those given, or taken off where `sense` is -1 (Z2)."""
+        gear = self.gear
+        if gear is None or gear.density is None or not self.parts:
+            return self
+        unbalance, ways = sense * self.throw_unbalance, dict(gear.throws)
+        rotors = (
+            replace(r, unbalance=r.unbalance + unbalance * ways[r.name]) if r.name in ways else r for r in self.rotors
+        )
+        return replace(self, parts=tuple(_heavier(gear, part, sense) for part in self.parts), rotors=tuple(rotors))
+
+    @property
+    def throw_unbalance(self) -> float:
+        """Of crank pin and webs of every throw [kg m] (Z2)."""
+        if self.gear is None or not self.parts:
+            return 0.0
+        # about the journal a web turns about its own middle
+        journal = min((b.diameter for b in self.bearings if b.diameter is not None), default=0.0)
+        return self.gear.throw_unbalance(self.parts[0].crank_radius, self.parts[0].big_end, journal)
+
+    @property
+    def sizes(self) -> dict[Size, float]:
+        """Every size that decisions may move [m]."""
+        found: dict[Size, float] = {}
+        if self.parts:
+            found[ROD_LENGTH] = self.parts[0].rod_length
+            if self.parts[0].big_end is not None:
+                found |= {(BIG_END, key): value for key, value in zip(_ACROSS, self.parts[0].big_end, strict=True)}
+        for bearing in self.bearings:
+            found |= {(on(bearing), k): getattr(bearing, k) for k in _ACROSS if getattr(bearing, k) is not None}
+        for name in PARTS if self.gear else ():
+            part = getattr(self.gear, name)
+            found |= {(name, f.name): getattr(part, f.name) for f in fields(part) if f.name in MOVED} if part else {}
+        return found
+
+    def resized(self, sizes: Mapping[Size, float]) -> Moving:
+        """With sizes in place of its own, and the masses of these."""
+        bare = self.weighed(-1.0)
+        parts, gear = bare.parts, bare.gear
+        length, end = sizes.get(ROD_LENGTH), tuple(sizes.get((BIG_END, key)) for key in _ACROSS)
+        if parts and length is not None and length != parts[0].rod_length:
+            parts = tuple(replace(part, rod_length=length) for part in parts)
+        if end[0] is not None and end[1] is not None:
+            parts = tuple(replace(part, big_end=(end[0], end[1])) for part in parts)
+        bearings = tuple(
+            replace(b, **{key: sizes.get((on(b), key), getattr(b, key)) for key in _ACROSS}) for b in bare.bearings
+        )
+        for name in PARTS if gear else ():
+            own = getattr(gear, name)
+            told = {f.name: sizes[name, f.name] for f in fields(own) if (name, f.name) in sizes} if own else {}
+            if told and gear is not None:
+                gear = replace(gear, **{name: replace(own, **told)})
+        return replace(bare, gear=gear, parts=parts, bearings=bearings).weighed()
+
+
+def _heavier(gear: RunningGear, part: SliderCrank, sense: float) -> SliderCrank:
+    reciprocating, rotating, deficit = (sense * each for each in gear.rod_masses(part))
+    return replace(
+        part,
+        # what was added and is taken off again may leave a rounding
+        reciprocating_mass=max(part.reciprocating_mass + reciprocating, 0.0),
+        rotating_mass=max(part.rotating_mass + rotating, 0.0),
+        rod_inertia_deficit=part.rod_inertia_deficit + deficit,
+    )
+
+
+def on(bearing: Bearing) -> str:
+    """The name of a main bearing among those of parts."""
+    return f"bearing {bearing.name}"
+
+
+def ring_area(diameter: float, bore: float) -> float:
+    """Of a round section [m2]."""
+    return math.pi / 4.0 * (diameter**2 - bore**2)
+
+
+def round_modulus(diameter: float, bore: float = 0.0) -> float:
+    """Of a round section against bending, half of that against torsion [m3] (Z1)."""
+    return math.pi / 32.0 * (diameter**4 - bore**4) / diameter
+
+
+def _check_hollow(name: str, diameter: float, bore: float) -> None:
+    if not diameter > bore >= 0.0:
+        raise ModelError(f"{name}: a bore of {1e3 * bore:.6g} mm does not fit into {1e3 * diameter:.6g} mm")

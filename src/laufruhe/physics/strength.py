@@ -1,0 +1,302 @@
+"""What loads the sections of the running gear, and what its sizes make of that (Z1-Z9).
+
+Every stress is a load inside the crankcase, linear in the masses, times a factor of the sizes alone. The crankshaft is
+cut in the middle of its journals, as the simple calculation of the sources has it (textbook 10.3; worked diesel G, H):
+pieces between neighbouring bearings carry what stands on them, each simply supported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import (
+    CRANKSHAFT,
+    Bearing,
+    Bolts,
+    Engine,
+    OperatingPoint,
+    PistonPin,
+    RunningGear,
+    Shank,
+    SliderCrank,
+    Webs,
+)
+from laufruhe.machine.running_gear import round_modulus
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.bearing_loads import pin_forces
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.shaking_loads import rotor_loads
+from laufruhe.physics.torque import crank_torque
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+Factor: TypeAlias = Callable[[Engine, OperatingPoint], Array]
+
+# shear strain energy: a shear stress counts as so much of a normal one (textbook 10.3)
+SHEAR = math.sqrt(3.0)
+# how far loads lie apart in bosses and small end lessens the bending of a piston pin (textbook, example to eq. 93)
+SPREAD = 2.0 / 3.0
+
+
+# loads, that sizes do not move but by their masses
+
+
+def pin_moments(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """Bending moment in the middle of every crank pin, shape (n, cylinders, 3): the force that makes it, turned (Z3).
+
+    Raises
+    ------
+    ModelError
+        If a pin has no main bearing on either side.
+    """
+    spans = [_span(engine, part) for part in engine.slider_cranks]
+    return _shared(engine, point, fidelity, [partial(_moment, part.x, *span) for part, span in zip(
+        engine.slider_cranks, spans, strict=True)])  # fmt: skip
+
+
+def side_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """What every throw's piece of the shaft presses on the bearing before it and behind it, (n, 2 cylinders, 3) (Z4).
+
+    Raises
+    ------
+    ModelError
+        As `pin_moments`, and if two throws stand on one piece.
+    """
+    shares: list[Callable[[float], float]] = []
+    for part in engine.slider_cranks:
+        front, rear = _span(engine, part)
+        for other in engine.slider_cranks:
+            if other.shaft == part.shaft and _within(other.x, front, rear) and not _on_one_throw(part, other):
+                raise ModelError(
+                    f"{part.name} and {other.name} have no main bearing between them; webs are sized between two each"
+                )
+        shares += [partial(_lever, front.x, rear.x), partial(_lever, rear.x, front.x)]
+    return _shared(engine, point, fidelity, shares)
+
+
+def journal_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """Torque through every main bearing of all throws before it, the load at the rear (C3), (n, bearings) (Z5)."""
+    return _torques(engine, point, fidelity, [bearing.x for bearing in engine.bearings])
+
+
+def side_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """What bends the journals beside every throw, and the torque through them, shape (n, 2 cylinders, 4) (Z6)."""
+    forces = side_forces(engine, point, fidelity)
+    places = [bearing.x for part in engine.slider_cranks for bearing in _span(engine, part)]
+    torques = _torques(engine, point, fidelity, places)
+    onto, last = np.eye(3, 4), np.eye(4)[3]
+    return forces.each(lambda own: own @ onto) + torques.each(lambda own: own[..., None] * last)
+
+
+def cap_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """What masses alone pull on the caps of the big ends, as when the gas is exchanged, (n, cylinders, 3) (Z8)."""
+    return pin_forces(engine, replace(point, gas=None), fidelity)
+
+
+def _shared(
+    engine: Engine, point: OperatingPoint, fidelity: Fidelity, shares: Sequence[Callable[[float], float]]
+) -> Spectrum:
+    """Sums of the loads of rods, webs and weights, each times a share of its place along the crankshaft."""
+    if any(part.shaft != CRANKSHAFT for part in engine.slider_cranks):
+        raise ModelError("sections are sized of engines with one crankshaft")
+    by_rod = np.array([[share(part.x) for part in engine.slider_cranks] for share in shares])
+    total = pin_forces(engine, point, fidelity).each(partial(np.einsum, "kc,ncd->nkd", by_rod))
+    for rotor in engine.rotors:
+        own = np.array([share(rotor.x) for share in shares])
+        if rotor.shaft == CRANKSHAFT and rotor.unbalance and own.any():
+            load = rotor_loads((rotor,), point.speed, engine.cycle)
+            total = total + load.each(partial(_times, own))
+    return total
+
+
+def _times(share: Array, wrench: Array) -> Array:
+    return np.asarray(np.einsum("k,nd->nkd", share, wrench[:, :3]))
+
+
+def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, places: Sequence[float]) -> Spectrum:
+    total = Spectrum(engine.cycle.base_order, np.zeros((1, len(places)), dtype=complex))
+    if any(part.shaft != CRANKSHAFT for part in engine.slider_cranks):
+        raise ModelError("sections are sized of engines with one crankshaft")
+    for part in engine.slider_cranks:
+        behind = np.array([float(part.x > x) for x in places])
+        if behind.any():
+            own = crank_torque(replace(engine, slider_cranks=(part,)), point, fidelity)
+            total = total + own.each(partial(_outer, behind))
+    return total
+
+
+def _outer(share: Array, torque: Array) -> Array:
+    return np.multiply.outer(torque, share)
+
+
+def _span(engine: Engine, part: SliderCrank) -> tuple[Bearing, Bearing]:
+    """The main bearings next before and next behind a throw."""
+    front = [b for b in engine.bearings if b.shaft == part.shaft and b.x > part.x]
+    rear = [b for b in engine.bearings if b.shaft == part.shaft and b.x < part.x]
+    if not front or not rear:
+        raise ModelError(
+            f"the throw of {part.name} has no main bearing on one side; webs and pins are sized between two"
+        )
+    return min(front, key=lambda b: b.x), max(rear, key=lambda b: b.x)
+
+
+def _within(x: float, front: Bearing, rear: Bearing) -> bool:
+    return rear.x < x < front.x
+
+
+def _on_one_throw(part: SliderCrank, other: SliderCrank) -> bool:
+    """Whether two rods stand side by side on one pin, or on the two parts of a split one."""
+    return abs(part.x - other.x) <= 1.5 * (part.big_end[1] if part.big_end else 0.0)
+
+
+def _lever(at: float, far: float, x: float) -> float:
+    """Share of a load at x that the support `at` carries of a piece that ends at `far`."""
+    share = (far - x) / (far - at)
+    return share if 0.0 <= share <= 1.0 else 0.0
+
+
+def _moment(section: float, front: Bearing, rear: Bearing, x: float) -> float:
+    """Bending moment at a section for each unit of load at x on its piece [m]."""
+    if not _within(x, front, rear):
+        return 0.0
+    if x >= section:
+        return (section - rear.x) * _lever(rear.x, front.x, x)
+    return (front.x - section) * _lever(front.x, rear.x, x)
+
+
+# factors, of the sizes alone
+
+
+def gear_of(engine: Engine) -> RunningGear:
+    """The running gear, which the engine must have."""
+    if engine.gear is None:
+        raise ModelError("sizes of the running gear are asked for, and none are given; add [running_gear]")
+    return engine.gear
+
+
+def big_end_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """One over the modulus of every crank pin [1/m3] (Z3)."""
+    return np.array([1.0 / round_modulus(_pin_size(part)[0]) for part in engine.slider_cranks])
+
+
+def web_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """Stress of every web for each newton on its side, bending and pressure at its edge added, (2 cylinders,) (Z4)."""
+    webs = _part(engine, "webs", Webs)
+    found = []
+    for part in engine.slider_cranks:
+        middle = 0.5 * (_pin_size(part)[1] + webs.thickness)
+        for bearing in _span(engine, part):
+            lever = max(abs(bearing.x - part.x) - middle, 0.0)
+            found.append(lever / webs.modulus + 1.0 / webs.area)
+    return np.array(found)
+
+
+def journal_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """One over the modulus of every journal against torsion [1/m3] (Z5)."""
+    return np.array([0.5 / round_modulus(_journal(bearing)[0]) for bearing in engine.bearings])
+
+
+def side_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """Of force and torque in the edge of every journal beside a throw, shape (2 cylinders, 4) (Z6)."""
+    rows = []
+    for part in engine.slider_cranks:
+        for diameter, width in map(_journal, _span(engine, part)):
+            modulus = round_modulus(diameter)
+            rows.append([*[0.5 * width / modulus] * 3, 0.5 * SHEAR / modulus])
+    return np.array(rows)
+
+
+def rod_stress_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """One over the section of every rod [1/m2] (Z7)."""
+    return np.full(len(engine.slider_cranks), 1.0 / _part(engine, "rod", Shank).area)
+
+
+def buckling_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """One over the load that every rod buckles under, both ends hinged [1/N] (Z7; worked diesel H.a)."""
+    stiffness = math.pi**2 * gear_of(engine).elastic_modulus * _part(engine, "rod", Shank).inertia
+    return np.array([part.rod_length**2 / stiffness for part in engine.slider_cranks])
+
+
+def bolt_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """One over the section of the bolts of every big end [1/m2] (Z8)."""
+    return np.full(len(engine.slider_cranks), 1.0 / _part(engine, "bolts", Bolts).area)
+
+
+def boss_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """One over the area of every piston pin in its bosses [1/m2] (Z9; eq. 92)."""
+    return _of_pins(engine, lambda pin: 1.0 / pin.boss_area)
+
+
+def pin_bending_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """Bending stress of every piston pin for each newton [1/m2] (Z9)."""
+    return _of_pins(engine, lambda pin: SPREAD * 0.25 * pin.span / round_modulus(pin.diameter, pin.bore))
+
+
+def deflection_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """Deflection of every piston pin for each newton [m/N] (Z9; eq. 93)."""
+    modulus = gear_of(engine).elastic_modulus
+    return _of_pins(engine, lambda pin: SPREAD * pin.span**3 / (48.0 * modulus * _pin_inertia(pin)))
+
+
+def ovality_factors(engine: Engine, _: OperatingPoint) -> Array:
+    """By how much every piston pin grows across the load, for each newton [m/N] (Z9; eq. 94)."""
+    modulus = gear_of(engine).elastic_modulus
+
+    def factor(pin: PistonPin) -> float:
+        radius, wall = 0.25 * (pin.diameter + pin.bore), pin.diameter - pin.bore
+        return radius**3 / (12.0 * modulus * pin.length * wall**3 / 96.0)
+
+    return _of_pins(engine, factor)
+
+
+def journal_speeds(engine: Engine, point: OperatingPoint) -> Array:
+    """Speed of every journal over its projected area [1/(m s)] (Z10; worked diesel G.c.V)."""
+    sizes = [(_journal(bearing), abs(bearing.shaft.ratio)) for bearing in engine.bearings]
+    return np.array([0.5 * ratio * point.speed * d / (d * width) for (d, width), ratio in sizes])
+
+
+def throw_clearance(engine: Engine) -> float:
+    """What pin, webs and halves of the journals leave of the least distance between two main bearings [m] (Z11)."""
+    thickness = _part(engine, "webs", Webs).thickness
+    found = []
+    for part in engine.slider_cranks:
+        bearings = _span(engine, part)
+        for bearing in bearings:
+            room = abs(bearing.x - part.x) - 0.5 * (_pin_size(part)[1] + _journal(bearing)[1])
+            found.append(room - thickness)
+    return min(found)
+
+
+def _of_pins(engine: Engine, factor: Callable[[PistonPin], float]) -> Array:
+    return np.full(len(engine.slider_cranks), factor(_part(engine, "piston_pin", PistonPin)))
+
+
+def _pin_inertia(pin: PistonPin) -> float:
+    return 0.5 * pin.diameter * round_modulus(pin.diameter, pin.bore)
+
+
+def _part(engine: Engine, name: str, kind: type[T]) -> T:
+    found = gear_of(engine).part(name)
+    if not isinstance(found, kind):
+        raise TypeError(f"{name} is no {kind.__name__}")
+    return found
+
+
+def _pin_size(part: SliderCrank) -> tuple[float, float]:
+    if part.big_end is None:
+        raise ModelError(f"{part.name} has no big end, so its crank pin has no size; add engine.big_end")
+    return part.big_end
+
+
+def _journal(bearing: Bearing) -> tuple[float, float]:
+    if bearing.diameter is None or bearing.width is None:
+        raise ModelError(f"bearing '{bearing.name}' has no diameter or no width, so its journal has no size")
+    return bearing.diameter, bearing.width
