@@ -16,7 +16,7 @@ from laufruhe.files.reader import load
 from laufruhe.present.pictures import PRINTED, PRINTED_SHEETS, SHEETS
 from laufruhe.problem.evaluation import measured
 from laufruhe.report.sections import SECTIONS
-from laufruhe.report.tables import sheets_of, write_tables
+from laufruhe.report.tables import Sheet, sheets_of, write_book, write_tables
 from laufruhe.solvers import Result, solve, state
 from problem_files import PROBLEMS, loaded
 
@@ -119,3 +119,11 @@ def test_what_only_the_report_knows_is_a_file_too() -> None:
     found = sheets_of(state(load(PROBLEMS / "inline-five-torsion.toml")))
     assert {"table-torque", "table-torsion", "table-torsion-2"} <= set(found) <= {*SHEETS, *PRINTED_SHEETS}
     assert any(isinstance(cell, float) for row in found["table-torque"].rows for cell in row)
+
+
+def test_pages_of_a_workbook_have_names_that_it_takes(tmp_path: Path) -> None:
+    names = ["mean force over 'speed'", "a" * 40, "A" * 40, "n/a [kg]", "'quoted'"]
+    write_book({name: Sheet(["x"], [[1.5], [None], [float("nan")]]) for name in names}, tmp_path / "book.xlsx")
+    book = openpyxl.load_workbook(tmp_path / "book.xlsx")
+    assert book.sheetnames == ["mean force over 'speed-", "a" * 31, "A" * 29 + " 2", "n-a -kg-", "-quoted-"]
+    assert [cell.value for cell in book["n-a -kg-"]["A"]] == ["x", 1.5, None, None]

@@ -27,12 +27,12 @@ HEAVY = {
     "matplotlib",
     "mpmath",
     "netCDF4",
-    "openpyxl",
     "pandas",
     "pint",
     "pyscipopt",
     "scipy",
     "xarray",
+    "xlsxwriter",
     "zarr",
 }
 LATE_ROOMS = ("", "cli")

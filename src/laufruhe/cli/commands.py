@@ -5,6 +5,7 @@ Heavy imports happen inside the commands, so that `laufruhe --help` answers at o
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -26,6 +27,9 @@ from laufruhe.cli.screen import (
     spoken,
 )
 from laufruhe.cli.supervised import supervised
+
+_SELDOM = 50_000
+"""New objects after which garbage is looked for."""
 
 app = typer.Typer(
     name="laufruhe",
@@ -173,7 +177,7 @@ def check(
         if is_study(problem):
             from laufruhe.cli.study import checked
         else:
-            from laufruhe.cli.solve import checked
+            from laufruhe.cli.check import checked
         hand_out(*checked(problem))
 
 
@@ -229,6 +233,8 @@ def _options(
 
 def main() -> None:
     """Entry point of the `laufruhe` command; ends the process."""
+    # classes of models and marks of pictures are many, and none of them is garbage
+    gc.set_threshold(_SELDOM)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             # a terminal that knows no Greek gets an escape in place of a traceback

@@ -25,15 +25,15 @@ from laufruhe.report import trade as report
 from laufruhe.studies.trade import Trade, seconds, trade
 
 
-def explained(path: Path, tolerance: float) -> tuple[str, str]:
-    """Text and JSON of what a scene needs."""
+def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
+    """Text of what a scene needs, and what makes JSON of it."""
     problem = _with_objective(path)
     if problem.load_terms:
         choice, times = choose(problem, tolerance), _load_times
     else:
         choice, times = needs(problem), _mount_times
     both = times(problem, choice)
-    return explain.as_text(problem, choice, tolerance, both), explain.as_json(problem, choice, tolerance, both)
+    return explain.as_text(problem, choice, tolerance, both), lambda: explain.as_json(problem, choice, tolerance, both)
 
 
 def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
@@ -56,8 +56,8 @@ def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
     return times[0], times[1]
 
 
-def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[str, str]:
-    """Pages and pictures of every problem, an index of them all; returns the index and JSON."""
+def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[str, Callable[[], str]]:
+    """Pages and pictures of every problem, an index of them all; returns the index, and what makes JSON."""
     from laufruhe.plots.style import save
     from laufruhe.plots.trade import figure, has_picture
 
@@ -78,11 +78,16 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
             command = shlex.join(["laufruhe", "trade", str(path)])
             files.write(stage / names[0], report.as_page(one, names[1] if drawn else None, command))
     trades = [found[k] for k in range(len(problems))]
-    index, data = report.index(trades), [report.as_json(one).strip() for one in trades]
+    index = report.index(trades)
     if len(trades) > 1:
         with files.staged(files.Set(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
             files.write(stage / "README.md", index)
-    return index + f"Results: {folder}\n", "[" + ",\n".join(data) + "]\n"
+    return index + f"Results: {folder}\n", lambda: _together(trades)
+
+
+def _together(trades: Sequence[Trade]) -> str:
+    """JSON of them all."""
+    return "[" + ",\n".join(report.as_json(one).strip() for one in trades) + "]\n"
 
 
 def _measured(

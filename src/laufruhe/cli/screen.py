@@ -22,20 +22,20 @@ DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 
 @contextmanager
-def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[str, str], None]]:
-    """Text on the screen, data where they were asked for; whether that can be written is found out on entry."""
+def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[str, Callable[[], str]], None]]:
+    """Text on the screen, data made where they were asked for; whether that can be written is found out on entry."""
     from laufruhe.report import files
 
     with ExitStack() as places:
         place = json_file(json, problems, places)
 
-        def hand_out(text: str, data: str) -> None:
+        def hand_out(text: str, data: Callable[[], str]) -> None:
             if not is_quiet():
                 typer.echo(text, nl=False, err=json == "-")
             if json == "-":
-                typer.echo(data, nl=False)
+                typer.echo(data(), nl=False)
             elif place is not None:
-                files.write(place, data)
+                files.write(place, data())
 
         yield hand_out
 

@@ -76,15 +76,6 @@ def solved(problem: Problem, listener: Listener) -> Result:
         return replace(state(problem, to_start_from=True), status=Status.FAILED, message=str(error))
 
 
-def checked(path: Path) -> tuple[str, str]:
-    """What a problem leaves open, and the design as given as JSON."""
-    from laufruhe.solvers import state
-
-    problem = load(path)
-    # a load that no mount carries, or a gas cycle that cannot be met, shows only here
-    return f"ok: {problem.summary}\n", as_json(state(problem, to_start_from=True))
-
-
 def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tuple[Result, Path]:
     """The result, its files in place, and the folder that they are in."""
     say("reading the problem")

@@ -22,8 +22,8 @@ from laufruhe.studies.reader import load_study
 
 def studied(
     path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None], kinds: Sequence[str] = ("png",)
-) -> tuple[str, str]:
-    """Files of a study in their folder; what to say of them, and all parts as JSON."""
+) -> tuple[str, Callable[[], str]]:
+    """Files of a study in their folder; what to say of them, and what makes JSON of all parts."""
     if jobs is not None and jobs < 1:
         complaint = Complaint("--jobs", str(jobs), "must be one or more", "leave it out to use every core")
         raise InputError("laufruhe", (complaint,))
@@ -42,15 +42,15 @@ def studied(
     kept.unlink(missing_ok=True)
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())
     text = f"{spent}done in {time.perf_counter() - started:.1f} s: {folder / files.REPORT}\n"
-    return text, as_json(study, datasets, seconds)
+    return text, lambda: as_json(study, datasets, seconds)
 
 
-def checked(path: Path) -> tuple[str, str]:
-    """How many points the parts of a study have, as text and as JSON."""
+def checked(path: Path) -> tuple[str, Callable[[], str]]:
+    """How many points the parts of a study have, as text, and what makes JSON of it."""
     study, scenes = load_study(path), Scenes(path.parent)
     points = {part.name: len(part.points(scenes)) for part in study.study.parts}
     told = f"ok: {printed(study.title)}, {sum(points.values())} points\n"
-    return told, strict({"title": study.title, "points": points})
+    return told, lambda: strict({"title": study.title, "points": points})
 
 
 class _Teller:

@@ -274,7 +274,7 @@ Three: TypeAlias = Annotated[list[T], Field(min_length=3, max_length=3)]
 class Table(BaseModel):
     """A TOML table that knows its keys and takes no others."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
 
 
 def told(text: str, default: Any = None) -> Any:

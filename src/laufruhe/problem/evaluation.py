@@ -56,6 +56,11 @@ class Evaluation:
     resonance: str = ""
 
     @cached_property
+    def measured_so_far(self) -> dict[tuple[int, LoadChannel], list[CycleMeasures]]:
+        """Of every place of a channel at an operating point: tables, files and pictures ask for the same."""
+        return {}
+
+    @cached_property
     def mount_names(self) -> list[str]:
         """In the order of the engine."""
         return [mount.name for mount in self.engine.mounts]
@@ -191,7 +196,13 @@ def samples_of(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORC
 
 def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> list[CycleMeasures]:
     """At every place of a channel at operating point k; a maximum is sought between the samples too, as limits are."""
-    signal = channel.signal(evaluation.loads[k])
+    known = evaluation.measured_so_far
+    if (k, channel) not in known:
+        known[k, channel] = _measured(evaluation, channel.signal(evaluation.loads[k]))
+    return known[k, channel]
+
+
+def _measured(evaluation: Evaluation, signal: Spectrum) -> list[CycleMeasures]:
     if not np.all(np.isfinite(signal.coefficients)):
         return [CycleMeasures(math.inf, math.inf, math.inf)] * signal.coefficients.shape[1]
     fine, coarse = (lengths(_one_period(evaluation, each)) for each in (signal, signal.series))

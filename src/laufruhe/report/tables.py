@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
+from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeAlias
-from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from laufruhe.physics.run_up import RunUp
 from laufruhe.present.measures import has_loads, has_ranking, limits_of, load_designs, places_of, ranking_of
@@ -28,6 +28,7 @@ from laufruhe.units import readable
 Cells: TypeAlias = list[Any]
 RPM, DEGREE = readable("rad/s")[1], readable("rad")[1]
 MOST_ROWS = 20 * STEPS
+_WHENEVER = datetime(2000, 1, 1, tzinfo=UTC)
 
 
 @dataclass(frozen=True)
@@ -194,25 +195,28 @@ def write_csv(sheet: Sheet, path: Path) -> None:
 
 def write_book(sheets: Mapping[str, Sheet], path: Path) -> None:
     """All sheets as one workbook, heads held in view."""
-    from openpyxl import Workbook
+    from xlsxwriter import Workbook
 
-    book = Workbook(write_only=True)
-    for name, sheet in sheets.items():
-        page = book.create_sheet(name[:31])
-        page.freeze_panes = "A2"
-        for row in _table(sheet):
-            page.append(row)
-    book.save(drawn := io.BytesIO())
-    with ZipFile(drawn) as given, ZipFile(path, "w", ZIP_DEFLATED) as kept:
-        for entry in given.infolist():
-            # the same numbers make the same file, whenever they are written
-            content = re.sub(rb">\d{4}-\d\d-\d\dT[^<]*<", b">2000-01-01T00:00:00Z<", given.read(entry))
-            kept.writestr(ZipInfo(entry.filename), content, ZIP_DEFLATED)
+    plainly = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
+    with Workbook(str(path), plainly) as book:
+        # the same numbers make the same file, whenever they are written
+        book.set_properties({"created": _WHENEVER})
+        for name, sheet in zip(_page_names(sheets), sheets.values(), strict=True):
+            page = book.add_worksheet(name)
+            page.freeze_panes(1, 0)
+            page.write_row(0, 0, [_text(head) for head in sheet.head])
+            for k, row in enumerate(sheet.rows, 1):
+                page.write_row(k, 0, [_cell(cell) for cell in row])
 
 
-def _table(sheet: Sheet) -> Iterator[Cells]:
-    yield [_text(head) for head in sheet.head]
-    yield from ([_cell(cell) for cell in row] for row in sheet.rows)
+def _page_names(names: Iterable[str]) -> list[str]:
+    """Names of pages: at most 31 letters, none that a workbook forbids, no two that differ in capitals alone."""
+    found: list[str] = []
+    for name in names:
+        whole = re.sub(r"[\[\]:*?/\\]|^'|'$", "-", name)
+        tries = (f"{whole[: 31 - len(end)]}{end}" for k in count(1) for end in [f" {k}" if k > 1 else ""])
+        found.append(next(each for each in tries if each.lower() not in {one.lower() for one in found}))
+    return found
 
 
 def _plain(value: Any) -> Any:

@@ -1,0 +1,33 @@
+"""What check says of a problem: whether the design as given can be evaluated, and what is open.
+
+Nothing that decides or reports is loaded unless its JSON is asked for: an editor may call this on every save.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from laufruhe.files.reader import load
+from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.problem import Problem
+
+
+def checked(path: Path) -> tuple[str, Callable[[], str]]:
+    """What a problem leaves open, and what makes JSON of the design as given."""
+    problem = load(path)
+    drawing = problem if problem.over is None else problem.changed(over=None)
+    # a load that no mount carries, or a gas cycle that cannot be met, shows only here
+    given = evaluate_start(drawing)
+    objective_value(drawing, given)
+    if not given.resonance:
+        given.excess(drawing.limits)
+    return f"ok: {problem.summary}\n", lambda: _as_given(problem)
+
+
+def _as_given(problem: Problem) -> str:
+    from laufruhe.report.json_result import as_json
+    from laufruhe.solvers import state
+
+    return as_json(state(problem, to_start_from=True))
