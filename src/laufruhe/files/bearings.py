@@ -50,13 +50,14 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
 
 
 def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[SliderCrank]) -> None:
-    """Every throw between two bearings; one alone may hang over."""
+    """Every throw between two bearings; one alone may hang over, and one at each end of an axle on two."""
     if len(bearings) < 2:
         rule = f"leaves {shaft.name} on {['no', 'one'][len(bearings)]} bearing, which does not carry its throws"
         raise Refused("main_bearings", None, rule, "give it two at least")
-    places = sorted({part.x for part in parts})
-    for part in parts if len(places) > 1 else ():
-        if not min(bearings) < part.x < max(bearings):
+    places, first, last = sorted({part.x for part in parts}), min(bearings), max(bearings)
+    is_axle = len(bearings) == len(places) == 2 and places[0] < first and last < places[1]
+    for part in parts if len(places) > 1 and not is_axle else ():
+        if not first < part.x < last:
             rule = f"leaves the throw of {part.name} at x = {units.shown(part.x, 'm')} beside all bearings"
             raise Refused("main_bearings", None, rule, "put one on its other side")
 

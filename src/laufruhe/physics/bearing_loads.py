@@ -16,6 +16,7 @@ bearings (B6), still linear. What gears and belts add is not modelled.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import TypeAlias
 
@@ -122,6 +123,20 @@ def _of_rotors(engine: Engine, speed: float, fidelity: Fidelity) -> Spectrum:
     for rotor, index, share in zip(rotors, indices, shares.T, strict=True):
         out[index] += share[:, None] * rotor_wrench(rotor, speed)[:3]
     return Spectrum(engine.cycle.base_order, out)
+
+
+def hammer_blows(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Vertical force of all that turns with an axle on the rail under each of its wheels (B9).
+
+    The wheels stand where the main bearings do. What reciprocates is left out: it drives the frame, not the axle.
+
+    Returns
+    -------
+    Spectrum of shape (n, bearings, 1) [N].
+    """
+    _check_even(fidelity)
+    turning = replace(engine, rotors=(*engine.pins, *engine.rotors))
+    return _of_rotors(turning, point.speed, fidelity).each(lambda forces: forces[..., 2:])
 
 
 @lru_cache(maxsize=256)

@@ -25,18 +25,19 @@ def headline(result: Result) -> str:
     name = o.name[:1].upper() + o.name[1:]
     if not changed(result):
         return f"{name} of the design as given: {figure(o.value, o.unit)}."
-    if abs(o.reduction) < UNFELT:
+    if abs(o.value - o.initial) <= UNFELT * max(abs(o.value), abs(o.initial)):
         return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
     if math.isinf(o.initial):
         found = f"{name} is {figure(o.value, o.unit)}, {_proven(result.certificate)}"
         return f"{found}; the design as given stands on a resonance."
-    change = percent(-o.reduction)
+    # of nothing there is no share
+    change = f" ({percent(-o.reduction)})" if o.initial else ""
     given, decided = figure(o.initial, o.unit), figure(o.value, o.unit, scale=o.initial)
     sentence = f"{name} falls from {given} to {decided}"
     if o.value > o.initial:
         why = ", which breaks a limit," if breaks_a_limit(result.problem, result.initial) else ""
         sentence = f"{name} goes from {given}{why} to {decided}"
-    return f"{sentence} ({change}), {_proven(result.certificate)}."
+    return f"{sentence}{change}, {_proven(result.certificate)}."
 
 
 def accuracy(result: Result) -> str:

@@ -19,6 +19,7 @@ from laufruhe.physics.bearing_loads import (
     bearing_factors,
     crank_pin_factors,
     drag_factors,
+    hammer_blows,
     main_bearing_forces,
     pin_forces,
     piston_pin_forces,
@@ -144,6 +145,8 @@ MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: load
 SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3), lever=0)
 ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), lever=1)
 ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4))
+SURGING_FORCE = _on_block("surging force", "N", slice(1, 2), lever=0)
+SWAYING_COUPLE = _on_block("swaying couple", "N m", slice(5, 6), lever=1)
 MAIN_BEARING_FORCE = _inside(
     "main-bearing force", "N", AT_BEARINGS, Needs.BEARINGS, names_of_bearings,
     lambda moving, at: main_bearing_forces(moving, at.point, at.fidelity),
@@ -151,6 +154,10 @@ MAIN_BEARING_FORCE = _inside(
 MAIN_BEARING_PRESSURE = sized(
     "main-bearing pressure", "Pa", AT_BEARINGS, Needs.BEARINGS, names_of_bearings, main_bearing_forces, bearing_factors
 )
+HAMMER_BLOW = _inside(
+    "hammer blow", "N", OF_BEARINGS, Needs.BEARINGS, names_of_bearings,
+    lambda moving, at: hammer_blows(moving, at.point, at.fidelity),
+)  # fmt: skip
 CRANK_TORQUE = _inside(
     "crank torque", "N m", ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",),
     lambda moving, at: crank_torque(moving, at.point, at.fidelity).each(lambda values: values[:, None, None]),
@@ -210,10 +217,10 @@ ENVELOPE_RADIUS = _of_places("envelope radius", ("max",), lambda m, a, b: reache
 CHANNELS: Mapping[str, Channel] = {
     channel.name: channel
     for channel in (
-        MOUNT_FORCE, MOUNT_TRAVEL, SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT,
-        MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE, SIDE_FORCE,
-        FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS,
-        TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
+        MOUNT_FORCE, MOUNT_TRAVEL, SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT, SURGING_FORCE, SWAYING_COUPLE,
+        HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
+        SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
+        ADDED_MASS, TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
         *OF_RUNS, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES, *TORSIONAL,
     )
 }  # fmt: skip
