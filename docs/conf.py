@@ -1,16 +1,44 @@
-"""Settings of the documentation site: `make docs` writes it to docs/_build."""
+"""Settings of the documentation site: `make docs` writes it to docs/_build, and fetches nothing."""
 
+import sys
 from importlib.metadata import version as version_of
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
 project = "Laufruhe"
 author = "Laufruhe developers"
 version = release = version_of("laufruhe")
-extensions = ["myst_parser", "sphinx_copybutton"]
-exclude_patterns = ["_build"]
-myst_enable_extensions = ["colon_fence", "deflist"]
+from drawn import scraper  # noqa: E402
+
+extensions = ["mathml", "myst_nb", "schema_keys", "sphinx_copybutton", "sphinx_gallery.gen_gallery"]
+exclude_patterns = ["_build", "extensions", "examples", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
 myst_heading_anchors = 3
 # links to files beside docs/ are for readers of the repository
-suppress_warnings = ["myst.xref_missing"]
+suppress_warnings = ["myst.xref_missing", "config.cache"]
+
+# notebooks are run as the site is built; one that fails stops it
+nb_execution_mode = "cache"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120
+
+# every example solves a ready problem, and its pictures are drawn as the site is built
+sphinx_gallery_conf = {
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "abort_on_example_error": True,
+    "only_warn_on_example_error": False,
+    "show_memory": False,
+    "min_reported_time": 1e9,
+    "download_all_examples": False,
+    "remove_config_comments": True,
+    "within_subsection_order": "ExampleTitleSortKey",
+    "image_scrapers": (scraper,),
+}
+
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = "Laufruhe"
 html_theme_options = {"navigation_with_keys": True}

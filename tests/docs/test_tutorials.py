@@ -1,4 +1,4 @@
-"""Every command of a tutorial runs, and says what the page says."""
+"""Every command of tutorials and how-to pages runs, and says what the page says."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 
-PAGES = Path(__file__).parents[2] / "docs" / "tutorials"
+DOCS = Path(__file__).parents[2] / "docs"
 BLOCK = re.compile(r"^```(console|pycon)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 pytestmark = pytest.mark.slow
@@ -33,40 +33,50 @@ def commands(text: str) -> list[tuple[list[str], list[str]]]:
     return found
 
 
-PAGE_NAMES = sorted(path.stem for path in PAGES.glob("*.md"))
+TUTORIALS = sorted(DOCS.glob("tutorials/*.md"))
+PAGES = [*TUTORIALS, *sorted(DOCS.glob("how-to/*.md"))]
+
+
+def pages(kind: str) -> list[Path]:
+    """Pages with blocks of a kind."""
+    return [page for page in PAGES if blocks(page, kind)]
+
+
+def name_of(page: Path) -> str:
+    return page.stem
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder of a user who saved the files of the pages."""
-    for path in PAGES.glob("*.toml"):
+    for path in DOCS.glob("tutorials/*.toml"):
         shutil.copy(path, tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "120")
     return tmp_path
 
 
-@pytest.mark.parametrize("name", [name for name in PAGE_NAMES if blocks(PAGES / f"{name}.md", "console")])
-def test_commands_answer_as_the_page_says(name: str, folder: Path) -> None:
-    for text in blocks(PAGES / f"{name}.md", "console"):
+@pytest.mark.parametrize("page", pages("console"), ids=name_of)
+def test_commands_answer_as_the_page_says(page: Path, folder: Path) -> None:
+    for text in blocks(page, "console"):
         for words, shown in commands(text):
             more = ["--no-plots"] if words[0] in ("solve", "evaluate") else []
             answer = CliRunner().invoke(app, [*words, *more])
             assert answer.exit_code == 0, answer.output
             said = [" ".join(line.split()) for line in answer.output.splitlines()]
             for line in shown:
-                assert line in said, f"{name}: {line}\n{answer.output}"
+                assert line in said, f"{page.stem}: {line}\n{answer.output}"
 
 
-@pytest.mark.parametrize("name", [name for name in PAGE_NAMES if blocks(PAGES / f"{name}.md", "pycon")])
-def test_python_answers_as_the_page_says(name: str, folder: Path) -> None:
-    text = "\n".join(blocks(PAGES / f"{name}.md", "pycon"))
-    test = doctest.DocTestParser().get_doctest(text, {}, name, name, 0)
+@pytest.mark.parametrize("page", pages("pycon"), ids=name_of)
+def test_python_answers_as_the_page_says(page: Path, folder: Path) -> None:
+    text = "\n".join(blocks(page, "pycon"))
+    test = doctest.DocTestParser().get_doctest(text, {}, page.stem, page.stem, 0)
     told: list[str] = []
     assert doctest.DocTestRunner().run(test, out=told.append).failed == 0, "".join(told)
 
 
-def test_every_page_shows_an_answer() -> None:
-    assert PAGE_NAMES
-    for name in PAGE_NAMES:
-        assert blocks(PAGES / f"{name}.md", "console") or blocks(PAGES / f"{name}.md", "pycon"), name
+def test_every_tutorial_shows_an_answer() -> None:
+    assert TUTORIALS
+    for page in TUTORIALS:
+        assert blocks(page, "console") or blocks(page, "pycon"), page.stem

@@ -13,6 +13,7 @@ with chdir(Path(__file__).parent):
 
 from matplotlib.figure import Figure
 
+from laufruhe.errors import Complaint, InputError
 from laufruhe.plots.style import as_svg, save
 from laufruhe.present.pictures import PICTURES
 from laufruhe.solvers.result import Result
@@ -24,6 +25,18 @@ def figures(result: Result) -> Iterator[tuple[str, Figure]]:
         picture = import_module(f"{__name__}.results.{name}")
         if picture.applies(result):
             yield name, picture.figure(result)
+
+
+def figure(result: Result, name: str) -> Figure:
+    """One picture of a result, by its name among `laufruhe.present.pictures.PICTURES`."""
+    picture = import_module(f"{__name__}.results.{name}") if name in PICTURES else None
+    if picture is None or not picture.applies(result):
+        known = [each for each in PICTURES if import_module(f"{__name__}.results.{each}").applies(result)]
+        raise InputError(
+            "figure", (Complaint("name", f'"{name}"', "is no picture of this result", f"one of {', '.join(known)}"),)
+        )
+    drawn: Figure = picture.figure(result)
+    return drawn
 
 
 def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple[str, ...]:

@@ -1,0 +1,13 @@
+"""
+Main bearings of a three-cylinder
+=================================
+
+Six webs, free in mass and angle, halve the mean force on the main bearings. The polar diagrams show where block and
+journals wear.
+"""
+
+import laufruhe
+from laufruhe.plots import figure
+
+result = laufruhe.solve("../../problems/tractor-three-bearings.toml")
+bearings = figure(result, "bearings")

@@ -1,0 +1,16 @@
+"""
+A single-cylinder and its counterweight
+=======================================
+
+A counterweight for about half of the reciprocating mass trades vertical for lateral force. The pictures show the path
+of the force on each mount, and loads over the crank angle, as given and as decided.
+"""
+
+import laufruhe
+from laufruhe.plots import figure
+
+result = laufruhe.solve("../../problems/tractor-single.toml")
+polar = figure(result, "polar")
+
+# %%
+cycle = figure(result, "cycle")

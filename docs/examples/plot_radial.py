@@ -1,0 +1,16 @@
+"""
+A radial engine
+===============
+
+Seven cylinders, one master rod and six articulated rods: the pistons move a little differently, and the engine keeps
+a rest that no single counterweight balances.
+"""
+
+import laufruhe
+from laufruhe.plots import figure
+
+result = laufruhe.solve("../../problems/radial-seven.toml")
+engine = figure(result, "engine")
+
+# %%
+polar = figure(result, "polar")

@@ -1,0 +1,13 @@
+"""
+Mounts on the torque-roll axis
+==============================
+
+Nine stiffnesses of three mounts are decided so that torque excites one mode alone. Bars: share of each motion in the
+kinetic energy of each natural mode.
+"""
+
+import laufruhe
+from laufruhe.plots import figure
+
+result = laufruhe.solve("../../problems/powertrain-torque-roll.toml")
+modes = figure(result, "modes")

@@ -1,0 +1,16 @@
+"""
+A torsional damper
+==================
+
+Inertia and damping of a viscous damper are decided for the least shaft stress in two resonances: how the crankshaft
+swings in its modes, and the torque over crank speed.
+"""
+
+import laufruhe
+from laufruhe.plots import figure
+
+result = laufruhe.solve("../../problems/inline-five-damper.toml")
+twist_modes = figure(result, "twist_modes")
+
+# %%
+twist_response = figure(result, "twist_response")

@@ -1,0 +1,16 @@
+"""
+The crank of a V8
+=================
+
+Throws and firing order of a 90 degree V8 are open. Every crank star that fires evenly is ranked, each with its own best
+counterweights.
+"""
+
+import laufruhe
+from laufruhe.plots import figure
+
+result = laufruhe.solve("../../problems/vee-eight-open.toml")
+star = figure(result, "star")
+
+# %%
+firings = figure(result, "firings")

@@ -1,0 +1,53 @@
+"""Every page of the site is in its index, and every picture of the gallery is of a problem that the tests solve."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import re
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from laufruhe.problem.channels import CHANNELS
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+EXAMPLES = sorted((DOCS / "examples").glob("plot_*.py"))
+
+
+def ready() -> set[str]:
+    with (ROOT / "problems" / "uses.csv").open(encoding="utf-8") as rows:
+        return {row["problem"] for row in csv.DictReader(rows)}
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^([a-z-]+(?:/[a-z-]+)?)$", index, re.MULTILINE))
+    paths = [path.relative_to(DOCS) for pattern in ("**/*.md", "notebooks/*.ipynb") for path in DOCS.glob(pattern)]
+    found = {str(path.with_suffix("")) for path in paths if not {"_build", "gallery"} & set(path.parts)}
+    assert found - {"index"} == listed - {"gallery/index"}
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_pictures_of_the_gallery_are_of_ready_problems(path: Path) -> None:
+    texts = [
+        node.value for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Constant)
+    ]
+    solved = [Path(text).stem for text in texts if isinstance(text, str) and text.endswith(".toml")]
+    assert solved
+    assert set(solved) <= ready()
+
+
+def test_every_quantity_is_explained() -> None:
+    page = (DOCS / "reference" / "quantities.md").read_text(encoding="utf-8")
+    assert not [name for name in CHANNELS if name not in page]
+
+
+def test_notebooks_are_kept_without_output() -> None:
+    """They are executed as the site is built."""
+    for path in DOCS.glob("notebooks/*.ipynb"):
+        notebook = nbformat.read(path, as_version=4)
+        nbformat.validate(notebook)
+        assert all(not cell.get("outputs") for cell in notebook.cells)
