@@ -114,6 +114,7 @@ _EXAMPLES = {
     "rad": ("an angle", "90 deg"),
     "rad/s": ("a speed of rotation", "2500 rpm"),
     "m/s": ("a speed", "10 m/s"),
+    "m/s^2": ("an acceleration", "10 m/s^2"),
     "s": ("a time", "60 s"),
     "": ("a plain number", "0.26"),
 }
@@ -188,6 +189,7 @@ _WRITTEN = {
     "rad": "m?rad|radians?|deg|degrees?|°|turns?",
     "rad/s": "rpm|(?:rad|deg|turns?|revolutions?) ?/ ?(?:s|min)",
     "m/s": f"(?:{_LENGTH}) ?/ ?(?:s|min|h)",
+    "m/s^2": f"{_LENGTH}{_OVER}s(?:\\^|\\*\\*)?2",
     "s": "[nµum]?s|min|minutes?|h|hours?",
 }
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?:/[0-9]+)?"

@@ -32,6 +32,7 @@ _NEEDS = {
         "needs a flywheel",
         "add [flywheel] with an inertia or a rim, [torsion], or fidelity.crank_inertia",
     ),
+    Needs.ROTORS: ("needs the rotors of a rotary engine", 'take layout = "rotary"'),
     Needs.RIM: ("needs the rim of a flywheel", "add [flywheel.rim]"),
     Needs.RUN: ("needs elastic mounts that an engine is run up on", "add [run_up] and [mounts] of kind elastic"),
     Needs.ARMS: ("needs the arms of a flywheel", "add [flywheel.rim.arms]"),
@@ -135,6 +136,7 @@ class Scene:
             Needs.FLYWHEEL: wheel is not None or chain is not None,
             Needs.RIM: rim is not None,
             Needs.RUN: engine.run is not None,
+            Needs.ROTORS: any(not part.has_rod for part in engine.slider_cranks),
             Needs.ARMS: rim is not None and rim.arms is not None,
         }
         return has[needs]

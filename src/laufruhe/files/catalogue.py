@@ -10,6 +10,7 @@ from importlib.resources import files
 from typing import Any
 
 from laufruhe.files.complaints import Refused, nearest
+from laufruhe.machine.layouts import LAYOUTS
 
 KEY = "catalogue"
 """Of [engine]; `engine = "name"` says the same."""
@@ -114,4 +115,9 @@ def with_catalogue_key(schema: dict[str, Any]) -> None:
     required, names = schema.pop("required"), list(engines())
     schema["type"], schema["pattern"] = ["object", "string"], f"^({'|'.join(names)})$"
     schema["properties"] = {KEY: {"enum": names, "description": _TOLD}, **schema["properties"]}
-    schema["anyOf"] = [{"type": "string"}, {"required": [KEY]}, {"required": required}]
+    pistons = {"required": [*required, "stroke", "reciprocating_mass"]}
+    without = {
+        "required": required,
+        "properties": {"layout": {"enum": [k for k, v in LAYOUTS.items() if not v.has_pistons]}},
+    }
+    schema["anyOf"] = [{"type": "string"}, {"required": [KEY]}, pistons, without]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.catalogue import with_catalogue_key
-from laufruhe.files.complaints import Refused, blamed_on, nearest, one_of
+from laufruhe.files.complaints import Refused, blamed_on, nearest, none_of, one_of
 from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
 from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
@@ -23,6 +23,9 @@ FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[Cy
 
 _CYCLES = {str(cycle): cycle for cycle in Cycle}
 _OWNED = tuple(dict.fromkeys(key for k in LAYOUTS.values() for key in (*(own.name for own in k.keys), *k.lists)))
+_OF_PISTONS = (
+    "bore", "stroke", "rod_ratio", "rod_length", "offset", "reciprocating_mass", "rod", "rod_inertia_deficit",
+)  # fmt: skip
 # what a slider-crank of a free list takes from [engine] unless it says otherwise
 _INHERITED = {"stroke", "bore", "offset", "reciprocating_mass", "rod_inertia_deficit"}
 
@@ -81,6 +84,7 @@ _KINDS: dict[str, Any] = {
     "open angle": f.OpenAngle,
     "angles": list[f.Angle],
     "mass": f.Mass,
+    "inertia": f.Inertia,
     "cylinder": CylinderNumber,
     "sign": Literal[1, -1],
     "rod": RodTable,
@@ -107,13 +111,11 @@ class EngineTable(Table):
     cycle: Literal["two-stroke", "four-stroke"]
     cylinders: CylinderNumber | None = f.told("Told by throws or firing order where left out.")
     bore: f.PositiveLength | None = f.told("Needed with gas.")
-    stroke: f.PositiveLength
+    stroke: f.PositiveLength | None = None
     rod_ratio: f.NonNegative | None = f.told("Crank radius over rod length; 0 is a Scotch yoke.")
     rod_length: f.OpenPositiveLength | None = None
     offset: f.Length = f.told("Of the pin's path from the crank axis.", 0.0)
-    reciprocating_mass: f.OpenMass = Field(
-        description="Per cylinder, with the rod's share unless [engine.rod] is given."
-    )
+    reciprocating_mass: f.OpenMass | None = f.told("Per cylinder, with the rod's share unless [engine.rod] is given.")
     rotating_mass: f.Mass = f.told("Per throw, at the crank radius.", 0.0)
     rod: RodTable | None = None
     big_end: BigEndTable | None = f.told("Needed for the pressure on crank pins.")
@@ -126,7 +128,7 @@ class EngineTable(Table):
     @property
     def piston_mass(self) -> Open:
         """Reciprocating mass without a share of the rod, which may be open."""
-        return Open.of(self.reciprocating_mass)
+        return Open.of(self.reciprocating_mass or 0.0)
 
     @property
     def given_throws(self) -> list[float] | None:
@@ -150,8 +152,9 @@ class EngineTable(Table):
 
 
 def cycle_of(table: EngineTable) -> Cycle:
-    """Two- or four-stroke."""
-    return _CYCLES[table.cycle]
+    """In which its loads repeat."""
+    with blamed_on("engine.cycle"):
+        return table.kind.cycle(_CYCLES[table.cycle])
 
 
 def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
@@ -160,8 +163,9 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     for key in _OWNED:
         if table.own(key) and not kind.takes(key):
             raise Refused(f"engine.{key}", None, f"means nothing in layout '{table.layout}'", "leave it out")
+    _check_pistons(table)
     bores = [part.bore for part in table.slider_cranks] or [None]
-    if gas and table.bore is None and None in bores:
+    if gas and kind.has_pistons and table.bore is None and None in bores:
         raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
     if kind.is_free:
         parts = _free_parts(table)
@@ -170,6 +174,16 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     throws = _throws(table, layout)
     with blamed_on("engine.firing_order" if table.given_order else "engine"):
         return kind.parts(asked, layout, throws)
+
+
+def _check_pistons(table: EngineTable) -> None:
+    """What an engine with pistons must say, and one without must not."""
+    if table.kind.has_pistons:
+        for key in ("stroke", "reciprocating_mass"):
+            if getattr(table, key) is None:
+                raise Refused(f"engine.{key}", None, "is missing", "add it")
+    else:
+        none_of(table, _OF_PISTONS, "engine", f"means nothing in layout '{table.layout}'", "leave it out")
 
 
 def layout_of(table: EngineTable) -> Layout:
@@ -184,7 +198,7 @@ def _asked(table: EngineTable, gas: bool = False) -> Asked:
     own = {name: None if isinstance(value, Open) else value for name, value in given.items()}
     rods = {name: value.model_dump() for name, value in own.items() if isinstance(value, RodTable)}
     order = None if table.given_order is None else tuple(table.given_order)
-    count, (mechanism, rod) = _cylinders(table), _mechanism(table)
+    count, (mechanism, rod) = _cylinders(table), _mechanism(table, own)
     return Asked(cycle_of(table), count, mechanism, own | rods, order, table.piston_mass.start, rod, gas)
 
 
@@ -231,8 +245,11 @@ def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
         return even_throws(cycle_of(table), layout, table.given_order)
 
 
-def _mechanism(table: EngineTable) -> tuple[Mechanism, Rod | None]:
+def _mechanism(table: EngineTable, own: Mapping[str, Any] | None = None) -> tuple[Mechanism, Rod | None]:
     """Masses and lengths of one cylinder, and its rod where that is a rigid body."""
+    big_end = None if table.big_end is None else table.big_end.size
+    if not table.kind.has_pistons:
+        return table.kind.mechanism(own or {}, rotating_mass=table.rotating_mass, big_end=big_end), None
     radius, rod_length = _radius_and_rod(table)
     rod = _rod(table, rod_length)
     if rod is not None and table.rod_inertia_deficit != 0.0:
@@ -246,7 +263,7 @@ def _mechanism(table: EngineTable) -> tuple[Mechanism, Rod | None]:
         rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit,
         offset=table.offset,
         bore=table.bore,
-        big_end=None if table.big_end is None else table.big_end.size,
+        big_end=big_end,
     )
     return mechanism, rod
 
@@ -264,8 +281,9 @@ def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
     """Crank radius and rod length [m] from stroke, offset and one of rod ratio and rod length."""
     ratio, length = table.rod_ratio, None if table.rod_length is None else Open.of(table.rod_length).start
     one_of(table, "engine", "rod_ratio", "rod_length", shown=ratio)
+    stroke = table.stroke or 0.0
     with blamed_on("engine.offset"):
-        radius = radius_for_stroke(table.stroke, table.offset, rod_length=length, rod_ratio=ratio or 0.0)
+        radius = radius_for_stroke(stroke, table.offset, rod_length=length, rod_ratio=ratio or 0.0)
     rod = length if length is not None else (radius / ratio if ratio else math.inf)
     turning = (radius + abs(table.offset)) / rod
     if turning >= 1.0:

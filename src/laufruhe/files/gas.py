@@ -26,6 +26,7 @@ from laufruhe.machine import (
     Wiebe,
 )
 from laufruhe.machine.gas import AMBIENT_PRESSURE
+from laufruhe.physics.gas_cycle import check_chamber
 
 
 class ChargeTable(Table):
@@ -141,7 +142,10 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
         if isinstance(table, TraceTable):
             return replace(_trace(table, folder, "gas"), crankcase_pressure=air)
         made: GasModel = table.makes(**table.model_dump(exclude={"model"}, exclude_none=True))
-        return made
+    with blamed_on("gas.compression_ratio"):
+        for part in parts:
+            check_chamber(made, part)
+    return made
 
 
 def _chambers(
@@ -149,6 +153,8 @@ def _chambers(
 ) -> tuple[Chamber, ...]:  # fmt: skip
     if cycle is not Cycle.TWO_STROKE:
         raise Refused("engine.cycle", str(cycle), "has chambers that work once a turn", 'write "two-stroke"')
+    if any(not part.has_rod for part in parts):
+        raise Refused("gas.model", "chambers", "is of pistons, and a rotor has none", "take seiliger, wiebe or a trace")
     if any(one.faces(other) for one in parts for other in parts):
         rule = "has pistons that share a chamber, and chambers here are between a piston and a cylinder head"
         raise Refused("engine.layout", None, rule, "list the pistons on cylinders of their own, or leave gas out")

@@ -38,7 +38,11 @@ class OperatingPointTable(Table):
 
 
 def operating_points(
-    tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float, brake: Brake | None = None
+    tables: Sequence[OperatingPointTable],
+    gas: GasModel | None,
+    cycle: Cycle,
+    stroke: float | None,
+    brake: Brake | None = None,
 ) -> tuple[OperatingPoint, ...]:
     """Speeds and loads of an engine whose gas, where a point says no other, is this."""
     points = []
@@ -60,11 +64,13 @@ def operating_points(
     return tuple(points)
 
 
-def _speeds(table: OperatingPointTable, stroke: float, where: str) -> tuple[float, ...]:
+def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tuple[float, ...]:
     """One speed, or equal steps over a range that share the weight."""
     one_of(table, where, "speed", "mean_piston_speed")
+    if table.speed is None and stroke is None:
+        raise Refused(f"{where}.mean_piston_speed", None, "means nothing without pistons", "give the speed")
     # c_m = 2 s n (Roetscher eq. 290)
-    first = math.pi * (table.mean_piston_speed or 0.0) / stroke if table.speed is None else table.speed
+    first = math.pi * (table.mean_piston_speed or 0.0) / (stroke or 1.0) if table.speed is None else table.speed
     if table.up_to is None and table.steps is None:
         return (first,)
     if table.up_to is None or table.steps is None:

@@ -319,7 +319,7 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
         raise Refused(
             "friction", None, "serves no operating point", "give one a bmep or a brake_torque, or leave it out"
         )
-    if any(part.bore is None for part in cylinders):
+    if any(part.swept.piston.bore is None for part in cylinders):
         raise Refused("engine.bore", None, "is missing, and a load at the brake is over the displacement", "add it")
     return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
 

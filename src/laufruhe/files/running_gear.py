@@ -145,6 +145,6 @@ def _check_rod(engine: EngineTable) -> None:
     shortest = Open.of(engine.rod_length or math.inf).lower
     if engine.kind.is_free or engine.offset:
         raise Refused("engine.rod_length", None, "is decided in layouts without offset", "fix it, or take a layout")
-    if shortest <= 0.5 * engine.stroke:
+    if engine.stroke is not None and shortest <= 0.5 * engine.stroke:
         shown = units.shown(shortest, "m")
         raise Refused("engine.rod_length", shown, "does not let the crank turn", "raise its lower bound")

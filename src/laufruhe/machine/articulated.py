@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -70,6 +70,7 @@ class ArticulatedCrank(SliderCrank):
     """A cylinder whose rod works on a knuckle pin; `rotating_mass` is the rod's share there."""
 
     knuckle: Knuckle
+    has_pin_loads: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -6,7 +6,7 @@ import math
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
@@ -73,6 +73,47 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Outline:
+    """A body as it is drawn.
+
+    Attributes
+    ----------
+    points
+        Of a closed line about the shaft, in the plane turned to the cylinder axis [m].
+    width
+        Along the shaft [m].
+    moves
+        Else it is of the block.
+    """
+
+    points: Any
+    width: float
+    moves: bool
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What a charge works in: a piston's cylinder, or chambers alike that come one after the other.
+
+    Attributes
+    ----------
+    piston
+        Slider-crank that sweeps one chamber, its angle counted from firing.
+    pace
+        Its crank angle over that of the engine.
+    lags
+        Crank angles of the engine by which each fires before the first [rad].
+    four_strokes
+        Whether a chamber makes four strokes whatever the cycle of the engine.
+    """
+
+    piston: SliderCrank
+    pace: float = 1.0
+    lags: tuple[float, ...] = (0.0,)
+    four_strokes: bool = False
+
+
+@dataclass(frozen=True)
 class SliderCrank:
     """One cylinder's mechanism; any other is a class of its own that says how it moves.
 
@@ -118,6 +159,10 @@ class SliderCrank:
     firing_angle: float = 0.0
     shaft: Shaft = CRANKSHAFT
     big_end: tuple[float, float] | None = None
+    has_pin_loads: ClassVar[bool] = True
+    """Whether it is known what it presses its crank pin with."""
+    has_rod: ClassVar[bool] = True
+    """Whether a rod leans on a cylinder wall."""
 
     def __post_init__(self) -> None:
         if not self.crank_radius > 0.0:
@@ -211,6 +256,28 @@ class SliderCrank:
         apart = complex(other.shaft.z - self.shaft.z, other.shaft.y - self.shaft.y) * axis.conjugate()
         reach = _ON_ONE_AXIS * abs(apart)
         return self.x == other.x and abs(axis + opposite) < _ON_ONE_AXIS and abs(apart.imag) <= reach < apart.real
+
+    @property
+    def swept(self) -> Swept:
+        """What a charge works in."""
+        return Swept(self)
+
+    def lean(self, lib: Any, angles: Any) -> Any:
+        """Force on the crank pin over that of the gas away from it, some crank angles after firing (B2).
+
+        In the plane turned to the cylinder axis: the rod leans on the wall.
+        """
+        shape = lib, self.fires_at + self.shaft.ratio * angles, self.rod_ratio, self.offset_ratio
+        return 1.0 - 1j * kinematics.sin_psi(*shape) / kinematics.cos_psi(*shape)
+
+    def outlines(self, _alpha: float) -> tuple[Outline, ...]:
+        """Bodies at an angle of its crank; of none a piston and a rod are drawn."""
+        return ()
+
+    @property
+    def largest_ratio(self) -> float:
+        """Compression ratio that its shape allows."""
+        return math.inf
 
     @property
     def piston_area(self) -> float:

@@ -38,8 +38,8 @@ OfPart: TypeAlias = Callable[[Cycle, SliderCrank, float, GasModel | None, Fideli
 
 
 def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
-    """Whether loads inside the crankcase are modelled: of plain slider-cranks at even crank speed."""
-    return not fidelity.is_uneven and all(type(part) is SliderCrank for part in engine.slider_cranks)
+    """Whether loads inside the crankcase are modelled: of what is known to press its pin, at even crank speed."""
+    return not fidelity.is_uneven and all(part.has_pin_loads for part in engine.slider_cranks)
 
 
 def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -67,8 +67,11 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
     Raises
     ------
     ModelError
-        As `pin_forces`.
+        As `pin_forces`; if there is no rod.
     """
+    for part in engine.slider_cranks:
+        if not part.has_rod:
+            raise ModelError(f"{part.name} has no rod that leans on a cylinder wall; ask for the crank-pin force")
     return _of_parts(_of_piston_pin, engine, point, fidelity)
 
 
@@ -222,7 +225,7 @@ def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
 @lru_cache(maxsize=256)
 def _of_piston_pin(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
     """P and N of one cylinder, shape (n, 2) (B1, B2)."""
-    if type(part) is not SliderCrank:
+    if not part.has_pin_loads:
         raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
     ratio = part.shaft.ratio
     series = _inertia_orders(part, fidelity) * (ratio * speed) ** 2
@@ -272,9 +275,9 @@ def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fideli
     """P and N of the gas over the crank angle of the engine, shape (n, 2) (B1, B2)."""
 
     def loads(angles: Array) -> Array:
-        alpha = part.fires_at + part.shaft.ratio * angles
-        along = thrust_at(gas, part, cycle, angles)
-        return np.stack([along, -along * _tangent(part, alpha)], axis=1)
+        ago = [angles + lag for lag in part.swept.lags]
+        total = np.sum([thrust_at(gas, part, cycle, since) * part.lean(np, since) for since in ago], axis=0)
+        return np.stack([total.real, total.imag], axis=1)
 
     from_firing = bent_spectrum(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))
     return fidelity.kept_of_gas(from_firing.later(as_turn(part.firing_angle) / cycle.turns, part.firing_angle))

@@ -39,6 +39,12 @@ def swept_rate(part: SliderCrank, angles: FloatArray) -> FloatArray:
     return np.asarray(-ratio * part.velocity(np, part.fires_at + ratio * angles) / part.stroke)
 
 
+def chamber_volume(part: SliderCrank, since: FloatArray) -> FloatArray:
+    """Volume of a chamber over its least [m3], some crank angles after it fired [rad] (R3)."""
+    own = part.swept.piston
+    return own.piston_area * own.stroke * swept_volume(own, part.swept.pace * since)
+
+
 def dead_centres(part: SliderCrank) -> tuple[float, float]:
     """Angles gamma of the highest piston position and of the lowest after it [rad] (G2)."""
     top, bottom = (_ratio(part) * (alpha - part.fires_at) for alpha in part.dead_centres)

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Chambers, Cycle, GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
+from laufruhe.errors import ModelError
+from laufruhe.machine import Chambers, Charge, Cycle, GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.physics.cylinder_volume import dead_centres
 from laufruhe.physics.pressure_trace import trace_pressure
 from laufruhe.physics.seiliger_cycle import cut_off_angle, seiliger_pressure
@@ -36,18 +38,43 @@ def cylinder_pressure(gas: OneChamber, part: SliderCrank, cycle: Cycle, samples:
 
 def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """As `cylinder_pressure`, at any crank angles from the firing dead centre [rad], shape of `angles`."""
+    gas, own, cycle, pace = _worked(gas, part, cycle)
     if isinstance(gas, PressureTrace):
-        return trace_pressure(gas, cycle, angles)
+        return trace_pressure(gas, cycle, angles, pace)
     if isinstance(gas, Seiliger):
-        return seiliger_pressure(gas, part, cycle, angles)
-    return wiebe_pressure(gas, part, cycle, angles)
+        return seiliger_pressure(gas, own, cycle, pace * angles)
+    return wiebe_pressure(gas, own, cycle, pace * angles)
+
+
+def _worked(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> tuple[OneChamber, SliderCrank, Cycle, float]:
+    """Gas, piston and cycle of one chamber, and its pace (R3): a burn is told in crank angles of the engine."""
+    check_chamber(gas, part)
+    swept = part.swept
+    if isinstance(gas, Wiebe) and swept.pace != 1.0:
+        gas = replace(gas, start=swept.pace * gas.start, duration=swept.pace * gas.duration)
+    return gas, swept.piston, Cycle.FOUR_STROKE if swept.four_strokes else cycle, swept.pace
+
+
+def check_chamber(gas: GasModel, part: SliderCrank) -> None:
+    """Refuse a compression that the shape of a chamber has no room for (R2).
+
+    Raises
+    ------
+    ModelError
+        If the chamber would vanish.
+    """
+    if isinstance(gas, Charge) and gas.compression_ratio > part.largest_ratio:
+        raise ModelError(
+            f"{gas.compression_ratio:g} leaves {part.name} no chamber, whose shape allows "
+            f"{part.largest_ratio:.4g} at most; lessen it, or the eccentricity"
+        )
 
 
 def thrust_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Force of the gas on a piston rod, along the axis and away from the crank [N], as `pressure_at` (B1, G14)."""
     if isinstance(gas, Chambers):
         return chambers_thrust(gas, part, angles)
-    return np.asarray(-part.piston_area * (pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure))
+    return np.asarray(-part.swept.piston.piston_area * (pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure))
 
 
 def alike_under(gas: GasModel, part: SliderCrank) -> Hashable:
@@ -62,10 +89,16 @@ def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[n
     """
     if isinstance(gas, Chambers):
         return chambers_breaks(gas, part)
+    return np.ravel(_breaks_of_one(gas, part, cycle)[:, None] - np.array(part.swept.lags))
+
+
+def _breaks_of_one(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:
+    """Those of the chamber that fires at the dead centre."""
+    gas, own, cycle, pace = _worked(gas, part, cycle)
     if isinstance(gas, PressureTrace):
         return np.array(gas.angles)
-    top, bottom = dead_centres(part)
+    top, bottom = dead_centres(own)
     ends = [bottom - math.tau, top, bottom, top + math.tau]
     if isinstance(gas, Seiliger):
-        return np.array([*ends, cut_off_angle(gas, part, cycle)])
-    return np.array([*ends, gas.start, gas.start + gas.duration])
+        return np.array([*ends, cut_off_angle(gas, own, cycle)]) / pace
+    return np.array([*ends, gas.start, gas.start + gas.duration]) / pace

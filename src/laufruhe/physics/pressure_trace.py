@@ -17,8 +17,8 @@ MAX_TRACE_GAP = math.radians(30.0)
 """Largest gap between points of a measured trace."""
 
 
-def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: FloatArray) -> FloatArray:
-    """Measured pressure [Pa] at crank angles gamma [rad], shape of `angles`, with the period of the cycle (G12).
+def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: FloatArray, pace: float = 1.0) -> FloatArray:
+    """Measured pressure [Pa] at crank angles gamma [rad], shape of `angles`, the cycle repeated at a pace (G12).
 
     Monotone cubics between the points (Fritsch and Carlson 1980) stay within their
     neighbours: a jump does not ring.
@@ -31,24 +31,25 @@ def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: FloatArray) -> Floa
     # late, for it takes longer than all the rest of a small problem
     from scipy.interpolate import PchipInterpolator
 
-    points, pressures = _one_period(gas, cycle)
-    _check_gaps(points, cycle)
+    whole = cycle.angle / pace
+    points, pressures = _one_period(gas, cycle, whole)
+    _check_gaps(points, cycle, whole)
     # a slope looks at two neighbours on either side
-    around = np.concatenate([points[-3:] - cycle.angle, points, points[:3] + cycle.angle])
+    around = np.concatenate([points[-3:] - whole, points, points[:3] + whole])
     values = np.concatenate([pressures[-3:], pressures, pressures[:3]])
-    local = points[0] + np.mod(angles - points[0], cycle.angle)
+    local = points[0] + np.mod(angles - points[0], whole)
     return np.asarray(PchipInterpolator(around, values)(local))
 
 
-def _one_period(gas: PressureTrace, cycle: Cycle) -> tuple[FloatArray, FloatArray]:
+def _one_period(gas: PressureTrace, cycle: Cycle, whole: float) -> tuple[FloatArray, FloatArray]:
     """Points of a trace, an end that repeats the beginning merged into it."""
     points, pressures = np.array(gas.angles), np.array(gas.pressures)
-    missing = cycle.angle - (points[-1] - points[0])
+    missing = whole - (points[-1] - points[0])
     step = float(np.min(np.diff(points)))
     if missing < -1e-3 * step:
         raise ModelError(
             f"the trace runs from {_degrees(points[0])} to {_degrees(points[-1])} deg, more than the "
-            f"{_degrees(cycle.angle)} deg of a {cycle} cycle; cut it to one cycle"
+            f"{_degrees(whole)} deg of a {cycle} cycle; cut it to one cycle"
         )
     if missing > 1e-3 * step:
         return points, pressures
@@ -57,13 +58,13 @@ def _one_period(gas: PressureTrace, cycle: Cycle) -> tuple[FloatArray, FloatArra
     return points[:-1], merged
 
 
-def _check_gaps(points: FloatArray, cycle: Cycle) -> None:
+def _check_gaps(points: FloatArray, cycle: Cycle, whole: float) -> None:
     inner = np.diff(points)
-    outer = float(points[0] + cycle.angle - points[-1])
+    outer = float(points[0] + whole - points[-1])
     if outer > min(2.0 * float(inner.max()), MAX_TRACE_GAP):
         raise ModelError(
             f"the trace runs from {_degrees(points[0])} to {_degrees(points[-1])} deg, so {_degrees(outer)} of the "
-            f"{_degrees(cycle.angle)} deg of a {cycle} cycle are missing; "
+            f"{_degrees(whole)} deg of a {cycle} cycle are missing; "
             "give the whole cycle"
         )
     k = int(np.argmax(inner))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from matplotlib.patches import Circle, Patch, Rectangle, Wedge
 
 from laufruhe.machine import Engine, Rotor, Shaft, SliderCrank
 from laufruhe.machine.rotor import Role
+from laufruhe.machine.slider_crank import Outline
 from laufruhe.plots.style import AFTER, GREY, ORANGE, entry, entry_of_dots
 from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import changed
@@ -89,12 +90,13 @@ class Scene:
 
 @dataclass(frozen=True)
 class _Pose:
-    """Where a slider-crank is, zeta = z + i y [m] (C4)."""
+    """Where a slider-crank is, zeta = z + i y [m] (C4), and the bodies of one that has no piston."""
 
     part: SliderCrank
     crank: complex
     pin: complex
     piston: complex
+    bodies: tuple[Outline, ...]
 
     @classmethod
     def of(cls, part: SliderCrank, phi: float) -> _Pose:
@@ -104,7 +106,10 @@ class _Pose:
         rod = part.rod_length if math.isfinite(part.rod_length) else LONG_ROD * part.crank_radius
         moved = complex(part.motion(np, np.float64(turn - part.bank)).points[0][1][0])
         way = part.crank_radius + rod + moved
-        return cls(part, centre, centre + part.crank_radius * cmath.exp(1j * turn), centre + way * axis)
+        bodies = tuple(
+            replace(body, points=centre + axis * body.points) for body in part.outlines(float(turn - part.bank))
+        )
+        return cls(part, centre, centre + part.crank_radius * cmath.exp(1j * turn), centre + way * axis, bodies)
 
 
 def half_disc(unbalance: float) -> float:
@@ -117,10 +122,13 @@ def front_view(axes: Axes, scene: Scene, phi: float = 0.0) -> None:
     poses = [_Pose.of(part, phi) for part in scene.engine.slider_cranks]
     bore = _bore(scene.engine)
     for pose in poses:
-        _line(axes, [pose.pin, pose.piston], color=_METAL, linewidth=2.6, zorder=2)
+        if pose.bodies:
+            _bodies(axes, pose)
+        else:
+            _line(axes, [pose.pin, pose.piston], color=_METAL, linewidth=2.6, zorder=2)
+            _piston(axes, pose, bore)
         _line(axes, [pose.crank, pose.pin], color=_crank_colour(scene), linewidth=3.2, zorder=4)
         axes.add_patch(Circle(_at(pose.pin), _MM * 0.12 * bore, facecolor="white", edgecolor=INK, zorder=5))
-        _piston(axes, pose, bore)
     for rotor in scene.weights:
         centre, along = complex(rotor.shaft.z, rotor.shaft.y), _direction(rotor, phi)
         middle = 90.0 - math.degrees(along)
@@ -153,10 +161,16 @@ def side_view(axes: Axes, scene: Scene, phi: float = 0.0) -> None:
         look: Any = {"color": _crank_colour(scene), "linewidth": 2.6, "zorder": 4}
         crank, piston = level(pose.crank), level(pose.piston)
         axes.plot([x - wide, x - wide, x + wide, x + wide], [crank, pin, pin, crank], **look)
-        axes.plot([x, x], [pin, piston], color=_METAL, linewidth=2.6, zorder=3)
-        height = _MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
-        place = (x - 0.48 * _MM * bore, piston - 0.5 * height)
-        axes.add_patch(Rectangle(place, 0.96 * _MM * bore, height, **_PISTON, zorder=5))
+        for body in pose.bodies:
+            heights = [level(place) for place in body.points]
+            corner = (x - 0.5 * _MM * body.width, min(heights))
+            axes.add_patch(Rectangle(corner, _MM * body.width, max(heights) - min(heights), **_look_of(body)))
+            piston = 0.5 * (min(heights) + crank)
+        if not pose.bodies:
+            axes.plot([x, x], [pin, piston], color=_METAL, linewidth=2.6, zorder=3)
+            height = _MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
+            place = (x - 0.48 * _MM * bore, piston - 0.5 * height)
+            axes.add_patch(Rectangle(place, 0.96 * _MM * bore, height, **_PISTON, zorder=5))
         number = next((word for word in pose.part.name.split() if word.isdecimal()), "")
         # pistons of two banks may stand behind each other
         aside = -0.25 * _MM * bore * float(np.sign(round(math.sin(pose.part.bank - quarter), 9)))
@@ -198,7 +212,8 @@ def _spots(scene: Scene) -> Iterator[tuple[float, complex, float]]:
     bore = _bore(scene.engine)
     for part in scene.engine.slider_cranks:
         for pose in (_Pose.of(part, phi) for phi in np.linspace(0.0, math.tau / abs(part.shaft.ratio), 13)):
-            yield part.x, pose.piston, 0.4 * bore
+            spots = [*(place for body in pose.bodies for place in body.points)] or [pose.piston]
+            yield from ((part.x, place, 0.0 if pose.bodies else 0.4 * bore) for place in spots)
             yield part.x, pose.pin, 0.15 * bore
     for rotor in scene.weights:
         yield rotor.x, complex(rotor.shaft.z, rotor.shaft.y), half_disc(abs(rotor.unbalance))
@@ -253,6 +268,18 @@ def _at(place: complex) -> tuple[float, float]:
 def _line(axes: Axes, places: Sequence[complex], **look: Any) -> None:
     xs, ys = zip(*(_at(place) for place in places), strict=True)
     axes.plot(xs, ys, solid_capstyle="round", **look)
+
+
+def _look_of(body: Outline) -> dict[str, Any]:
+    if body.moves:
+        return {**_PISTON, "zorder": 2.2}
+    return {"fill": False, "edgecolor": GREY, "linewidth": 1.4, "zorder": 1.8}
+
+
+def _bodies(axes: Axes, pose: _Pose) -> None:
+    for body in pose.bodies:
+        xs, ys = zip(*(_at(place) for place in body.points), strict=True)
+        axes.fill(xs, ys, **_look_of(body))
 
 
 def _piston(axes: Axes, pose: _Pose, bore: float) -> None:

@@ -43,7 +43,7 @@ def animate(result: Result, path: Path) -> None:
         framed(drawn.panels[1], beside, backwards=True, down=scene.is_flat)
         for one, forces in zip(series, loads, strict=False):
             _arrows(drawn.panels[0], scene, forces[step], largest, one.colour)
-        shown = f"{math.degrees(phi):5.1f} deg after cylinder 1 fires"
+        shown = f"{math.degrees(phi):5.1f} deg after {scene.engine.slider_cranks[0].name} fires"
         scale = f"; longest arrow {words(largest, 'N', 3)}" if largest else ""
         at = f", at {point_name(result, k)}" if loads else ""
         legend = [*legend_of(scene), *(one.entry(": forces") for one in series[: len(loads)])]

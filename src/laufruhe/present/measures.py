@@ -102,7 +102,7 @@ def breaks_a_limit(problem: Problem, evaluation: Evaluation) -> bool:
 def is_met(limit: LimitValue) -> bool:
     """Whether the design keeps a limit, up to the rounding of a solver."""
     sign = 1.0 if limit.side == "at most" else -1.0
-    return sign * (limit.value - limit.limit) <= abs(limit.limit) * 1e-6 + 1e-12
+    return sign * (limit.value - limit.limit) <= 1e-6 * (abs(limit.limit) or 1.0)
 
 
 def has_mounts(result: Result) -> bool:

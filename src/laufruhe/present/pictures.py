@@ -9,6 +9,7 @@ PICTURES = {
     "bars": "Mean and maximum of each mount's force over one cycle.",
     "indicator": "Indicator diagrams of steam cylinders and pumps, and the force on each rod over its stroke.",
     "torque": "Torque of gas, pistons and rods, its work and its orders, and the speed that a flywheel makes of it.",
+    "chambers": "Volume, pressure and torque of each chamber of a rotor over three turns of the shaft.",
     "bearings": "Force on each main bearing over a cycle, as block and crankshaft feel it, and where they wear.",
     "twist_modes": "How the crankshaft swings in its natural modes, and the speeds at which orders meet them.",
     "twist_response": "Torque in the crankshaft over crank speed, with the speeds at which a limit bars it.",

@@ -11,6 +11,7 @@ from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_piston
 from laufruhe.machine.layouts.parts import Parts
 from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.layouts.radial import Radial
+from laufruhe.machine.layouts.rotary import Rotary
 from laufruhe.machine.layouts.vee import Vee, vee
 
 LAYOUTS: dict[str, LayoutKind] = {
@@ -21,6 +22,7 @@ LAYOUTS: dict[str, LayoutKind] = {
         Boxer(),
         OpposedPiston(),
         Radial(),
+        Rotary(),
         Parts(),
     )
 }

@@ -23,7 +23,7 @@ class Key:
     ----------
     kind
         "length", "positive length", "non-negative length", "angle", "open angle", "angles", "cylinder", "sign",
-        "mass", or "rod" of a mass, centre of gravity and inertia.
+        "inertia", "mass", or "rod" of a mass, centre of gravity and inertia.
     default
         Where it is left out.
     remedy
@@ -97,6 +97,8 @@ class LayoutKind(ABC):
         Cylinders that share a throw.
     is_free
         Whether every slider-crank is listed, and nothing is placed.
+    has_pistons
+        Whether [engine] says what its pistons, rods and strokes are; else the layout's own keys make the mechanism.
     """
 
     name: ClassVar[str]
@@ -105,10 +107,27 @@ class LayoutKind(ABC):
     openable: ClassVar[tuple[str, ...]] = ()
     cylinders_per_throw: ClassVar[int] = 1
     is_free: ClassVar[bool] = False
+    has_pistons: ClassVar[bool] = True
 
     def takes(self, key: str) -> bool:
         """Whether a key means anything here."""
         return key in self.lists or any(own.name == key for own in self.keys)
+
+    def cycle(self, said: Cycle) -> Cycle:
+        """In which the loads of an engine repeat whose chambers work in this one (C6)."""
+        return said
+
+    def mechanism(self, own: Mapping[str, Any], **shared: Any) -> Mechanism:
+        """What cylinders share in a layout without pistons.
+
+        Parameters
+        ----------
+        own
+            As in `Asked`.
+        shared
+            What [engine] says of all mechanisms: `rotating_mass` and `big_end`.
+        """
+        raise NotImplementedError(f"layout '{self.name}' has pistons")
 
     @abstractmethod
     def place(self, asked: Asked) -> Layout:

@@ -28,5 +28,6 @@ def figure(result: Result) -> Figure:
     for axes, title in ((front, "from the front, turning clockwise"), (side, scene.beside)):
         axes.set_title(title, loc="left", size=9)
     weights = f" Weights as half discs of steel, {1e3 * THICKNESS:g} mm thick, of the same unbalance."
-    lines = f"To scale, at the firing dead centre of cylinder 1.{weights if scene.weights else ''}"
+    first = scene.engine.slider_cranks[0].name
+    lines = f"To scale, at the firing dead centre of {first}.{weights if scene.weights else ''}"
     return headed(drawn, result, "The engine", lines, legend_of(scene))

@@ -29,6 +29,7 @@ from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.channels.apexes import OF_APEXES
 from laufruhe.problem.channels.flywheel import OF_FLYWHEEL
 from laufruhe.problem.channels.kinds import (
     AT_BEARINGS,
@@ -221,6 +222,6 @@ CHANNELS: Mapping[str, Channel] = {
         HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
         SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
         ADDED_MASS, TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
-        *OF_RUNS, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES, *TORSIONAL,
+        *OF_RUNS, *OF_APEXES, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES, *TORSIONAL,
     )
 }  # fmt: skip

@@ -57,6 +57,7 @@ class Needs(StrEnum):
     RIM = "rim"
     ARMS = "arms"
     RUN = "run-up"
+    ROTORS = "rotors of a rotary engine"
 
 
 _KNOWN: dict[str, Channel] = {}

@@ -1,0 +1,88 @@
+"""Rotors on the eccentrics of one shaft."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from laufruhe import units
+from laufruhe.errors import KeyedError
+from laufruhe.machine.engine import Cycle
+from laufruhe.machine.layouts.base import SPACING, Key
+from laufruhe.machine.layouts.build import Mechanism
+from laufruhe.machine.layouts.inline import Inline
+from laufruhe.machine.rotary import FLANKS, RotaryUnit
+from laufruhe.machine.rotor import CRANKSHAFT, Shaft
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotorMechanism(Mechanism):
+    """What the rotors of an engine share; `rod_rotating_mass` is the rotor's.
+
+    Attributes
+    ----------
+    rotor_radius, rotor_width, rotor_inertia
+        See `RotaryUnit`.
+    """
+
+    rotor_radius: float
+    rotor_width: float
+    rotor_inertia: float
+
+    def cylinder(
+        self,
+        number: int,
+        x: float,
+        throw: float,
+        bank: float,
+        firing_angle: float,
+        pin_mass: float = 0.0,
+        shaft: Shaft = CRANKSHAFT,
+    ) -> RotaryUnit:
+        """One rotor."""
+        unit = vars(super().cylinder(number, x, throw, bank, firing_angle, pin_mass, shaft))
+        own = {key: getattr(self, key) for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
+        return RotaryUnit(**unit | own | {"name": f"rotor {number}"})
+
+
+class Rotary(Inline):
+    """Rotors one behind another, each firing once a turn of the shaft."""
+
+    name = "rotary"
+    has_pistons = False
+    keys = (
+        SPACING,
+        Key("eccentricity", "positive length", "Of the shaft under every rotor."),
+        Key("rotor_radius", "positive length", "From a rotor's centre to its apexes."),
+        Key("rotor_width", "positive length", "Along the shaft."),
+        Key("rotor_mass", "mass", "Of a rotor with its seals; rotating_mass is the eccentric's."),
+        Key("rotor_inertia", "inertia", "Of a rotor about its centre.", 0.0),
+    )
+
+    def cycle(self, said: Cycle) -> Cycle:
+        """Each chamber makes its four strokes in three turns of the shaft, so that a rotor fires every turn."""
+        if said is not Cycle.FOUR_STROKE:
+            raise KeyedError("cycle", "is not that of a rotary engine, whose chambers make four strokes", str(said))
+        return Cycle.TWO_STROKE
+
+    def mechanism(self, own: Mapping[str, Any], **shared: Any) -> RotorMechanism:
+        """Rotor and eccentric.
+
+        Raises
+        ------
+        KeyedError
+            If the rotor cannot turn, or has no mass.
+        """
+        for key in ("eccentricity", "rotor_radius", "rotor_width", "rotor_mass"):
+            if own[key] is None:
+                raise KeyedError(key, "is missing; add it")
+        least, radius = FLANKS * own["eccentricity"], own["rotor_radius"]
+        if radius <= least:
+            rule = f"does not let the rotor turn, it must be over three eccentricities, {units.shown(least, 'm')}"
+            raise KeyedError("rotor_radius", f"{rule}; enlarge it", units.shown(radius, "m"))
+        return RotorMechanism(
+            own["eccentricity"], math.inf, 0.0, rod_rotating_mass=own["rotor_mass"], rotor_radius=radius,
+            rotor_width=own["rotor_width"], rotor_inertia=own["rotor_inertia"], **shared,
+        )  # fmt: skip

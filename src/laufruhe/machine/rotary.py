@@ -1,0 +1,143 @@
+"""A rotor with three flanks on an eccentric, in a housing of two lobes: another unit of the same engine (R1-R8)."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from laufruhe import units
+from laufruhe.errors import ModelError
+from laufruhe.machine.slider_crank import Motion, Outline, SliderCrank, Swept
+
+FLANKS = 3
+_PACE = 2.0 / 3.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class RotaryUnit(SliderCrank):
+    """A rotor; its crank is the eccentric, its reciprocating mass nothing and its bank where it fires.
+
+    Attributes
+    ----------
+    rotor_radius
+        From the rotor's centre to its apexes [m]; `crank_radius` is the eccentricity.
+    rotor_width
+        Along the shaft [m].
+    rotor_inertia
+        About the rotor's centre [kg m2].
+    """
+
+    rotor_radius: float
+    rotor_width: float
+    rotor_inertia: float = 0.0
+    has_rod: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.rotor_width <= 0.0 or self.rotor_inertia < 0.0:
+            raise ModelError(f"{self.name}: the rotor's width must be positive and its inertia not negative")
+        if self.rotor_radius <= FLANKS * self.crank_radius:
+            radius, least = units.shown(self.rotor_radius, "m"), units.shown(FLANKS * self.crank_radius, "m")
+            raise ModelError(
+                f"{self.name}: the rotor cannot turn, its radius of {radius} must be over three eccentricities, {least}"
+            )
+
+    @property
+    def path(self) -> Hashable:
+        """What its chambers depend on, besides the angle of the eccentric."""
+        return self.crank_radius, self.rotor_radius, self.rotor_width
+
+    @cached_property
+    def swept(self) -> Swept:
+        """Three, each swept as by a piston of a Scotch yoke at two thirds of the speed (R3; textbook eqs. 102, 103)."""
+        bore = math.sqrt(4.0 * self.piston_area / math.pi)
+        yoke = SliderCrank("chamber", 0.0, 0.5 * self.stroke, math.inf, 0.0, bore=bore)
+        return Swept(yoke, _PACE, tuple(math.tau * k for k in range(FLANKS)), four_strokes=True)
+
+    @property
+    def piston_area(self) -> float:
+        """Chord of a flank times the width, which the gas of a chamber presses on [m2] (R4)."""
+        return math.sqrt(3.0) * self.rotor_radius * self.rotor_width
+
+    @property
+    def stroke(self) -> float:
+        """Of a piston of that area that sweeps as much as a chamber [m] (R3)."""
+        return 3.0 * self.crank_radius
+
+    @property
+    def displacement(self) -> float:
+        """Largest less smallest volume of a chamber [m3] (R2; textbook eqs. 102, 103)."""
+        return self.piston_area * self.stroke
+
+    @property
+    def smallest_volume(self) -> float:
+        """Of a chamber whose flank is the inner envelope of the housing, without a recess [m3] (R2)."""
+        e, radius = self.crank_radius, self.rotor_radius
+        lean = math.asin(FLANKS * e / radius)
+        sector = math.pi * e**2 / 3.0 + 2.0 * e * radius * math.cos(lean)
+        sector += (2.0 * radius**2 / 9.0 + 4.0 * e**2) * lean
+        return self.rotor_width * sector - 0.5 * self.displacement
+
+    @property
+    def largest_ratio(self) -> float:
+        """Compression ratio of a flank without a recess, which no other exceeds (R2)."""
+        return 1.0 + self.displacement / self.smallest_volume
+
+    @property
+    def apex_speed(self) -> float:
+        """Largest speed of an apex along the housing at unit speed of the shaft [m] (R5; textbook eq. 8)."""
+        return self.crank_radius + self.rotor_radius / 3.0
+
+    @property
+    def apex_acceleration(self) -> float:
+        """Largest acceleration of an apex at unit speed of the shaft [m] (R5; textbook eq. 9)."""
+        return self.crank_radius + self.rotor_radius / 9.0
+
+    def lean(self, lib: Any, angles: Any) -> Any:
+        """Direction of the gas on a flank, along its normal through the rotor's centre (R4; textbook eqs. 21, 22)."""
+        third = angles / 3.0
+        return lib.cos(third) + 1j * lib.sin(third)
+
+    def motion(self, lib: Any, alpha: Any) -> Motion:
+        """The rotor turns at a third of the shaft's speed; its mass counts at the eccentric, where it is (R6)."""
+        points = super().motion(lib, alpha).points
+        return Motion(points, ((self.rotor_inertia, (0.0 * alpha + 1.0 / 3.0, 0.0 * alpha)),))
+
+    def outlines(self, alpha: float) -> tuple[Outline, ...]:
+        """Housing and rotor (R1)."""
+        rotor = self.crank_radius * cmath.exp(1j * alpha) + self._flanks() * cmath.exp(1j * alpha / 3.0)
+        housing = self.housing(np.linspace(0.0, math.tau, 181))
+        return Outline(housing, self.rotor_width, False), Outline(rotor, self.rotor_width, True)
+
+    def housing(self, turn: Any) -> Any:
+        """Peritrochoid that the apexes run on, at angles of an apex about its rotor's centre (R1; textbook eq. 7)."""
+        # at alpha = 0 the flank, and no apex, looks to where it fires
+        return self.crank_radius * np.exp(3j * (turn - math.pi / 3.0)) + self.rotor_radius * np.exp(1j * turn)
+
+    def _flanks(self) -> Any:
+        """Rotor about its own centre when alpha = 0: arcs through the apexes that clear the housing."""
+        return np.concatenate([self._flank() * cmath.exp(1j * math.tau * k / FLANKS) for k in range(FLANKS)])
+
+    def _flank(self) -> Any:
+        """One flank, a circle through its apexes and the middle of the inner envelope (R1)."""
+        half, rise = math.sqrt(0.75) * self.rotor_radius, 0.5 * self.rotor_radius - 2.0 * self.crank_radius
+        height = np.linspace(-half, half, 31)
+        if rise <= 0.0:
+            return 0.5 * self.rotor_radius + 1j * height
+        arc = 0.5 * (half**2 + rise**2) / rise
+        return 0.5 * self.rotor_radius + rise - arc + np.sqrt(arc**2 - height**2) + 1j * height
+
+    def scaled(self, length: float, mass: float) -> Self:
+        """The same in another size."""
+        return replace(
+            super().scaled(length, mass),
+            rotor_radius=self.rotor_radius * length,
+            rotor_width=self.rotor_width * length,
+            rotor_inertia=self.rotor_inertia * mass * length**2,
+        )

@@ -1,0 +1,40 @@
+"""How fast the apexes of rotors run along their housings: of shape and speed, and of nothing that is decided (R5)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+from laufruhe.machine.rotary import RotaryUnit
+from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.channels.kinds import Needs, NumberChannel
+from laufruhe.problem.decision import Kind
+
+
+@dataclass(frozen=True, eq=False)
+class ApexChannel(NumberChannel):
+    """The most of any apex at the operating points that count."""
+
+    keys: tuple[str, ...] = ("operating_points",)
+    needs: Needs = Needs.ROTORS
+    minimised: bool = False
+
+    def is_moved_by(self, _kinds: Collection[Kind]) -> bool:
+        """By nothing."""
+        return False
+
+
+def _most(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float]) -> ApexChannel:
+    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+        speeds = [
+            at.point.speed for at in evaluation.loads if measure.points is None or at.point.name in measure.points
+        ]
+        rotors = [part for part in evaluation.engine.slider_cranks if isinstance(part, RotaryUnit)]
+        return [max((number(part) * speed**power for part in rotors for speed in speeds), default=0.0)]
+
+    return ApexChannel(name, unit, values=values)
+
+
+APEX_SPEED = _most("apex speed", "m/s", 1, lambda part: part.apex_speed)
+APEX_ACCELERATION = _most("apex acceleration", "m/s^2", 2, lambda part: part.apex_acceleration)
+OF_APEXES = (APEX_SPEED, APEX_ACCELERATION)
