@@ -22,10 +22,10 @@ from laufruhe.physics.bearing_loads import (
     pin_forces,
     piston_pin_forces,
 )
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import cylinder_pressure
 from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
-from laufruhe.physics.torque import crank_torque
 
 FloatArray = NDArray[np.float64]
 GAS = Seiliger(peak_pressure=80e5, imep=6e5)

@@ -14,8 +14,8 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.machine import Bearing, Bolts, Engine, OperatingPoint, PistonPin, RunningGear, Shank, Webs
 from laufruhe.physics import strength
 from laufruhe.physics.bearing_loads import pin_forces, piston_pin_forces
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT
-from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import MEASURES, Measure

@@ -13,9 +13,9 @@ import laufruhe
 from laufruhe.errors import ModelError
 from laufruhe.machine import Absorber, Disc, Engine, OperatingPoint, Section, SliderCrank, Torsion
 from laufruhe.machine.torsion import stiffness_of
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.reduced_inertia import inertia_of_discs, reduced_inertia, turned_by
-from laufruhe.physics.torque import crank_torque
 from laufruhe.physics.torsion import (
     absorber_heat,
     critical_speed,

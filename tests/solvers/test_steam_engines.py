@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.physics.torque import crank_torque
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.solvers import Result
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

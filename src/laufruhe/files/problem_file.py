@@ -18,6 +18,7 @@ from laufruhe.files.fields import Table
 from laufruhe.files.flywheel import FlywheelTable
 from laufruhe.files.friction import FrictionTable
 from laufruhe.files.gas import GasTable
+from laufruhe.files.geared import GearedInertiaTable
 from laufruhe.files.mounts import BlockTable, MountsTable, RunUpTable
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
@@ -58,6 +59,7 @@ class ProblemFile(Table):
     running_gear: RunningGearTable | None = None
     torsion: TorsionTable | None = None
     flywheel: FlywheelTable | None = None
+    geared_inertias: list[GearedInertiaTable] = Field(default_factory=list)
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
     objective: ObjectiveTable | None = None

@@ -28,6 +28,7 @@ from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import check_told_alike, flywheel_of
 from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of, needs_bore
+from laufruhe.files.geared import geared_of
 from laufruhe.files.mounts import mounts_of, run_of
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
@@ -109,6 +110,11 @@ def shown_as(path: Path) -> Path:
 
 def _of_file(file: ProblemFile, path: Path) -> Problem:
     """The problem of a file, its tolerances left out."""
+    if file.geared_inertias and file.engine.throws is not None and file.engine.given_throws is None:
+        rule = "are known of throws that are given, and engine.throws is open"
+        raise Refused("geared_inertias", None, rule, "fix the throws, or leave them out")
+    if file.geared_inertias and file.assembly is not None:
+        raise Refused("geared_inertias", None, "are not known of [assembly]", "leave one of the two out")
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
     closed = partial(_assembled, file, path=path)
@@ -261,14 +267,18 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(told, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
     run = run_of(file.run_up, found.block, [point.name for point in points])
-    engine = Engine(file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run, gear)
+    geared, of_geared = geared_of(file.geared_inertias)
+    engine = Engine(
+        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run, gear, geared
+    )
     of_sizes = size_decisions(file.running_gear, table, file.main_bearings, bearings)
     if of_sizes and gear is not None and gear.density is not None:
         _check_factors(file, "counts masses that follow from sizes, which are open")
     check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))
+    loads = (*_of_pistons(file, table, cylinders), *collected.decisions, *of_geared)
     scene, decisions = (
         Scene(engine, points),
-        (*_of_pistons(file, table, cylinders), *collected.decisions, *found.decisions, *of_wheel, *of_chain, *of_sizes),
+        (*loads, *found.decisions, *of_wheel, *of_chain, *of_sizes),
     )
     objective = objective_of(file.objective, scene)
     _check_decided(decisions)

@@ -16,7 +16,7 @@ from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics.norms import MEAN, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
-from laufruhe.physics.shaking_loads import added_rotor_loads, shaking_loads
+from laufruhe.physics.shaking_loads import added_geared_loads, added_rotor_loads, shaking_loads
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.decision import Decision, Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
@@ -193,8 +193,8 @@ class AffineModel:
         self.bare, self._changes = bare, changes
         orders = [as_order(abs(r.shaft.ratio)) for change in changes for r in change.rotors]
         # loads of every column alone, at every operating point
-        alone = [_alone(problem.engine, change) for change in changes]
-        self._slopes = [[_loads(each, point, problem, mounting) for each in alone] for point in problem.points]
+        alone = [(_alone(problem.engine, change), change.shares) for change in changes]
+        self._slopes = [[_loads(*each, point, problem, mounting) for each in alone] for point in problem.points]
         self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
 
     def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
@@ -276,10 +276,11 @@ class AffineModel:
 
 @dataclass(frozen=True)
 class _Change:
-    """What one unit of one column adds: rotors, and slider-cranks with one more kilogram of reciprocating mass."""
+    """What one unit of one column adds: rotors, pistons with a kilogram more, and geared shafts with all inertia."""
 
     rotors: tuple[Rotor, ...]
     pistons: tuple[str, ...]
+    shares: tuple[str, ...] = ()
 
 
 def _change(problem: Problem, decision: Decision, direction: complex) -> _Change:
@@ -288,7 +289,7 @@ def _change(problem: Problem, decision: Decision, direction: complex) -> _Change
     if decision.pistons and problem.fidelity.is_uneven:
         rule = "reciprocating masses are decided for a crank that turns evenly"
         raise ModelError(f"{rule}; leave fidelity.crank_inertia out, or fix the mass")
-    return _Change(rotors, decision.pistons)
+    return _Change(rotors, decision.pistons, decision.shares)
 
 
 def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
@@ -304,12 +305,17 @@ def _alone(engine: Engine, change: _Change) -> Engine:
     return replace(engine, slider_cranks=tuple(parts), rotors=change.rotors)
 
 
-def _loads(alone: Engine, point: OperatingPoint, problem: Problem, mounting: Mounting | None) -> PointLoads:
-    """What these alone make at an operating point; an uneven speed is that of the whole engine."""
+def _loads(
+    alone: Engine, shares: tuple[str, ...], point: OperatingPoint, problem: Problem, mounting: Mounting | None
+) -> PointLoads:
+    """What these alone make at an operating point; torque and an uneven speed are those of the whole engine."""
     without_gas = replace(problem.fidelity, gas=False, gas_orders=None)
     wrench = added_rotor_loads(alone.rotors, problem.engine, point, problem.fidelity)
     if any(part.reciprocating_mass for part in alone.slider_cranks):
         wrench = shaking_loads(alone, point, without_gas)
+    if shares:
+        geared = tuple(replace(own, share=1.0) for own in problem.engine.geared if own.name in shares)
+        wrench = wrench + added_geared_loads(replace(problem.engine, geared=geared), point, problem.fidelity)
     forces = mounting.forces(wrench, point.speed) if mounting else None
     travel = travel_of(problem.engine, mounting, wrench, point.speed)
     return PointLoads(point, wrench, forces, travel, alone, without_gas)

@@ -179,6 +179,8 @@ class EngineFamily:
 
 def _alike(engine: Engine) -> SliderCrank:
     first = engine.slider_cranks[0]
+    if engine.geared:
+        raise ModelError("a family has all its inertia on the crank; leave geared inertias out")
     for part in engine.slider_cranks:
         as_first = replace(part, name=first.name, x=first.x, throw=first.throw, bank=first.bank, bore=first.bore,
                            firing_angle=first.firing_angle)  # fmt: skip

@@ -6,6 +6,7 @@ from laufruhe.machine.chambers import Chamber, Chambers, GasModel, Pump, Steam
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.flywheel import Arms, Flywheel, Rim
 from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, Wiebe
+from laufruhe.machine.geared import GearedInertia
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.run import Run
@@ -28,6 +29,7 @@ __all__ = [
     "Engine",
     "Flywheel",
     "GasModel",
+    "GearedInertia",
     "Mount",
     "OperatingPoint",
     "PistonPin",

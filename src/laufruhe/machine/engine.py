@@ -14,6 +14,7 @@ from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block
 from laufruhe.machine.chambers import GasModel
 from laufruhe.machine.flywheel import Flywheel
+from laufruhe.machine.geared import GearedInertia
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
 from laufruhe.machine.run import Run
@@ -89,6 +90,8 @@ class Engine:
         How it is run up and shut down; None where nothing is said of that.
     gear
         Sizes of its running gear; None where nothing is asked of them.
+    geared
+        Shares of the inertia of all that turns on shafts of other speeds.
     """
 
     name: str
@@ -102,9 +105,10 @@ class Engine:
     flywheel: Flywheel | None = None
     run: Run | None = None
     gear: RunningGear | None = None
+    geared: tuple[GearedInertia, ...] = ()
 
     def __post_init__(self) -> None:
-        for kind in ("slider_cranks", "rotors", "mounts", "bearings"):
+        for kind in ("slider_cranks", "rotors", "mounts", "bearings", "geared"):
             names = Counter(part.name for part in getattr(self, kind))
             double = [name for name, count in names.items() if count > 1]
             if double:

@@ -30,7 +30,8 @@ from laufruhe.numerics.turns import as_turn, cis, star_sum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import pressure_breaks, thrust_at
 from laufruhe.physics.mechanism import resolved_orders
-from laufruhe.physics.shaking_loads import order_index, rotor_loads, rotor_wrench, spread
+from laufruhe.physics.shaking_loads import rotor_loads, rotor_wrench
+from laufruhe.physics.star_loads import order_index, spread
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -8,7 +8,7 @@ what the star cancels is zero and not a rounding.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -16,13 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
-from laufruhe.numerics.spectrum import Spectrum, as_order
-from laufruhe.numerics.turns import as_turn, cancelling_sum, cis, star_sum
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.turns import cancelling_sum
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.geared_inertia import geared_moment
 from laufruhe.physics.mechanism import Direction, Effect, mass_effects, rod_effects
-from laufruhe.physics.uneven_speed import uneven_loads, uneven_rotor_loads
-from laufruhe.physics.wrench import ROLL, plane_wrench
+from laufruhe.physics.star_loads import order_index, square_of, star_loads
+from laufruhe.physics.uneven_speed import uneven_geared_loads, uneven_loads, uneven_rotor_loads
+from laufruhe.physics.wrench import plane_wrench
 
 
 def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -41,7 +44,8 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
         return uneven_loads(engine, point, fidelity)
     gas = fidelity.gas_of(point)
     moving = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, gas, fidelity)
-    return moving + rotating_loads(engine, point.speed)
+    total = moving + rotating_loads(engine, point.speed)
+    return total + added_geared_loads(engine, point, fidelity) if engine.geared else total
 
 
 @lru_cache(maxsize=64)
@@ -109,6 +113,13 @@ def unit_star_load(engine: Engine, order: int, coefficient: complex, roll: bool)
     return star_loads(engine, 1.0, lambda part: (replace(effect, size=1.0 / part.shaft.ratio**2),))
 
 
+def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Loads that the geared inertia of an engine makes, at even or uneven speed (L8, F5)."""
+    if fidelity.is_uneven:
+        return uneven_geared_loads(engine, point, fidelity)
+    return geared_moment(engine, crank_torque(engine, point, fidelity))
+
+
 def added_rotor_loads(
     rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
 ) -> Spectrum:
@@ -127,18 +138,6 @@ def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
     return np.asarray((shaft.ratio * speed) ** 2 * plane_wrench(lateral, vertical, rotor.x, shaft))
 
 
-def _weight(part: SliderCrank, direction: Direction) -> NDArray[np.float64]:
-    """Wrench of a unit load of a cylinder: a force along its axis or across it, or a roll moment."""
-    if direction is Direction.ROLL:
-        return ROLL
-    axis = cis(as_turn(part.bank)) * (1j if direction is Direction.TRANSVERSE else 1.0)
-    return plane_wrench(axis.imag, axis.real, part.x, part.shaft).real
-
-
-def _square(part: SliderCrank, speed: float) -> float:
-    return (part.shaft.ratio * speed) ** 2
-
-
 def inertia_coefficients(
     part: SliderCrank, speed: float, fidelity: Fidelity = EXACT
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]:
@@ -150,42 +149,8 @@ def inertia_coefficients(
     `rod_inertia_loads` multiply by the phase and place of each cylinder (L2-L4, L7).
     """
     effects = (*mass_effects(part, fidelity), *rod_effects(part, fidelity))
-    found = [(effect.direction, effect.size * _square(part, speed) * effect.series()) for effect in effects]
+    found = [(effect.direction, effect.size * square_of(part, speed) * effect.series()) for effect in effects]
     out = np.zeros((3, max((len(series) for _, series in found), default=1)), dtype=complex)
     for direction, series in found:
         out[direction, : len(series)] += series
     return out[0], out[1], out[2]
-
-
-def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
-    """(coefficients of one cylinder) x (phase and weight of each), summed over the star, shape (n, 6) (L6)."""
-    cycle = engine.cycle
-    alike: dict[Hashable, list[tuple[SliderCrank, Effect]]] = defaultdict(list)
-    for part in engine.slider_cranks:
-        for effect in effects(part):
-            alike[effect.direction, effect.shape, part.shaft.ratio].append((part, effect))
-    total = Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
-    for members in alike.values():
-        first, effect = members[0]
-        series = effect.series()
-        weights = np.array([own.size * _square(part, speed) * _weight(part, own.direction) for part, own in members])
-        star = star_sum(weights, [part.star_turn for part, _ in members], np.arange(len(series)))
-        load = series[:, None] * star
-        ratio = first.shaft.ratio
-        # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
-        total = total + spread(load if ratio > 0.0 else load.conj(), order_index(cycle, abs(ratio)), cycle)
-    return total
-
-
-def spread(load: NDArray[np.complex128], step: int, cycle: Cycle) -> Spectrum:
-    """A load by order of its own crank angle, shape (n, d), in orders of the cycle, `step` to one of its own."""
-    out = np.zeros(((len(load) - 1) * step + 1, load.shape[1]), dtype=complex)
-    out[::step] = load
-    return Spectrum(cycle.base_order, out)
-
-
-@lru_cache(maxsize=1024)
-@lru_cache(maxsize=1024)
-def order_index(cycle: Cycle, order: float) -> int:
-    """Of an order of crank speed among those of a cycle."""
-    return int(as_order(order) / cycle.base_order)

@@ -14,8 +14,10 @@ from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.geared_inertia import geared_moment
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.physics.wrench import ROLL
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -25,7 +27,10 @@ def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXAC
     """Wrench per square of crank speed [N s2, N m s2], and that of the gas, which speed does not change [N, N m]."""
     inertia = shaking_loads(engine, replace(point, speed=1.0, gas=None), fidelity)
     gas = fidelity.gas_of(point)
-    return inertia, None if gas is None else fidelity.kept(gas_loads(engine, gas, fidelity))
+    if gas is None:
+        return inertia, None
+    loads = fidelity.kept(gas_loads(engine, gas, fidelity))
+    return inertia, loads + geared_moment(engine, loads.each(lambda wrench: wrench @ ROLL)) if engine.geared else loads
 
 
 @dataclass(frozen=True, eq=False)

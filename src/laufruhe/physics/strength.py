@@ -32,9 +32,9 @@ from laufruhe.machine import (
 from laufruhe.machine.running_gear import round_modulus
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.bearing_loads import pin_forces
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads
-from laufruhe.physics.torque import crank_torque
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

@@ -15,15 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Engine, OperatingPoint, SliderCrank
+from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.irregularity import swing_of
-from laufruhe.physics.mechanism import ComplexArray, Direction, Effect, resolved_orders
 from laufruhe.physics.reduced_inertia import turning_inertia
-from laufruhe.physics.shaking_loads import star_loads
-from laufruhe.physics.wrench import ROLL
 
 FINE = 8
 """Times as many steps as the fidelity has, at which the work is compared."""
@@ -56,19 +53,6 @@ class TorqueFacts:
     irregularity: float | None
 
 
-def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Torque of gas, pistons and rods on the crankshaft at even speed, as it drives the engine's output (T1).
-
-    Returns
-    -------
-    Spectrum of shape (n,) [N m].
-    """
-    gas = fidelity.gas_of(point)
-    masses = fidelity.kept(star_loads(engine, point.speed, lambda part: (_of_masses(part, fidelity),)))
-    total = masses if gas is None else masses + fidelity.kept(gas_loads(engine, gas, fidelity))
-    return total.each(lambda wrench: wrench @ ROLL)
-
-
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:
     """Torque of the gas, of pistons and rods as point masses, of what the rods' inertia adds, and of all (T1)."""
     whole, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
@@ -79,26 +63,6 @@ def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 def _less(torque: Spectrum) -> Spectrum:
     return torque.each(lambda values: -values)
-
-
-def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
-    """Torque at unit speed of the mechanism's own crank, in the sense of the output."""
-    is_rigid = fidelity.rod == "rigid"
-    alike = "torque", replace(part, name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0), is_rigid
-    return Effect(Direction.ROLL, 1.0, alike, lambda: _orders(part, is_rigid))
-
-
-def _orders(part: SliderCrank, is_rigid: bool) -> ComplexArray:
-    def torque(alpha: np.ndarray) -> tuple[np.ndarray]:
-        motion = part.motion(np, alpha)
-        total = np.zeros(len(alpha))
-        for mass, (_, velocity, acceleration) in motion.points:
-            total -= mass * (np.conj(velocity) * acceleration).real
-        for inertia, (rate, swing) in motion.swings if is_rigid else ():
-            total -= inertia * rate * swing
-        return (part.shaft.ratio * total,)
-
-    return np.asarray(resolved_orders(torque, np.ones((1, 1)), part.name)[0])
 
 
 def work_stored(torque: Spectrum, samples: int) -> float:

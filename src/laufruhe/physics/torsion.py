@@ -23,8 +23,8 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, SliderCrank, Torsion
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.numerics.turns import as_turn, phasors
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.torque import crank_torque
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

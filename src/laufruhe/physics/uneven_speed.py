@@ -21,8 +21,9 @@ from laufruhe.numerics.spectrum import Spectrum, bent_spectrum, spectrum_of
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.geared_inertia import geared_factor
 from laufruhe.physics.mechanism import cylinder_wrench
-from laufruhe.physics.wrench import plane_wrench
+from laufruhe.physics.wrench import ROLL, plane_wrench
 
 Array = NDArray[np.float64]
 
@@ -89,7 +90,7 @@ def _steps(engine: Engine, fidelity: Fidelity) -> Array:
 
 def _turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
     # rotors and mounts do not move the crank; without them a motion is found once for all designs
-    return _found_turning(replace(engine, rotors=(), mounts=(), flywheel=None), point, fidelity)
+    return _found_turning(replace(engine, rotors=(), mounts=(), flywheel=None, geared=()), point, fidelity)
 
 
 @lru_cache(maxsize=32)
@@ -126,6 +127,8 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
         for part in engine.slider_cranks:
             total += _slider_loads(part, motion, fidelity)
         total[:, 3] += torque.values(motion.angle)
+        # what speeds up beside the crank (L8)
+        total[:, 3] += geared_factor(engine) * fidelity.crank_inertia * motion.acceleration
         return total
 
     last_rotor = max((math.ceil(abs(rotor.shaft.ratio)) for rotor in engine.rotors), default=1)
@@ -135,6 +138,12 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
 def uneven_rotor_loads(rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     """Loads of rotors alone on an engine whose motion they do not change; linear in their unbalances (F5)."""
     return _turning(engine, point, fidelity).loads(lambda motion: _rotor_loads(rotors, motion))
+
+
+def uneven_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """Loads of the geared inertia alone (F5, L8)."""
+    gain = geared_factor(engine) * fidelity.crank_inertia
+    return _turning(engine, point, fidelity).loads(lambda motion: gain * motion.acceleration[:, None] * ROLL)
 
 
 def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:

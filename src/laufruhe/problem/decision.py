@@ -28,6 +28,7 @@ from laufruhe.problem.drives import (
     Numbers,
     PlaceDrive,
     RotorDrive,
+    ShareDrive,
     SizeDrive,
     TorsionDrive,
     mount_of,
@@ -51,6 +52,7 @@ __all__ = [
     "Numbers",
     "PlaceDrive",
     "RotorDrive",
+    "ShareDrive",
     "SizeDrive",
     "TorsionDrive",
     "domains_of",
@@ -109,7 +111,7 @@ class Decision:
     @property
     def is_affine(self) -> bool:
         """Whether every load is affine in it."""
-        return self.kind in (Kind.UNBALANCE, Kind.PISTON)
+        return self.kind in (Kind.UNBALANCE, Kind.PISTON, Kind.SHARE)
 
     @property
     def rotor_drives(self) -> tuple[RotorDrive, ...]:
@@ -120,6 +122,11 @@ class Decision:
     def pistons(self) -> tuple[str, ...]:
         """Slider-cranks whose reciprocating masses follow."""
         return tuple(drive.part for drive in self.drives if isinstance(drive, MassDrive))
+
+    @property
+    def shares(self) -> tuple[str, ...]:
+        """Geared inertias whose shares follow."""
+        return tuple(drive.geared for drive in self.drives if isinstance(drive, ShareDrive))
 
     @property
     def place_drives(self) -> tuple[PlaceDrive, ...]:

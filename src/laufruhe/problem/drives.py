@@ -38,6 +38,8 @@ class Kind(IntEnum):
     """Nothing but the twist of the crankshaft feels it."""
     SIZE = 9
     """Of the running gear: stresses fall with it, and masses follow (Z2)."""
+    SHARE = 10
+    """Of inertia on a geared shaft: the roll moment is affine in it while the masses of the pistons are held."""
 
 
 @dataclass
@@ -58,6 +60,8 @@ class Numbers:
         Of discs, sections and absorbers of the crankshaft, by their name and that of the number.
     sizes
         Changes of sizes of the running gear, by the same [m].
+    shares
+        Of geared inertias by name.
     """
 
     unbalances: dict[str, Any] = field(default_factory=dict)
@@ -67,6 +71,7 @@ class Numbers:
     pistons: dict[str, Any] = field(default_factory=dict)
     torsion: dict[tuple[str, str], Any] = field(default_factory=dict)
     sizes: dict[Size, Any] = field(default_factory=dict)
+    shares: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
@@ -76,7 +81,8 @@ class Numbers:
         places: dict[str, list[Any]] = {name: list(rotor.place) for name, rotor in rotors.items()}
         flywheel = list(engine.flywheel.numbers) if engine.flywheel else []
         torsion = engine.torsion.numbers if engine.torsion else {}
-        return cls(unbalances, places, [list(row) for row in mounts], flywheel, torsion=torsion)
+        shares: dict[str, Any] = {geared.name: geared.share for geared in engine.geared}
+        return cls(unbalances, places, [list(row) for row in mounts], flywheel, torsion=torsion, shares=shares)
 
     def engine(self, given: Engine) -> Engine:
         """The engine with these numbers."""
@@ -93,7 +99,9 @@ class Numbers:
             # a sum of changes may leave a bound of zero by a rounding
             masses = (max(part.reciprocating_mass + float(self.pistons.get(part.name, 0.0)), 0.0) for part in parts)
             parts = tuple(replace(part, reciprocating_mass=mass) for part, mass in zip(parts, masses, strict=True))
-        found = replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel)
+        # a sum of changes may leave a bound by a rounding
+        geared = tuple(replace(g, share=min(max(float(self.shares[g.name]), 0.0), 1.0)) for g in given.geared)
+        found = replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, geared=geared)
         if self.sizes:
             own = given.moving.sizes
             found = found.resized({size: own[size] + float(self.sizes.get(size, 0.0)) for size in own})
@@ -214,6 +222,19 @@ class SizeDrive:
     def move(self, numbers: Numbers, change: Any) -> None:
         """Of the size."""
         numbers.sizes[self.size] = numbers.sizes.get(self.size, 0.0) + change.real
+
+
+@dataclass(frozen=True)
+class ShareDrive:
+    """Share of one geared inertia += change."""
+
+    geared: str
+    kind: ClassVar[Kind] = Kind.SHARE
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the geared inertia."""
+        numbers.shares[self.geared] += change.real
 
 
 @dataclass(frozen=True)

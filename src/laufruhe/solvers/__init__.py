@@ -168,7 +168,7 @@ METHODS: tuple[Method, ...] = (
     Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, state),
     Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
     Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, _torsion),
-    Method("second-order cones", frozenset({_U}), _asks_loads, Reach.WHOLE,
+    Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_sharply)),
     Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_sharply)),

@@ -169,6 +169,8 @@ def _check(problem: Problem) -> None:
     if open_kinds:
         names = ", ".join(d.name for d in problem.decisions if d.kind in open_kinds)
         raise ModelError(f"[robust] decides unbalances, and {names} is open too; fix it, or leave [robust] out")
+    if problem.engine.geared:
+        raise ModelError("[robust] takes all inertia on the crank; leave [[geared_inertias]] out, or [robust]")
     if problem.fidelity.is_uneven:
         raise ModelError("[robust] takes a crank that turns evenly; leave fidelity.crank_inertia out, or [robust]")
     for measure in problem.measures:

@@ -24,10 +24,10 @@ from laufruhe.physics.bearing_loads import (
     pin_forces,
     piston_pin_forces,
 )
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
-from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.apexes import OF_APEXES
 from laufruhe.problem.channels.flywheel import OF_FLYWHEEL

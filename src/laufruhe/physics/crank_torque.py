@@ -1,0 +1,48 @@
+"""Torque of the crankshaft over the cycle (T1)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.machine import Engine, OperatingPoint, SliderCrank
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.mechanism import ComplexArray, Direction, Effect, resolved_orders
+from laufruhe.physics.star_loads import star_loads
+from laufruhe.physics.wrench import ROLL
+
+
+def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Torque of gas, pistons and rods on the crankshaft at even speed, as it drives the engine's output (T1).
+
+    Returns
+    -------
+    Spectrum of shape (n,) [N m].
+    """
+    gas = fidelity.gas_of(point)
+    masses = fidelity.kept(star_loads(engine, point.speed, lambda part: (_of_masses(part, fidelity),)))
+    total = masses if gas is None else masses + fidelity.kept(gas_loads(engine, gas, fidelity))
+    return total.each(lambda wrench: wrench @ ROLL)
+
+
+def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
+    """Torque at unit speed of the mechanism's own crank, in the sense of the output."""
+    is_rigid = fidelity.rod == "rigid"
+    alike = "torque", replace(part, name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0), is_rigid
+    return Effect(Direction.ROLL, 1.0, alike, lambda: _orders(part, is_rigid))
+
+
+def _orders(part: SliderCrank, is_rigid: bool) -> ComplexArray:
+    def torque(alpha: np.ndarray) -> tuple[np.ndarray]:
+        motion = part.motion(np, alpha)
+        total = np.zeros(len(alpha))
+        for mass, (_, velocity, acceleration) in motion.points:
+            total -= mass * (np.conj(velocity) * acceleration).real
+        for inertia, (rate, swing) in motion.swings if is_rigid else ():
+            total -= inertia * rate * swing
+        return (part.shaft.ratio * total,)
+
+    return np.asarray(resolved_orders(torque, np.ones((1, 1)), part.name)[0])

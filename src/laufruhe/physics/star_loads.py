@@ -1,0 +1,62 @@
+"""Loads of a star: the coefficients of one cylinder, times phase and weight of each (L6)."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterable
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Cycle, Engine, SliderCrank
+from laufruhe.numerics.spectrum import Spectrum, as_order
+from laufruhe.numerics.turns import as_turn, cis, star_sum
+from laufruhe.physics.mechanism import Direction, Effect
+from laufruhe.physics.wrench import ROLL, plane_wrench
+
+
+def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
+    """(coefficients of one cylinder) x (phase and weight of each), summed over the star, shape (n, 6) (L6)."""
+    cycle = engine.cycle
+    alike: dict[Hashable, list[tuple[SliderCrank, Effect]]] = defaultdict(list)
+    for part in engine.slider_cranks:
+        for effect in effects(part):
+            alike[effect.direction, effect.shape, part.shaft.ratio].append((part, effect))
+    total = Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
+    for members in alike.values():
+        first, effect = members[0]
+        series = effect.series()
+        weights = np.array([own.size * square_of(part, speed) * _weight(part, own.direction) for part, own in members])
+        star = star_sum(weights, [part.star_turn for part, _ in members], np.arange(len(series)))
+        load = series[:, None] * star
+        ratio = first.shaft.ratio
+        # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
+        total = total + spread(load if ratio > 0.0 else load.conj(), order_index(cycle, abs(ratio)), cycle)
+    return total
+
+
+def spread(load: NDArray[np.complex128], step: int, cycle: Cycle) -> Spectrum:
+    """A load by order of its own crank angle, shape (n, d), in orders of the cycle, `step` to one of its own."""
+    out = np.zeros(((len(load) - 1) * step + 1, load.shape[1]), dtype=complex)
+    out[::step] = load
+    return Spectrum(cycle.base_order, out)
+
+
+@lru_cache(maxsize=1024)
+def order_index(cycle: Cycle, order: float) -> int:
+    """Of an order of crank speed among those of a cycle."""
+    return int(as_order(order) / cycle.base_order)
+
+
+def square_of(part: SliderCrank, speed: float) -> float:
+    """Of the speed of its own crank [rad2/s2]."""
+    return (part.shaft.ratio * speed) ** 2
+
+
+def _weight(part: SliderCrank, direction: Direction) -> NDArray[np.float64]:
+    """Wrench of a unit load of a cylinder: a force along its axis or across it, or a roll moment."""
+    if direction is Direction.ROLL:
+        return ROLL
+    axis = cis(as_turn(part.bank)) * (1j if direction is Direction.TRANSVERSE else 1.0)
+    return plane_wrench(axis.imag, axis.real, part.x, part.shaft).real
