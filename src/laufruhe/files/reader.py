@@ -276,14 +276,9 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         _check_factors(file, "counts masses that follow from sizes, which are open")
     check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))
     loads = (*_of_pistons(file, table, cylinders), *collected.decisions, *of_geared)
-    scene, decisions = (
-        Scene(engine, points),
-        (*loads, *found.decisions, *of_wheel, *of_chain, *of_sizes),
-    )
+    scene, decisions = Scene(engine, points), (*loads, *found.decisions, *of_wheel, *of_chain, *of_sizes)
     objective = objective_of(file.objective, scene)
-    _check_decided(decisions)
-    if decisions and not objective:
-        raise Refused("objective", None, "is missing while numbers are open", "say what is to be minimised")
+    _check_decided(decisions, bool(objective))
     problem = Problem(
         name=path.stem,
         title=file.title,
@@ -334,11 +329,13 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
     return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
 
 
-def _check_decided(decisions: Sequence[Decision]) -> None:
-    """Refuse what is open and moves nothing, and more than is decided in minutes."""
+def _check_decided(decisions: Sequence[Decision], has_objective: bool) -> None:
+    """Refuse what is open and moves nothing, or for nothing, and more than is decided in minutes."""
     if len(decisions) > MOST_OPEN:
         remedy = "fix some, or let some follow others"
         raise Refused(decisions[MOST_OPEN].name, None, f"is open beside {MOST_OPEN} other numbers", remedy)
     for decision in decisions:
         if not any(drive.acts for drive in decision.drives):
             raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")
+    if decisions and not has_objective:
+        raise Refused("objective", None, "is missing while numbers are open", "say what is to be minimised")
