@@ -68,7 +68,7 @@ def _over_chord(since: float) -> float:
 
 
 def test_chambers_are_what_is_between_housing_and_rotor() -> None:
-    """R3: to the area of a polygon of 20,000 corners; the flank, whatever its shape, adds the same at every angle."""
+    """Y3: to the area of a polygon of 20,000 corners; the flank, whatever its shape, adds the same at every angle."""
     angles = np.linspace(0.0, 6.0 * math.pi, 25)
     found = chamber_volume(UNIT, angles)
     drawn = B * np.array([_over_chord(angle) for angle in angles])
@@ -78,7 +78,7 @@ def test_chambers_are_what_is_between_housing_and_rotor() -> None:
 
 @pytest.mark.parametrize("radius", [0.06, 0.105, 0.15])
 def test_the_smallest_chamber_is_that_of_the_inner_envelope(radius: float) -> None:
-    """R2: what no angle of the housing cuts off the flank, found ray by ray from the rotor's centre."""
+    """Y2: what no angle of the housing cuts off the flank, found ray by ray from the rotor's centre."""
     unit = replace(UNIT, rotor_radius=radius)
     turn = np.linspace(-math.pi / 2.0, math.pi / 2.0, 2001)
     rays = np.linspace(-math.pi / 3.0, math.pi / 3.0, 1001)
@@ -95,7 +95,7 @@ def test_the_smallest_chamber_is_that_of_the_inner_envelope(radius: float) -> No
 
 
 class TestGas:
-    """R4, against pressures that are added up along flanks and housing."""
+    """Y4, against pressures that are added up along flanks and housing."""
 
     point = OperatingPoint("", SPEED, GAS)
 
@@ -190,14 +190,14 @@ def test_masses_that_are_moved_step_by_step_load_the_block_as_a_rotor(throw: flo
 
 
 def test_a_rotor_adds_a_ninth_of_its_inertia_to_the_shaft() -> None:
-    """R6: it turns at a third of the speed; its mass is one of those at the crank pin."""
+    """Y6: it turns at a third of the speed; its mass is one of those at the crank pin."""
     swing = swing_of(_of(UNIT), OperatingPoint("", SPEED, GAS), EXACT)
     np.testing.assert_allclose(swing.inertia, INERTIA / 9.0, rtol=1e-12)
 
 
 @pytest.mark.slow
 def test_an_uneven_speed_loads_the_block_through_the_teeth() -> None:
-    """R6: the rotor gets its torque J a / 3 at the pitch circle of radius 3 e, whose fixed wheel has the radius 2 e."""
+    """Y6: the rotor gets its torque J a / 3 at the pitch circle of radius 3 e, whose fixed wheel has the radius 2 e."""
     unit, uneven = replace(UNIT, rotating_mass=0.0), replace(EXACT, crank_inertia=0.2)
     point = OperatingPoint("", 200.0, GAS)
     motion = crank_motion(_of(unit), point, uneven)
@@ -261,7 +261,7 @@ def _even_stars(count: int) -> list[tuple[float, ...]]:
 
 
 class TestApexes:
-    """R5, textbook eqs. 8, 9."""
+    """Y5, textbook eqs. 8, 9."""
 
     def test_limits_are_kept_or_named(self) -> None:
         problem = read(changed(TEXT, 'max = "35 m/s"', 'max = "31 m/s"'))

@@ -1,4 +1,4 @@
-"""A rotor with three flanks on an eccentric, in a housing of two lobes: another unit of the same engine (R1-R8)."""
+"""A rotor with three flanks on an eccentric, in a housing of two lobes: another unit of the same engine (Y1-R8)."""
 
 from __future__ import annotations
 
@@ -55,29 +55,29 @@ class RotaryUnit(SliderCrank):
 
     @cached_property
     def swept(self) -> Swept:
-        """Three, each swept as by a piston of a Scotch yoke at two thirds of the speed (R3; textbook eqs. 102, 103)."""
+        """Three, each swept as by a piston of a Scotch yoke at two thirds of the speed (Y3; textbook eqs. 102, 103)."""
         bore = math.sqrt(4.0 * self.piston_area / math.pi)
         yoke = SliderCrank("chamber", 0.0, 0.5 * self.stroke, math.inf, 0.0, bore=bore)
         return Swept(yoke, _PACE, tuple(math.tau * k for k in range(FLANKS)), four_strokes=True)
 
     @property
     def piston_area(self) -> float:
-        """Chord of a flank times the width, which the gas of a chamber presses on [m2] (R4)."""
+        """Chord of a flank times the width, which the gas of a chamber presses on [m2] (Y4)."""
         return math.sqrt(3.0) * self.rotor_radius * self.rotor_width
 
     @property
     def stroke(self) -> float:
-        """Of a piston of that area that sweeps as much as a chamber [m] (R3)."""
+        """Of a piston of that area that sweeps as much as a chamber [m] (Y3)."""
         return 3.0 * self.crank_radius
 
     @property
     def displacement(self) -> float:
-        """Largest less smallest volume of a chamber [m3] (R2; textbook eqs. 102, 103)."""
+        """Largest less smallest volume of a chamber [m3] (Y2; textbook eqs. 102, 103)."""
         return self.piston_area * self.stroke
 
     @property
     def smallest_volume(self) -> float:
-        """Of a chamber whose flank is the inner envelope of the housing, without a recess [m3] (R2)."""
+        """Of a chamber whose flank is the inner envelope of the housing, without a recess [m3] (Y2)."""
         e, radius = self.crank_radius, self.rotor_radius
         lean = math.asin(FLANKS * e / radius)
         sector = math.pi * e**2 / 3.0 + 2.0 * e * radius * math.cos(lean)
@@ -86,37 +86,37 @@ class RotaryUnit(SliderCrank):
 
     @property
     def largest_ratio(self) -> float:
-        """Compression ratio of a flank without a recess, which no other exceeds (R2)."""
+        """Compression ratio of a flank without a recess, which no other exceeds (Y2)."""
         return 1.0 + self.displacement / self.smallest_volume
 
     @property
     def apex_speed(self) -> float:
-        """Largest speed of an apex along the housing at unit speed of the shaft [m] (R5; textbook eq. 8)."""
+        """Largest speed of an apex along the housing at unit speed of the shaft [m] (Y5; textbook eq. 8)."""
         return self.crank_radius + self.rotor_radius / 3.0
 
     @property
     def apex_acceleration(self) -> float:
-        """Largest acceleration of an apex at unit speed of the shaft [m] (R5; textbook eq. 9)."""
+        """Largest acceleration of an apex at unit speed of the shaft [m] (Y5; textbook eq. 9)."""
         return self.crank_radius + self.rotor_radius / 9.0
 
     def lean(self, lib: Any, angles: Any) -> Any:
-        """Direction of the gas on a flank, along its normal through the rotor's centre (R4; textbook eqs. 21, 22)."""
+        """Direction of the gas on a flank, along its normal through the rotor's centre (Y4; textbook eqs. 21, 22)."""
         third = angles / 3.0
         return lib.cos(third) + 1j * lib.sin(third)
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
-        """The rotor turns at a third of the shaft's speed; its mass counts at the eccentric, where it is (R6)."""
+        """The rotor turns at a third of the shaft's speed; its mass counts at the eccentric, where it is (Y6)."""
         points = super().motion(lib, alpha).points
         return Motion(points, ((self.rotor_inertia, (0.0 * alpha + 1.0 / 3.0, 0.0 * alpha)),))
 
     def outlines(self, alpha: float) -> tuple[Outline, ...]:
-        """Housing and rotor (R1)."""
+        """Housing and rotor (Y1)."""
         rotor = self.crank_radius * cmath.exp(1j * alpha) + self._flanks() * cmath.exp(1j * alpha / 3.0)
         housing = self.housing(np.linspace(0.0, math.tau, 181))
         return Outline(housing, self.rotor_width, False), Outline(rotor, self.rotor_width, True)
 
     def housing(self, turn: Any) -> Any:
-        """Peritrochoid that the apexes run on, at angles of an apex about its rotor's centre (R1; textbook eq. 7)."""
+        """Peritrochoid that the apexes run on, at angles of an apex about its rotor's centre (Y1; textbook eq. 7)."""
         # at alpha = 0 the flank, and no apex, looks to where it fires
         return self.crank_radius * np.exp(3j * (turn - math.pi / 3.0)) + self.rotor_radius * np.exp(1j * turn)
 
@@ -125,7 +125,7 @@ class RotaryUnit(SliderCrank):
         return np.concatenate([self._flank() * cmath.exp(1j * math.tau * k / FLANKS) for k in range(FLANKS)])
 
     def _flank(self) -> Any:
-        """One flank, a circle through its apexes and the middle of the inner envelope (R1)."""
+        """One flank, a circle through its apexes and the middle of the inner envelope (Y1)."""
         half, rise = math.sqrt(0.75) * self.rotor_radius, 0.5 * self.rotor_radius - 2.0 * self.crank_radius
         height = np.linspace(-half, half, 31)
         if rise <= 0.0:

@@ -47,7 +47,7 @@ def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArra
 
 
 def _worked(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> tuple[OneChamber, SliderCrank, Cycle, float]:
-    """Gas, piston and cycle of one chamber, and its pace (R3): a burn is told in crank angles of the engine."""
+    """Gas, piston and cycle of one chamber, and its pace (Y3): a burn is told in crank angles of the engine."""
     check_chamber(gas, part)
     swept = part.swept
     if isinstance(gas, Wiebe) and swept.pace != 1.0:
@@ -56,7 +56,7 @@ def _worked(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> tuple[OneChambe
 
 
 def check_chamber(gas: GasModel, part: SliderCrank) -> None:
-    """Refuse a compression that the shape of a chamber has no room for (R2).
+    """Refuse a compression that the shape of a chamber has no room for (Y2).
 
     Raises
     ------

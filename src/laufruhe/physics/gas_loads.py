@@ -79,7 +79,7 @@ def _torque_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: FloatArra
 
 
 def chamber_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, since: FloatArray) -> FloatArray:
-    """Torque of what fired some crank angles ago [rad], of a piston or of one chamber of a rotor [N m] (L5, R4)."""
+    """Torque of what fired some crank angles ago [rad], of a piston or of one chamber of a rotor [N m] (L5, Y4)."""
     own, pace = part.swept.piston, part.swept.pace
     alpha = own.fires_at + own.shaft.ratio * pace * since
     return np.asarray(pace * own.shaft.ratio * thrust_at(gas, part, cycle, since) * own.velocity(np, alpha))

@@ -1,4 +1,4 @@
-"""Chambers of a rotary engine over the three turns in which each works once: volume, pressure and torque (R3, R4)."""
+"""Chambers of a rotary engine over the three turns in which each works once: volume, pressure and torque (Y3, Y4)."""
 
 from __future__ import annotations
 

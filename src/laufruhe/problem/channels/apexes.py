@@ -1,4 +1,4 @@
-"""How fast the apexes of rotors run along their housings: of shape and speed, and of nothing that is decided (R5)."""
+"""How fast the apexes of rotors run along their housings: of shape and speed, and of nothing that is decided (Y5)."""
 
 from __future__ import annotations
 
