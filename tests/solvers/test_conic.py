@@ -115,7 +115,7 @@ def test_a_peak_is_limited_at_few_angles_as_at_all(share: float, monkeypatch: py
     maximum = at_peak + share * (at_mean - at_peak) + 1e-3 * at_peak
     limited_so = replace(loose, limits=((maximum, loose.limits[0][1]),))
     rows = []
-    monkeypatch.setattr(conic, "_told", lambda own, *rest, told=conic._told: rows.append(own.count) or told(own, *rest))
+    monkeypatch.setattr(conic, "told", lambda own, *rest, told=conic.told: rows.append(own.count) or told(own, *rest))
     few = solve_cones(limited_so)
     monkeypatch.setattr(conic, "FEW_ROWS", 10**9)
     whole = solve_cones(limited_so)
@@ -158,7 +158,7 @@ def test_a_solver_that_gives_up_is_not_the_end(status: str, monkeypatch: pytest.
         x, z = np.full(rows.columns, value), np.full(rows.count, value)
         return SimpleNamespace(status=word, x=x, z=z, solve_time=0.0, iterations=1)
 
-    monkeypatch.setattr(conic, "_told", told)
+    monkeypatch.setattr(conic, "told", told)
     result = solve(limited(0.5))
     assert result.status is Status.FEASIBLE
     assert result.objective is not None

@@ -17,7 +17,7 @@ from laufruhe.files.fields import Name, Table
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.clearances import shafts_of
 from laufruhe.problem.channels import Channel, LoadChannel, Needs
-from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Term, counted_rotors, radius_of
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Rank, Term, counted_rotors, radius_of
 
 T = TypeVar("T")
 Motion = Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]
@@ -76,6 +76,7 @@ class ObjectiveTable(QuantityTable):
 
     minimise: QuantityName | None = None
     terms: list[TermTable] = Field(default_factory=list)
+    within: f.NonNegative | None = f.told("Share by which objectives after it may exceed its least value.")
 
 
 class ConstraintTable(QuantityTable):
@@ -212,15 +213,49 @@ def _tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
     return None if entries is None else tuple(entries)
 
 
-def objective_of(table: ObjectiveTable | None, scene: Scene) -> tuple[Term, ...]:
-    """What is to be least, norms of loads before numbers of the mounts; the mean mount force where nothing is said."""
-    if table is None:
-        return (Term(MEAN_MOUNT_FORCE),) if scene.engine.mounts else ()
-    one_of(table, "objective", "minimise", "terms", shown=table.minimise, named="[[objective.terms]]")
+def objectives_of(tables: Sequence[ObjectiveTable] | None, scene: Scene, single: Sequence[str]) -> tuple[Rank, ...]:
+    """What is to be least, in order of rank; the mean mount force where nothing is said.
+
+    Parameters
+    ----------
+    single
+        Keys of the file that go with one objective only.
+    """
+    if tables is None:
+        return (Rank((Term(MEAN_MOUNT_FORCE),)),) if scene.engine.mounts else ()
+    if not tables:
+        raise Refused("objective", [], "is empty", "leave it out, or say what is to be minimised")
+    last = len(tables) - 1
+    if last and single:
+        rule = f"goes with one objective, and there are {len(tables)} in order"
+        raise Refused(single[0], None, rule, "leave it out, or keep the first of them")
+    return tuple(
+        _ranked(table, scene, f"objective[{k + 1}]" if last else "objective", k == last)
+        for k, table in enumerate(tables)
+    )
+
+
+def _ranked(table: ObjectiveTable, scene: Scene, where: str, is_last: bool) -> Rank:
+    """One objective, which limits those after it."""
+    terms = _terms(table, scene, where)
+    if is_last and table.within is not None:
+        raise Refused(f"{where}.within", table.within, "goes with an objective before others", "leave it out")
+    if not is_last and len(terms) > 1:
+        rule = "is a weighted sum before other objectives, and no limit is one"
+        raise Refused(f"{where}.terms", None, rule, "put it last, or rank its parts")
+    if not is_last and "max" not in terms[0].measure.channel.sides:
+        rule = "stands before other objectives, and has no largest value to limit"
+        raise Refused(f"{where}.minimise", terms[0].measure.name, rule, "put it last")
+    return Rank(terms, table.within or 0.0)
+
+
+def _terms(table: ObjectiveTable, scene: Scene, where: str) -> tuple[Term, ...]:
+    """Its measures with their weights, norms of loads before numbers of the mounts."""
+    one_of(table, where, "minimise", "terms", shown=table.minimise, named=f"[[{where.split('[')[0]}.terms]]")
     if table.minimise is not None:
-        return (Term(_minimised(table.minimise, table, "objective.minimise", scene)),)
+        return (Term(_minimised(table.minimise, table, f"{where}.minimise", scene)),)
     found = [
-        Term(_minimised(term.quantity, term, f"objective.terms[{k + 1}].quantity", scene), term.weight)
+        Term(_minimised(term.quantity, term, f"{where}.terms[{k + 1}].quantity", scene), term.weight)
         for k, term in enumerate(table.terms)
     ]
     return tuple(sorted(found, key=lambda term: term.measure.channel.is_number))

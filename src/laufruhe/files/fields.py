@@ -197,6 +197,9 @@ class OneOrEach:
         return {"anyOf": [many["items"], many]}
 
     def _read(self, given: Any, inner: Callable[[Any], Any]) -> Any:
+        if not isinstance(given, list) and isinstance(self.inner, type) and issubclass(self.inner, BaseModel):
+            # a complaint about the one table counts no list
+            return [self.inner.model_validate(given)]
         return inner(given if isinstance(given, list) else [given])
 
 

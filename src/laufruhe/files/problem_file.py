@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib.resources import files
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, Field
 
@@ -62,13 +62,21 @@ class ProblemFile(Table):
     geared_inertias: list[GearedInertiaTable] = Field(default_factory=list)
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
-    objective: ObjectiveTable | None = None
+    objective: Annotated[list[ObjectiveTable], f.OneOrEach(ObjectiveTable)] | None = f.told(
+        "What is to be least; of several tables each among the designs that are best by those before it."
+    )
     constraints: list[ConstraintTable] = Field(default_factory=list)
     fidelity: FidelityTable = Field(default_factory=FidelityTable)
     search: SearchTable = Field(default_factory=SearchTable)
     tolerances: TolerancesTable | None = None
     robust: RobustTable | None = None
     assembly: AssemblyTable | None = None
+
+    @property
+    def single(self) -> list[str]:
+        """What stands here that goes with one objective only."""
+        given = [key for key in ("assembly", "robust") if getattr(self, key) is not None]
+        return [*given, *(["fidelity.kinematics"] if self.fidelity.kinematics == "auto" else [])]
 
 
 def schema() -> str:

@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from laufruhe.errors import Complaint, InputError, ModelError, printed
 from laufruhe.files import edits
-from laufruhe.files.asked import Scene, limits_of, objective_of
+from laufruhe.files.asked import Scene, limits_of, objectives_of
 from laufruhe.files.assembly import assembly_of
 from laufruhe.files.bearings import bearings_of
 from laufruhe.files.catalogue import with_catalogue
@@ -32,6 +32,7 @@ from laufruhe.files.geared import geared_of
 from laufruhe.files.mounts import mounts_of, run_of
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
+from laufruhe.files.piston_masses import check_factors, piston_masses
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.running_gear import size_decisions, weighed
@@ -39,9 +40,8 @@ from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbe
 from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
-from laufruhe.problem.decision import Decision, MassDrive
+from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem, Search
-from laufruhe.problem.sets import Interval
 from laufruhe.problem.tolerance import Drawing, Tolerances
 from laufruhe.problem.tolerance import Path as Place
 
@@ -273,19 +273,20 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     )
     of_sizes = size_decisions(file.running_gear, table, file.main_bearings, bearings)
     if of_sizes and gear is not None and gear.density is not None:
-        _check_factors(file, "counts masses that follow from sizes, which are open")
+        check_factors(file.counterweights, "counts masses that follow from sizes, which are open")
     check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))
-    loads = (*_of_pistons(file, table, cylinders), *collected.decisions, *of_geared)
+    loads = (*piston_masses(table, cylinders, file.counterweights), *collected.decisions, *of_geared)
     scene, decisions = Scene(engine, points), (*loads, *found.decisions, *of_wheel, *of_chain, *of_sizes)
-    objective = objective_of(file.objective, scene)
-    _check_decided(decisions, bool(objective))
+    ranks = objectives_of(file.objective, scene, file.single)
+    _check_decided(decisions, bool(ranks))
     problem = Problem(
         name=path.stem,
         title=file.title,
         engine=engine,
         points=points,
         decisions=decisions,
-        objective=objective,
+        objective=ranks[0].terms if ranks else (),
+        ranks=ranks if len(ranks) > 1 else (),
         limits=limits_of(file.constraints, scene),
         source=file.source,
         assumptions=(*file.assumptions, *(brake.said if brake else ())),
@@ -295,25 +296,6 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         assembly=assembly_of(file.assembly, engine, path.parent),
     )
     return at_fidelity(problem, file.fidelity)
-
-
-def _of_pistons(file: ProblemFile, table: EngineTable, parts: Sequence[SliderCrank]) -> list[Decision]:
-    """The decision about the reciprocating mass of all that give none of their own, if it is open."""
-    mass = table.piston_mass
-    if not mass.is_open:
-        return []
-    _check_factors(file, "counts the reciprocating mass, which is open")
-    own = [row.reciprocating_mass is None for row in table.slider_cranks] or [True] * len(parts)
-    drives = tuple(MassDrive(part.name) for part, follows in zip(parts, own, strict=True) if follows)
-    return [Decision("reciprocating mass", "kg", Interval(*mass.bounds), mass.start, drives)]
-
-
-def _check_factors(file: ProblemFile, rule: str) -> None:
-    """Refuse weights whose size follows from masses that are open."""
-    for k, weight in enumerate(file.counterweights, 1):
-        if weight.factor_key is not None:
-            remedy = "give the counterweights a mass, or fix the other"
-            raise Refused(f"counterweights[{k}].{weight.factor_key}", None, rule, remedy)
 
 
 def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:

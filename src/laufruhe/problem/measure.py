@@ -163,6 +163,20 @@ class Term:
 
 
 @dataclass(frozen=True)
+class Rank:
+    """One of several objectives in order: it is least among the designs that are best by those before it.
+
+    Attributes
+    ----------
+    within
+        Share by which those after it may exceed its least value.
+    """
+
+    terms: tuple[Term, ...]
+    within: float = 0.0
+
+
+@dataclass(frozen=True)
 class Limit:
     """Bounds of a measure [SI]; `outside` keeps every value out of a band."""
 

@@ -12,7 +12,7 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.assembly import Assembly
 from laufruhe.problem.decision import Decision, Kind, Numbers, moved_numbers
-from laufruhe.problem.measure import Limit, Measure, Term
+from laufruhe.problem.measure import Limit, Measure, Rank, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.sets import Value
 from laufruhe.problem.tolerance import NO_TOLERANCES, Drawing, Over, Tolerances
@@ -86,6 +86,8 @@ class Problem:
         Of which of them what is minimised and limited is taken; None for the drawing.
     assembly
         Measured parts to choose among for every cylinder.
+    ranks
+        All objectives in order where there are several, `objective` the first of them; else none.
     origin
         The file that it was read from; None where it was made or changed in code.
     """
@@ -109,6 +111,7 @@ class Problem:
     assembly: Assembly | None = None
     origin: Origin | None = field(default=None, compare=False, repr=False)
     sharply: bool = False
+    ranks: tuple[Rank, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"
@@ -150,7 +153,8 @@ class Problem:
     @property
     def measures(self) -> tuple[Measure, ...]:
         """All that is minimised or limited."""
-        return (*(term.measure for term in self.objective), *(limit.measure for limit in self.limits))
+        later = (term.measure for rank in self.ranks[1:] for term in rank.terms)
+        return (*(term.measure for term in self.objective), *later, *(limit.measure for limit in self.limits))
 
     @property
     def load_terms(self) -> tuple[Term, ...]:

@@ -68,6 +68,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         **_phasing(result),
         **_robust(result),
         **_assembly(result),
+        **_ranks(result),
         "fidelity": {
             # the crank inertia is null where the crank turns evenly
             **asdict(problem.fidelity),
@@ -278,6 +279,16 @@ def _robust(result: Result) -> Record:
             "tolerances": [_of(t, "name size unit law scope errors price saving") for t in found.tolerances],
         }
     }  # fmt: skip
+
+
+def _ranks(result: Result) -> Record:
+    """`objectives` where several were minimised in order, each with the ends of decisions that it leaves equal."""
+    names = "name unit initial least lower_bound gap final limit price"
+    found = [
+        {**_of(rank, names), "proof": str(rank.proof), "equal": [_of(d, "name unit low high") for d in rank.equal]}
+        for rank in result.ranks
+    ]
+    return {"objectives": found} if found else {}
 
 
 def _assembly(result: Result) -> Record:

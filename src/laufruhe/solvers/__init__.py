@@ -20,6 +20,7 @@ from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.apart import solve_apart
 from laufruhe.solvers.assembly import solve_assembly
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
+from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.places import solve_places
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.robust import solve_robust
@@ -246,6 +247,8 @@ def _checked(problem: Problem, checked: Sequence[Limit]) -> Result:
 
 def _decided(problem: Problem) -> Result:
     """By the first method that suits, for the drawing or for the engines that are built to it."""
+    if problem.ranks:
+        return solve_in_order(problem, _decided)
     if problem.assembly is not None:
         return solve_assembly(problem)
     if problem.over is not None:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.norms import MEAN, Grid
 from laufruhe.problem.decision import Domain
-from laufruhe.solvers.conic import projected, solve_cones
+from laufruhe.solvers.cone_program import projected
+from laufruhe.solvers.conic import solve_cones
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Certificate
+from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.solvers.assembly_result import AssemblyResult
 from laufruhe.solvers.ranking import PhasingResult
 from laufruhe.solvers.robust_result import RobustResult
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 AS_GIVEN, AS_DECIDED = "as given", "as decided"
+APART = 0.05
+"""Share of the largest decision by which two designs differ."""
 
 
 class Status(StrEnum):
@@ -52,6 +54,53 @@ class DecisionValue:
     initial: float
     at_bound: bool
     shadow_price: float = 0.0
+
+
+@dataclass(frozen=True)
+class DecisionRange:
+    """Least and largest value of a decision among designs that an objective does not tell apart [SI]."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class RankValue:
+    """One of several objectives in order [SI].
+
+    Attributes
+    ----------
+    least, lower_bound, gap, proof
+        What was found under the limits of those before it, and how good that is.
+    initial, final
+        Of the design as given, and of that of the last rank.
+    limit
+        What those after it may make of it; None of the last.
+    price
+        Fall of the last objective per unit by which this one may be exceeded.
+    designs
+        Ends of every decision among the designs that are best by this one and those before it.
+    """
+
+    name: str
+    unit: str
+    initial: float
+    least: float
+    lower_bound: float
+    gap: float
+    proof: Proof
+    final: float
+    limit: float | None
+    price: float
+    designs: tuple[DecisionRange, ...] = ()
+
+    @property
+    def equal(self) -> tuple[DecisionRange, ...]:
+        """Decisions whose ends are two designs, and not what the solver's tolerance leaves of one."""
+        most = {found.unit: max(abs(d.high) for d in self.designs if d.unit == found.unit) for found in self.designs}
+        return tuple(found for found in self.designs if found.high - found.low > APART * most[found.unit])
 
 
 @dataclass(frozen=True)
@@ -125,6 +174,8 @@ class Result:
         Designs under tolerance, where built engines were decided for.
     assembly
         Which part goes where, where parts were chosen.
+    ranks
+        Of several objectives in order, where there are.
     """
 
     problem: Problem
@@ -142,6 +193,7 @@ class Result:
     phasing: PhasingResult | None = None
     robust: RobustResult | None = None
     assembly: AssemblyResult | None = None
+    ranks: tuple[RankValue, ...] = ()
 
     @property
     def designs(self) -> dict[str, Evaluation]:

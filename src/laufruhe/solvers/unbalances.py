@@ -20,6 +20,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
 from laufruhe.solvers.conic import solve_cones
+from laufruhe.solvers.equations import on_grid
 from laufruhe.solvers.lightest import SAME_LOAD, lightest
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.sharpening import Optimum, sharpened
@@ -89,8 +90,12 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
     for _ in in_time(range(MOST_DOUBLINGS + 1)):
         found = _allowed(problem, model, samples, nothing)
         if found is None:
-            # fewer angles ask for less: what they cannot meet, all cannot
-            return best if best is not None and best.excess <= KEPT else None, samples
+            if best is not None and best.excess <= KEPT:
+                return best, samples
+            if not _met_on_average(model, samples):
+                return None, samples
+            samples *= 2
+            continue
         best = found
         if _hopeless(problem, best):
             break
@@ -99,6 +104,14 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
             break
         samples *= 2
     return best, samples
+
+
+def _met_on_average(model: AffineModel, samples: int) -> bool:
+    """Whether designs exist by rows that are never more than what they stand for: means averaged, peaks at angles (P7).
+
+    At a few angles alone a mean may be more than over the whole cycle, and forbid what is allowed.
+    """
+    return solve_cones(replace(model.at(samples, averaged=True), terms=())).x is not None
 
 
 def _allowed(problem: Problem, model: AffineModel, samples: int, nothing: float) -> Optimum | None:
@@ -123,7 +136,8 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float,
     if solution.x is None:
         return None
     x = _settled(problem, fine, solution.x)
-    bound = best_bound(model.at(fine.samples, averaged=True), x, solution.multipliers)
+    averaged = model.at(fine.samples, averaged=True)
+    bound = best_bound(averaged, x, on_grid(coarse, averaged, solution.multipliers))
     judge = model.at(fine.samples, finer=True) if _has_peaks(problem) else fine
     value = judge.objective(x)
     return Optimum(x, bound, fine, judge, gap_of(value, bound.value, nothing), judge.excess(x), samples, nothing)

@@ -10,6 +10,7 @@ from laufruhe.report.sections import (
     modes,
     mounts,
     orders,
+    ranks,
     robust,
     run_up,
     stars,
@@ -18,7 +19,7 @@ from laufruhe.report.sections import (
 )
 from laufruhe.solvers.result import Result
 
-SECTIONS = (stars, assembly, decisions, robust, limits, mounts, torque, torsion, modes, run_up, orders)
+SECTIONS = (stars, assembly, ranks, decisions, robust, limits, mounts, torque, torsion, modes, run_up, orders)
 
 
 def tables_of(result: Result) -> list[Grid]:

@@ -1,0 +1,58 @@
+"""Objectives in order of rank, and the designs that each of them does not tell apart."""
+
+from __future__ import annotations
+
+from laufruhe.present.numbers import DASH, figure, price_of, trimmed
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import DecisionRange, RankValue, Result
+from laufruhe.units import readable
+
+HEAD = ("objective", "as given", "least", "proven not under", "proof", "in the design", "price")
+ORDER = (
+    "Each is least among the designs that are best by those before it, up to the share that it leaves them. "
+    "Price: by how much the last objective falls for each unit by which this one may be exceeded."
+)
+EQUAL = (
+    "Where a decision has two ends, designs with either are equal by the objectives so far: equal optima, "
+    "of which the next objective chooses."
+)
+
+
+def tables(result: Result) -> list[Grid]:
+    """A row an objective; and a row a decision with its ends after each of them."""
+    ranks = result.ranks
+    if not ranks:
+        return []
+    rows = tuple(_row(k, rank, ranks[-1]) for k, rank in enumerate(ranks, 1))
+    names = [found.name for found in ranks[0].designs]
+    ends = tuple((name, *(_ends(rank, name) for rank in ranks)) for name in names)
+    head = ("decision", *(f"best by {k}" if k == 1 else f"by 1 to {k}" for k in range(1, len(ranks) + 1)))
+    return [Grid("Objectives in order", HEAD, rows, note=ORDER), Grid("Equal optima", head, ends, note=EQUAL)]
+
+
+def _row(number: int, rank: RankValue, last: RankValue) -> tuple[str, ...]:
+    scale = rank.initial
+    told = (figure(value, rank.unit, scale=scale) for value in (rank.initial, rank.least, rank.lower_bound))
+    price = DASH if rank is last else price_of(rank.price, last.unit, rank.unit)
+    return f"{number} {rank.name}", *told, str(rank.proof), figure(rank.final, rank.unit, scale=scale), price
+
+
+def _ends(rank: RankValue, name: str) -> str:
+    found = next((each for each in rank.designs if each.name == name), None)
+    if found is None:
+        return DASH
+    unit, factor = readable(found.unit)
+    low, middle, high = (
+        trimmed(factor * _plain(value, rank), 3) for value in (found.low, 0.5 * (found.low + found.high), found.high)
+    )
+    return f"{low} to {high} {unit}".rstrip() if _is_open(found, rank) else f"{middle} {unit}".rstrip()
+
+
+def _is_open(found: DecisionRange, rank: RankValue) -> bool:
+    return any(found is each for each in rank.equal)
+
+
+def _plain(value: float, rank: RankValue) -> float:
+    """Zero for what is a rounding beside the largest decision."""
+    most = max((abs(each.high) for each in rank.designs), default=0.0)
+    return 0.0 if abs(value) <= 1e-3 * most else value
