@@ -11,25 +11,10 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+from laufruhe.files.hover import alternatives, kind
+
 HEADS = ("key", "type", "meaning", "example")
 WIDTHS = (20, 25, 40, 15)
-PLAIN = {"integer": "whole number", "number": "number", "string": "text", "boolean": "true or false", "object": "table"}
-
-
-def resolved(schema: dict[str, Any], entry: dict[str, Any]) -> dict[str, Any]:
-    """The definition behind a reference."""
-    place = entry.get("$ref")
-    return schema["definitions"][place.rpartition("/")[2]] if place else entry
-
-
-def alternatives(schema: dict[str, Any], entry: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """What may stand for a key, but null."""
-    found = resolved(schema, entry)
-    for one in found.get("anyOf", found.get("oneOf", [found])):
-        if one is found:
-            yield found
-        elif one.get("type") != "null":
-            yield from alternatives(schema, one)
 
 
 def tables_of(schema: dict[str, Any], entry: dict[str, Any]) -> Iterator[tuple[bool, dict[str, Any]]]:
@@ -41,32 +26,18 @@ def tables_of(schema: dict[str, Any], entry: dict[str, Any]) -> Iterator[tuple[b
             yield from ((True, table) for _, table in tables_of(schema, one["items"]))
 
 
-def told(schema: dict[str, Any], entry: dict[str, Any]) -> str:
-    """What a value is, in words."""
-    words: list[str] = []
-    for one in alternatives(schema, entry):
-        if "between" in one.get("properties", {}):
-            words.append("may be open")
-        elif "properties" in one:
-            words.append("table")
-        elif "const" in one:
-            words.append(json.dumps(one["const"], ensure_ascii=False))
-        elif "enum" in one:
-            words += [json.dumps(value, ensure_ascii=False) for value in one["enum"]]
-        elif one.get("type") == "array":
-            inner = told(schema, one["items"]) if isinstance(one.get("items"), dict) else "any"
-            words.append(f"list ({inner})")
-        elif one.get("type") == "string" and "pattern" in one and "description" in one:
-            words.append(one["description"])
-        else:
-            words.append(PLAIN.get(one.get("type", ""), "any"))
-    return ", ".join(dict.fromkeys(words))
+def parts_of(table: dict[str, Any]) -> list[dict[str, Any]]:
+    """Tables of which one stands there, as its kind says."""
+    return [choice["then"] for choice in table.get("allOf", ())] or [table]
 
 
-def example(entry: dict[str, Any]) -> str:
-    """The first example of a key."""
-    found = entry.get("examples", [None])[0]
-    return "" if found is None else json.dumps(found, ensure_ascii=False)
+def shown(value: Any) -> str:
+    """A value as it stands in a file."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {shown(one)}" for key, one in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(shown, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 class SchemaKeys(SphinxDirective):
@@ -83,7 +54,7 @@ class SchemaKeys(SphinxDirective):
     def sections(self, path: str, table: dict[str, Any], is_list: bool) -> Iterator[nodes.Node]:
         """The section of a table, and then those of what stands in it."""
         name = f"[[{path}]]" if is_list else f"[{path}]" if path else "At the top of the file"
-        title = f"{name}, {kind}" if (kind := self.kind(table)) else name
+        title = f"{name}, {which}" if (which := self.which(table)) else name
         section = nodes.section(ids=[nodes.make_id(f"{self.arguments[0]}-{title}")])
         section += nodes.title("", title)
         if "description" in table:
@@ -92,13 +63,15 @@ class SchemaKeys(SphinxDirective):
         yield section
         for key, entry in table["properties"].items():
             for each, inner in tables_of(self.schema, entry):
-                mark = json.dumps(inner, sort_keys=True)
-                if mark not in self.seen:
-                    self.seen.add(mark)
-                    yield from self.sections(f"{path}.{key}".strip("."), inner, each)
+                for part in parts_of(inner):
+                    table = next(alternatives(self.schema, part))
+                    mark = json.dumps(table, sort_keys=True)
+                    if mark not in self.seen:
+                        self.seen.add(mark)
+                        yield from self.sections(f"{path}.{key}".strip("."), table, each)
 
     @staticmethod
-    def kind(table: dict[str, Any]) -> str:
+    def which(table: dict[str, Any]) -> str:
         """What tells one of several tables of a key from the others."""
         for key in ("kind", "model"):
             entry = table["properties"].get(key, {})
@@ -114,13 +87,9 @@ class SchemaKeys(SphinxDirective):
         group += [head, body]
         head += self.row([nodes.Text(word) for word in HEADS])
         for key, entry in keys.items():
-            shown = [
-                nodes.literal("", key),
-                nodes.Text(told(self.schema, entry)),
-                nodes.Text(entry.get("description", "")),
-            ]
-            shown.append(nodes.literal("", example(entry)) if example(entry) else nodes.Text(""))
-            body += self.row(shown)
+            words = [nodes.Text(word) for word in (kind(self.schema, entry), entry.get("description", ""))]
+            example = [nodes.literal("", shown(one)) for one in entry.get("examples", ())]
+            body += self.row([nodes.literal("", key), *words, *example])
         return nodes.table("", group)
 
     @staticmethod

@@ -6,6 +6,7 @@ import copy
 import json
 import re
 import tomllib
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +102,29 @@ def test_every_key_of_a_problem_file_is_explained() -> None:
     tables = json.loads(shipped_schema())
     keys = {key for table in (tables, *tables["definitions"].values()) for key in table.get("properties", {})}
     assert not keys - known
+
+
+@pytest.mark.parametrize("is_study", [False, True], ids=["problem", "study"])
+def test_every_key_has_words_and_an_example_that_may_stand_there(is_study: bool) -> None:
+    tables = json.loads(schema_file(is_study=is_study)[1])
+    for name, table in {"": tables, **tables["definitions"]}.items():
+        for key, entry in table.get("properties", {}).items():
+            assert entry["description"], f"{name}.{key}"
+            assert entry["description"] in entry["x-taplo"]["docs"]["main"]
+            one = jsonschema.Draft7Validator({**entry, "definitions": tables["definitions"]})
+            assert entry["examples"]
+            assert not [error for example in entry["examples"] for error in one.iter_errors(example)], f"{name}.{key}"
+
+
+def test_words_of_keys_are_of_keys_that_there_are() -> None:
+    keys: set[str] = set()
+    for is_study in (False, True):
+        tables = json.loads(schema_file(is_study=is_study)[1])
+        for name, table in {tables["title"]: tables, **tables["definitions"]}.items():
+            told = table.get("properties", {})
+            keys |= {*told, *(f"{name.rpartition('__')[2]}.{key}" for key in told)}
+    words = tomllib.loads((files("laufruhe.files") / "hover.toml").read_text(encoding="utf-8"))
+    assert not {*words["words"], *words["examples"]} - keys
 
 
 def test_numbers_are_checked_with_their_unit(validator: jsonschema.Draft7Validator) -> None:

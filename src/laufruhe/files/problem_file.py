@@ -19,6 +19,7 @@ from laufruhe.files.flywheel import FlywheelTable
 from laufruhe.files.friction import FrictionTable
 from laufruhe.files.gas import GasTable
 from laufruhe.files.geared import GearedInertiaTable
+from laufruhe.files.hover import explained
 from laufruhe.files.mounts import BlockTable, MountsTable, RunUpTable
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
@@ -89,7 +90,7 @@ def schema_text(model: type[BaseModel]) -> str:
     found = model.model_json_schema(ref_template="#/definitions/{model}")
     whole: dict[str, Any] = {"$schema": "http://json-schema.org/draft-07/schema#", **found}
     whole["definitions"] = whole.pop("$defs")
-    return json.dumps(whole, indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(explained(whole), indent=2, ensure_ascii=False) + "\n"
 
 
 def shipped_schema() -> str:

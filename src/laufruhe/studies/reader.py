@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError, model_validator
 from laufruhe.errors import Complaint, InputError
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
+from laufruhe.files.hover import HOVER
 from laufruhe.files.problem_file import schema_text
 from laufruhe.files.reader import given
 from laufruhe.files.study_tables import MOST_POINTS, joined
@@ -119,11 +120,11 @@ def study_schema() -> str:
     for name in kinds.values():
         found["definitions"][name].pop("required", None)
         told = found["definitions"][name]["properties"]
-        keys |= {key: {"description": one["description"]} if "description" in one else {} for key, one in told.items()}
+        keys |= {key: {word: one[word] for word in HOVER} for key, one in told.items()}
     # a condition for each kind: an editor then marks the key that is wrong, and not the whole part
     holder["items"] = {
         "type": "object",
-        "properties": {**keys, "kind": {"enum": list(kinds)}},
+        "properties": {**keys, "kind": {**keys["kind"], "enum": list(kinds)}},
         "allOf": [
             {
                 "if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]},
