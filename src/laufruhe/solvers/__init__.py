@@ -140,8 +140,7 @@ def _adds_points(problem: Problem) -> bool:
 
 def _asks_stars(problem: Problem) -> bool:
     """Whether stars may be told apart by all that is asked: by loads, and by masses."""
-    wheel = any(measure.channel.is_flywheel for measure in problem.measures)
-    return _asks_loads(problem) and _adds_points(problem) and not wheel
+    return _asks_loads(problem) and _adds_points(problem)
 
 
 def _nothing_inside(problem: Problem) -> bool:

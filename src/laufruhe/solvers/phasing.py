@@ -7,6 +7,8 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.machine.firing import MOST_ORDERS
 from laufruhe.numerics.budget import limited, passed
@@ -16,6 +18,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.solvers.conclusion import no_star, with_star
+from laufruhe.solvers.even_turning import floors, of_wheel, solve_told_alike
 from laufruhe.solvers.ranking import (
     ORDERS_LISTED,
     RankedOrder,
@@ -52,6 +55,14 @@ def solve_phasing(problem: Problem) -> Result:
     if phasing.continuous and any(measure.is_inside for measure in problem.measures):
         rule = "loads inside the crankcase are decided with even firing or with throws that are given"
         raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out")
+    wheel = of_wheel(problem)
+    if phasing.continuous and wheel:
+        rule = f"{wheel[0].name} is decided with even firing or with throws that are given"
+        raise ModelError(
+            f"{rule}; leave phasing.intervals and bounds of throws out, or ask for peak to peak stored work"
+        )
+    if phasing.throws is None and wheel:
+        return solve_told_alike(problem, phasing, solve_phasing)
     started = time.perf_counter()
     if phasing.throws is not None:
         result = _of_fixed_throws(problem, phasing)
@@ -105,7 +116,7 @@ def _by_each_order(
         many = f"{MOST_ORDERS} and more firing orders and sets of shafts are too many to decide one by one"
         raise ModelError(f"{many}; give a firing order, or throws")
     designs = [replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in told]
-    every, complete = _solved(problem, phasing, designs)
+    every, least, complete = _solved(problem, phasing, designs)
     solved = [design for design in every if design.is_met]
     if not solved:
         proven = complete and all(design.result.status is not Status.FAILED for design in every)
@@ -116,10 +127,12 @@ def _by_each_order(
     for design in solved[1:]:
         if design.value < best.value - room_of(best.value, _share(problem), nothing):
             best = design
-    bound = min(design.bound for design in every) if complete else 0.0
+    bound = min([least, *(design.bound for design in every)]) if complete else 0.0
     count = sum(map(len, orders.values()))
     of_stars = f" of {len(stars)} stars" if len(stars) > 1 else ""
     method = f"{len(told)} of {count} firing order(s){of_stars}, {len(sets)} set(s) of shafts looked at"
+    if len(every) < len(designs) and complete:
+        method += f", {len(designs) - len(every)} of these by one order of the torque alone"
     proof = best.result.certificate
     how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     certificate = certified(best.value, bound, nothing, problem.tolerance, Reach.WHOLE, residual, how)
@@ -145,17 +158,25 @@ def _entries(
     return found
 
 
-def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) -> tuple[list[StarDesign], bool]:
-    """Those designs with the rest at its optimum, and whether time was enough for all."""
+def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) -> tuple[list[StarDesign], float, bool]:
+    """Those that may be the best, the rest at its optimum; what the others are at least; whether time was enough."""
     started = time.perf_counter()
     found: list[StarDesign] = []
-    for k, candidate in enumerate(designs):
-        tell("firing orders and sets of shafts", k, len(designs), min((one.value for one in found), default=math.inf))
+    # those that one order of the torque says least of come first
+    lowest, broken = floors(problem, phasing, designs)
+    places, nothing = np.argsort(lowest, kind="stable"), nothing_of(problem)
+    for k, place in enumerate(places):
+        best = min((one.value for one in found), default=math.inf)
+        tell("firing orders and sets of shafts", k, len(designs), best)
+        if lowest[place] > best + room_of(best, problem.tolerance, nothing):
+            return found, float(lowest[place]), True
+        if broken[place]:
+            continue
         if found and (passed() or time.perf_counter() - started > phasing.time_limit):
-            return found, False
-        result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem)))
-        found.append(StarDesign(candidate, result))
-    return found, True
+            return found, 0.0, False
+        result = solve_fixed(replace(phasing.realise(designs[place]), tolerance=_share(problem)))
+        found.append(StarDesign(designs[place], result))
+    return found, math.inf, True
 
 
 def _share(problem: Problem) -> float:

@@ -15,15 +15,7 @@ from laufruhe.problem.decision import Kind
 
 @dataclass(frozen=True, eq=False)
 class FlywheelChannel(NumberChannel):
-    """A number that goes one way with every number of the flywheel.
-
-    Attributes
-    ----------
-    of_torque
-        Whether the torque is in it, which other decisions move too.
-    """
-
-    of_torque: bool = False
+    """A number that goes one way with every number of the flywheel."""
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """The flywheel, discs where it follows from them, and all that moves the torque where that counts."""

@@ -92,6 +92,8 @@ class Channel:
         Whether it never falls where a number of the flywheel grows, if it is of that; else it never rises.
     of_wheel
         The value as a function of the flywheel of an engine, if it is of that.
+    of_torque
+        Whether the torque of the crank is in it, which other decisions than the flywheel move too.
     of_modes
         Whether it is of natural frequencies of the crankshaft, which rise with stiffness and fall with inertia.
     span
@@ -108,6 +110,7 @@ class Channel:
     of_loads: bool = False
     rises: bool = True
     of_wheel: Callable[[Asked, Answered], OfWheel] | None = None
+    of_torque: bool = False
     of_modes: bool = False
     span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
     is_load: ClassVar[bool] = False

@@ -1,0 +1,136 @@
+"""Degree of irregularity over firing orders and stars: bounded by one order of the torque, against brute force."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.errors import ModelError
+from laufruhe.files.reader import load_tables
+from laufruhe.machine.firing import lap_orders
+from laufruhe.physics.irregularity import irregularity
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.prove.swing_bound import SwingBound
+from laufruhe.solvers import Result, Status
+
+THROWS = [0, 50, 130, 180, 265]
+WIDE = {"intervals": {"min": "5 deg", "max": "400 deg"}}
+LEAST = {"minimise": "degree of irregularity"}
+
+
+def problem_of(engine: dict[str, Any] | None = None, **more: Any) -> Problem:
+    whole = {
+        "title": "Five throws",
+        "engine": {
+            "layout": "inline", "cycle": "four-stroke", "bore": "85 mm", "stroke": "90 mm", "rod_ratio": 0.28,
+            "reciprocating_mass": "0.6 kg", "rotating_mass": "0.5 kg", "cylinder_spacing": "100 mm",
+            **(engine or {"throws": THROWS, "firing_order": "open"}),
+        },
+        "operating_points": [{"name": "slow", "speed": "1200 rpm"}, {"name": "fast", "speed": "3500 rpm"}],
+        "gas": {"model": "seiliger", "peak_pressure": "60 bar", "imep": "8 bar"},
+        "flywheel": {"inertia": "0.3 kg m^2"}, "fidelity": {"samples": 240}, "objective": LEAST,
+    }  # fmt: skip
+    return load_tables({**whole, **more}, Path("five.toml"))
+
+
+def by_order(problem: Problem) -> dict[tuple[int, ...], float]:
+    """Degree of every firing order, each engine built anew."""
+    phasing = problem.phasing
+    layout = phasing.layout(None, None)
+    found = {}
+    for order in lap_orders(phasing.cycle, layout, phasing.throws):
+        engine = problem_of({"throws": THROWS, "firing_order": list(order)}).engine
+        found[order] = max(irregularity(engine, point, 0.3, problem.fidelity) for point in problem.points)
+    return found
+
+
+@pytest.fixture(scope="module")
+def uneven() -> tuple[Problem, Result, dict[tuple[int, ...], float]]:
+    problem = problem_of(phasing=WIDE)
+    return problem, laufruhe.solve(problem), by_order(problem)
+
+
+def test_the_best_firing_order_is_that_of_all_of_them(uneven: Any) -> None:
+    _, result, every = uneven
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value == pytest.approx(min(every.values()), rel=1e-9)
+    assert result.certificate.lower_bound <= min(every.values()) * (1.0 + 1e-12)
+    assert every[result.phasing.ranking[0].firing_orders[0].order] == pytest.approx(min(every.values()), rel=1e-9)
+    assert max(every.values()) > 2.0 * min(every.values())
+    assert "by one order of the torque alone" in result.certificate.method
+
+
+def test_one_order_is_under_every_degree(uneven: Any) -> None:
+    """Of each firing order at any inertia and speed; where one order is nearly all there is, it is close."""
+    problem, _, every = uneven
+    for order in [*every][::4]:
+        engine = problem_of({"throws": THROWS, "firing_order": list(order)}).engine
+        fires = np.array([[part.firing_angle / (2.0 * np.pi) for part in engine.slider_cranks]])
+        for point in problem.points:
+            for inertia in (0.02, 0.1, 1.0, 30.0):
+                bound = SwingBound.of(engine, point, problem.fidelity, inertia)
+                degree = irregularity(engine, point, inertia, problem.fidelity)
+                assert 0.3 * min(degree, 0.2) < bound.least(fires)[0] <= degree
+
+
+def test_a_limit_takes_orders_away(uneven: Any) -> None:
+    """Those under it are all that is left, and below the least none is; the couple of pistons chooses among them."""
+    _, _, every = uneven
+    values = sorted(every.values())
+    limit = 0.5 * (values[1] + values[2])
+    told = {"limit": "degree of irregularity", "max": f"{limit:.6f}"}
+    found = laufruhe.solve(problem_of(phasing=WIDE, constraints=[told], objective={"minimise": "rms crank torque"}))
+    assert found.status is Status.OPTIMAL
+    kept = [order for order, value in every.items() if value <= limit]
+    assert found.phasing.ranking[0].firing_orders[0].order in kept
+    torques = {
+        order: evaluate(one).value(one.objective[0].measure)
+        for order in kept
+        for one in [
+            problem_of({"throws": THROWS, "firing_order": list(order)}, objective={"minimise": "rms crank torque"})
+        ]
+    }
+    assert found.objective.value == pytest.approx(min(torques.values()), rel=1e-9)
+    none = laufruhe.solve(
+        problem_of(phasing=WIDE, constraints=[{**told, "max": f"{0.9 * values[0]:.6f}"}],
+                   objective={"minimise": "rms crank torque"})
+    )  # fmt: skip
+    assert none.status is Status.INFEASIBLE
+
+
+def test_stars_that_fire_evenly_turn_alike() -> None:
+    """Every star has the same degree to a rounding: the couple decides, with the degree in the sum or limited."""
+    opened = {"throws": "open", "firing_order": "open", "cylinders": 5}
+    orders = ([1, 2, 4, 5, 3], [1, 5, 2, 3, 4], [1, 3, 5, 2, 4])
+    engines = [problem_of({"firing_order": order, "cylinders": 5}).engine for order in orders]
+    point = problem_of().points[0]
+    degrees = [irregularity(engine, point, 0.3) for engine in engines]
+    assert degrees == pytest.approx([degrees[0]] * 3, rel=1e-11)
+    alone = laufruhe.solve(problem_of(opened))
+    assert alone.certificate.kind is Proof.GLOBAL
+    couple = {"quantity": "rms rocking couple", "weight": 1e-3}
+    terms = {"terms": [couple, {"quantity": "degree of irregularity"}]}
+    both = laufruhe.solve(problem_of(opened, objective=terms))
+    plain = laufruhe.solve(problem_of(opened, objective={"terms": [couple]}))
+    assert both.certificate.kind is Proof.GLOBAL
+    assert both.objective.value == pytest.approx(plain.objective.value + alone.objective.value, rel=1e-9)
+    assert both.certificate.lower_bound >= both.objective.value * (1.0 - 1e-4)
+    limit = {"limit": "degree of irregularity", "max": f"{1.01 * alone.objective.value:.6f}"}
+    limited = laufruhe.solve(problem_of(opened, objective={"terms": [couple]}, constraints=[limit]))
+    assert limited.objective.value == pytest.approx(plain.objective.value)
+    assert limited.limits[0].value == pytest.approx(alone.objective.value)
+    broken = laufruhe.solve(problem_of(opened, constraints=[{**limit, "max": "0.0001"}]))
+    assert broken.status is Status.INFEASIBLE
+    assert "all that fire evenly turn the crank as evenly" in broken.message
+
+
+def test_throws_that_move_are_refused() -> None:
+    opened = {"throws": "open", "firing_order": "open", "cylinders": 3}
+    with pytest.raises(ModelError, match="degree of irregularity is decided with even firing or with throws that are"):
+        laufruhe.solve(problem_of(opened, phasing={"intervals": {"largest_deviation": "10 deg"}}))
