@@ -32,6 +32,7 @@ sphinx_gallery_conf = {
     "only_warn_on_example_error": False,
     "show_memory": False,
     "min_reported_time": 1e9,
+    "show_signature": False,
     "download_all_examples": False,
     "remove_config_comments": True,
     "within_subsection_order": "ExampleTitleSortKey",
@@ -40,5 +41,20 @@ sphinx_gallery_conf = {
 
 html_math_renderer = "mathml"
 html_theme = "furo"
+html_show_copyright = False
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 html_title = "Laufruhe"
 html_theme_options = {"navigation_with_keys": True}
+
+
+def for_readers_aloud(app, page, template, context, doctree):
+    """Headings of the navigation say their level; blocks that scroll can be reached by keys."""
+    tree = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+    context["body"] = context.get("body", "").replace("<pre>", '<pre tabindex="0">')
+
+
+def setup(app):
+    """After the theme has made its navigation."""
+    app.connect("html-page-context", for_readers_aloud, priority=900)

@@ -47,7 +47,9 @@ class SchemaKeys(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Sections in the order of the schema, each table once."""
-        self.schema = json.loads((files("laufruhe.files") / self.arguments[0]).read_text(encoding="utf-8"))
+        path = files("laufruhe.files") / self.arguments[0]
+        self.env.note_dependency(str(path))
+        self.schema = json.loads(path.read_text(encoding="utf-8"))
         self.seen: set[str] = set()
         return list(self.sections("", self.schema, False))
 

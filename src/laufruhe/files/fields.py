@@ -104,7 +104,8 @@ class Number:
         if not self.unit:
             # text where it has a tolerance
             return {"anyOf": [{"type": "number"}, {"type": "string", "examples": ["0.26 ± 1 %"]}]}
-        told = {"description": units.dimension_name(self.unit), "examples": [units.example(self.unit)]}
+        dimension = units.dimension_name(self.unit)
+        told = {"description": dimension, "x-dimension": dimension, "examples": [units.example(self.unit)]}
         text = {"type": "string", "pattern": units.pattern(self.unit)[:-1] + _BEHIND, **told}
         return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
 

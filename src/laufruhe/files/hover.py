@@ -62,7 +62,8 @@ def alternatives(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> Iterato
     """What may stand for a key, but null."""
     place = entry.get("$ref")
     found = schema["definitions"][place.rpartition("/")[2]] if place else entry
-    choices = found.get("anyOf") or found.get("oneOf")
+    # conditions on a table are no alternatives to it
+    choices = None if "properties" in found else found.get("anyOf") or found.get("oneOf")
     if choices is None:
         yield from [found] if found.get("type") != "null" else []
     for one in choices or ():
@@ -80,10 +81,11 @@ def kind(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
             words += [json.dumps(value, ensure_ascii=False) for value in choices]
         elif one.get("type") == "array" and isinstance(one.get("items"), dict):
             words.append(f"list of {kind(schema, one['items'])}")
-        elif "pattern" in one and "description" in one:
-            words.append(one["description"])
+        elif "x-dimension" in one:
+            words.append(one["x-dimension"])
         else:
-            words.append(_PLAIN.get(str(one.get("type")), "any value"))
+            kinds = one.get("type", "")
+            words += [_PLAIN.get(each, "any value") for each in ([kinds] if isinstance(kinds, str) else kinds)]
     return ", ".join(dict.fromkeys(words))
 
 
@@ -104,7 +106,7 @@ def _example(schema: Mapping[str, Any], entry: Mapping[str, Any], path: str, dep
         return told[path]
     if entry.get("examples"):
         return entry["examples"][0]
-    if (default := entry.get("default")) and isinstance(default, str | int):
+    if (default := entry.get("default")) and not any("x-dimension" in one for one in alternatives(schema, entry)):
         return default
     key = path.rpartition(".")[2]
     if key in told and not _of_table(schema, entry):
