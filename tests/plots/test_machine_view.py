@@ -13,7 +13,8 @@ from PIL import Image
 from cli import scenes
 from laufruhe.files.reader import load
 from laufruhe.plots import motion
-from laufruhe.plots.machine_view import STEEL, THICKNESS, Scene, _Pose, half_disc, reaches
+from laufruhe.plots.machine_parts import STEEL, THICKNESS, Pose, half_disc
+from laufruhe.plots.machine_view import Scene, reaches
 from laufruhe.plots.motion import animate
 from laufruhe.plots.results import engine
 from problem_files import PROBLEMS
@@ -22,7 +23,7 @@ from problem_files import PROBLEMS
 @pytest.mark.parametrize("name", ["vee-six-60", "radial-seven", "boxer-four"])
 def test_pistons_go_through_their_stroke_on_their_axes(name: str) -> None:
     for part in load(PROBLEMS / f"{name}.toml").engine.slider_cranks:
-        poses = [_Pose.of(part, phi) for phi in np.linspace(0.0, math.tau, 361)]
+        poses = [Pose.of(part, phi) for phi in np.linspace(0.0, math.tau, 361)]
         along = np.array([(pose.piston - pose.crank) * cmath.exp(-1j * part.bank) for pose in poses])
         assert np.ptp(along.real) == pytest.approx(part.stroke, rel=0.02)
         assert np.abs(along.imag - part.offset).max() < 1e-9
@@ -34,7 +35,7 @@ def test_pistons_go_through_their_stroke_on_their_axes(name: str) -> None:
 def test_pins_turn_clockwise_seen_from_the_front() -> None:
     """C3: a pin at (y, z) = r (sin phi, cos phi)."""
     part = load(PROBLEMS / "tractor-single.toml").engine.slider_cranks[0]
-    pin = _Pose.of(part, 0.25 * math.pi).pin
+    pin = Pose.of(part, 0.25 * math.pi).pin
     assert (pin.imag, pin.real) == pytest.approx((part.crank_radius * math.sqrt(0.5),) * 2)
 
 

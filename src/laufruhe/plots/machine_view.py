@@ -2,32 +2,48 @@
 
 from __future__ import annotations
 
-import cmath
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle, Wedge
+from numpy.typing import NDArray
 
-from laufruhe.machine import Engine, Rotor, Shaft, SliderCrank
+from laufruhe.machine import Engine, Rotor, Shaft
 from laufruhe.machine.rotor import Role
-from laufruhe.machine.slider_crank import Outline
-from laufruhe.plots.style import AFTER, GREY, ORANGE, entry, entry_of_dots
-from laufruhe.plots.words import FAINT, INK
+from laufruhe.plots.machine_parts import (
+    IRON,
+    METAL,
+    MM,
+    PISTON,
+    THICKNESS,
+    Pose,
+    at,
+    bar,
+    bodies,
+    bore_of,
+    box,
+    cylinder,
+    direction,
+    half_disc,
+    heights_of,
+    look_of,
+    piston_at,
+)  # fmt: skip
+from laufruhe.plots.style import AFTER, GREY, ORANGE, PALE, Page, entry_of_dots, page
+from laufruhe.plots.words import INK, SMALL, round_ticks, width_of
 from laufruhe.present.measures import changed
 from laufruhe.solvers.result import Result
 
-STEEL = 7850.0
-THICKNESS = 0.02
-"""Of the half discs that stand for weights [m]."""
-LONG_ROD = 4.0
-_METAL = "#c9ced3"
-_PISTON: Any = {"facecolor": "white", "edgecolor": INK, "linewidth": 1.0, "alpha": 0.9}
-_MM = 1e3
+# both views side by side, of one page, and between them [inch]
+WIDE, HIGH, ACROSS, NARROW = 8.0, 4.4, 0.8, 1.4
+ROOM = 1.1
+"""Around what is seen, as a share of it."""
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -83,117 +99,128 @@ class Scene:
         """From where the second view is taken."""
         return "from above" if self.is_flat else "from the left"
 
-    def colour(self, rotor: Rotor) -> str:
-        """Of a weight: whether it was decided."""
-        return AFTER if rotor.name in self.rotors else GREY
+    def is_decided(self, rotor: Rotor) -> bool:
+        """Whether a weight was."""
+        return rotor.name in self.rotors
 
 
-@dataclass(frozen=True)
-class _Pose:
-    """Where a slider-crank is, zeta = z + i y [m] (C4), and the bodies of one that has no piston."""
-
-    part: SliderCrank
-    crank: complex
-    pin: complex
-    piston: complex
-    bodies: tuple[Outline, ...]
-
-    @classmethod
-    def of(cls, part: SliderCrank, phi: float) -> _Pose:
-        """At a crank angle (C5)."""
-        centre, axis = complex(part.shaft.z, part.shaft.y), cmath.exp(1j * part.bank)
-        turn = part.throw + part.shaft.ratio * phi
-        rod = part.rod_length if math.isfinite(part.rod_length) else LONG_ROD * part.crank_radius
-        moved = complex(part.motion(np, np.float64(turn - part.bank)).points[0][1][0])
-        way = part.crank_radius + rod + moved
-        bodies = tuple(
-            replace(body, points=centre + axis * body.points) for body in part.outlines(float(turn - part.bank))
-        )
-        return cls(part, centre, centre + part.crank_radius * cmath.exp(1j * turn), centre + way * axis, bodies)
+def views(scene: Scene) -> Page:
+    """Empty panels for both views, in one scale, as large as fit on a page."""
+    ahead, beside = (np.array(points) for points in reaches(scene))
+    sizes = np.array([ROOM * np.ptp(points, axis=0) for points in (ahead, beside)])
+    scale = min(WIDE / sizes[:, 0].sum(), HIGH / sizes[:, 1].max())
+    high = float(scale * sizes[:, 1].max())
+    drawn = page(1, 2, (0.5 * WIDE, high), across=ACROSS)
+    inches, left = drawn.figure.get_figwidth(), 0.0
+    for axes, points, size, is_side in zip(drawn.panels, (ahead, beside), sizes, (False, True), strict=True):
+        wide = max(float(scale * size[0]), NARROW)
+        axes.set_position((left / inches, 0.0, wide / inches, 1.0))
+        left += wide + ACROSS
+        _framed(axes, points, (wide / scale, high / scale), backwards=is_side, down=is_side and scene.is_flat)
+        for axis, room in ((axes.xaxis, wide), (axes.yaxis, high)):
+            round_ticks(axis, min(max(int(room / 0.6), 2), 7))
+    return drawn
 
 
-def half_disc(unbalance: float) -> float:
-    """Radius of a half disc of steel with this unbalance [m]: its area centre lies 4 R / 3 pi off."""
-    return math.cbrt(1.5 * unbalance / (STEEL * THICKNESS))
+def _framed(axes: Axes, points: Array, size: tuple[float, float], backwards: bool, down: bool) -> None:
+    """So much [mm] about the middle of what is seen at any angle; x to the left, or y down, where told."""
+    x, y = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    across, up = (x - 0.5 * size[0], x + 0.5 * size[0]), (y - 0.5 * size[1], y + 0.5 * size[1])
+    axes.set(xlim=across[::-1] if backwards else across, ylim=up[::-1] if down else up)
 
 
-def front_view(axes: Axes, scene: Scene, phi: float = 0.0) -> None:
+def draw_views(drawn: Page, scene: Scene, phi: float = 0.0) -> None:
+    """Both views at a crank angle."""
+    front, side = drawn.panels
+    _front(front, scene, phi)
+    _side(side, scene, phi)
+    front.set_title("from the front, turning clockwise", loc="left", size=SMALL)
+    side.set_title(scene.beside, loc="left", size=SMALL)
+
+
+def _front(axes: Axes, scene: Scene, phi: float) -> None:
     """From the front: y to the right, z up, turning clockwise (C3)."""
-    poses = [_Pose.of(part, phi) for part in scene.engine.slider_cranks]
-    bore = _bore(scene.engine)
-    for pose in poses:
+    # what stands further back is drawn first
+    poses = [Pose.of(part, phi) for part in sorted(scene.engine.slider_cranks, key=lambda part: part.x)]
+    bore = bore_of(scene.engine)
+    for k, pose in enumerate(poses):
+        behind = 4.0 + k / len(poses)
         if pose.bodies:
-            _bodies(axes, pose)
+            bodies(axes, pose)
         else:
-            _line(axes, [pose.pin, pose.piston], color=_METAL, linewidth=2.6, zorder=2)
-            _piston(axes, pose, bore)
-        _line(axes, [pose.crank, pose.pin], color=_crank_colour(scene), linewidth=3.2, zorder=4)
-        axes.add_patch(Circle(_at(pose.pin), _MM * 0.12 * bore, facecolor="white", edgecolor=INK, zorder=5))
+            cylinder(axes, pose, bore)
+            piston_at(axes, pose, bore, behind)
+            bar(axes, (pose.pin, 0.15 * bore), (pose.piston, 0.09 * bore), behind, facecolor=METAL, edgecolor=INK)
+        bar(axes, (pose.crank, 0.2 * bore), (pose.pin, 0.15 * bore), behind + 2.0, **_crank_look(scene))
+        axes.add_patch(Circle(at(pose.pin), MM * 0.08 * bore, facecolor="white", edgecolor=INK, zorder=7.5))
     for rotor in scene.weights:
-        centre, along = complex(rotor.shaft.z, rotor.shaft.y), _direction(rotor, phi)
+        centre, along = complex(rotor.shaft.z, rotor.shaft.y), direction(rotor, phi)
         middle = 90.0 - math.degrees(along)
-        radius = _MM * half_disc(abs(rotor.unbalance))
-        look: Any = {"facecolor": scene.colour(rotor), "edgecolor": INK, "linewidth": 0.6, "alpha": 0.75, "zorder": 3}
-        axes.add_patch(Wedge(_at(centre), radius, middle - 90.0, middle + 90.0, **look))
+        radius = MM * half_disc(abs(rotor.unbalance))
+        axes.add_patch(
+            Wedge(at(centre), radius, middle - 90.0, middle + 90.0, zorder=3.0, **_weight_look(scene, rotor))
+        )
     for shaft in scene.engine.shafts:
-        axes.add_patch(Circle(_at(complex(shaft.z, shaft.y)), _MM * 0.08 * bore, facecolor=INK, zorder=6))
+        axes.add_patch(Circle(at(complex(shaft.z, shaft.y)), MM * 0.08 * bore, facecolor=INK, zorder=8.0))
     for mount in scene.engine.mounts:
         _, y, z = mount.position
-        axes.plot(_MM * y, _MM * z, **_mount_look(mount.name in scene.mounts))
+        axes.plot(MM * y, MM * z, **_mount_look(mount.name in scene.mounts))
     axes.set(xlabel="y [mm]", ylabel="z [mm]")
 
 
-def side_view(axes: Axes, scene: Scene, phi: float = 0.0) -> None:
+def _side(axes: Axes, scene: Scene, phi: float) -> None:
     """From the left, z up, or from above, y down: the front of the engine at the left."""
-    bore, parts = _bore(scene.engine), scene.engine.slider_cranks
+    bore = bore_of(scene.engine)
+    poses = [Pose.of(part, phi) for part in scene.engine.slider_cranks]
     quarter = 0.5 * math.pi if scene.is_flat else 0.0
 
     def level(place: complex) -> float:
-        return _MM * (place.imag if scene.is_flat else place.real)
+        return MM * (place.imag if scene.is_flat else place.real)
 
     for shaft in scene.engine.shafts:
-        places = [part.x for part in parts if part.shaft is shaft]
+        places = [pose.part.x for pose in poses if pose.part.shaft is shaft]
+        thick = 0.22 if places else 0.1
         places += [rotor.x for rotor in scene.engine.rotors if rotor.shaft == shaft]
-        ends = (max(places) + 0.6 * bore, min(places) - 0.6 * bore)
-        axes.plot([_MM * x for x in ends], [level(complex(shaft.z, shaft.y))] * 2, color=FAINT, linewidth=1.0, zorder=2)
-    for pose in (_Pose.of(part, phi) for part in parts):
-        x, wide, pin = _MM * pose.part.x, _MM * 0.18 * bore, level(pose.pin)
-        look: Any = {"color": _crank_colour(scene), "linewidth": 2.6, "zorder": 4}
-        crank, piston = level(pose.crank), level(pose.piston)
-        axes.plot([x - wide, x - wide, x + wide, x + wide], [crank, pin, pin, crank], **look)
+        ends, middle = (max(places) + 0.6 * bore, min(places) - 0.6 * bore), level(complex(shaft.z, shaft.y))
+        box(axes, ends, (middle - MM * 0.5 * thick * bore, middle + MM * 0.5 * thick * bore), 3.0, facecolor=METAL)
+    for pose in poses:
+        x, pin, crank, piston = pose.part.x, level(pose.pin), level(pose.crank), level(pose.piston)
+        reach, sign = MM * 0.15 * bore, math.copysign(1.0, pin - crank)
+        for web in (x - 0.24 * bore, x + 0.24 * bore):
+            ends = (web - 0.06 * bore, web + 0.06 * bore)
+            box(axes, ends, (crank - sign * 1.3 * reach, pin + sign * reach), 4.5, **_crank_look(scene))
+        journal = (pin - 0.7 * reach, pin + 0.7 * reach)
+        box(axes, (x - 0.18 * bore, x + 0.18 * bore), journal, 4.4, **_crank_look(scene))
         for body in pose.bodies:
-            heights = [level(place) for place in body.points]
-            corner = (x - 0.5 * _MM * body.width, min(heights))
-            axes.add_patch(Rectangle(corner, _MM * body.width, max(heights) - min(heights), **_look_of(body)))
-            piston = 0.5 * (min(heights) + crank)
+            found = [level(place) for place in body.points]
+            corner = (MM * (x - 0.5 * body.width), min(found))
+            axes.add_patch(Rectangle(corner, MM * body.width, max(found) - min(found), **look_of(body)))
+            piston = 0.5 * (min(found) + crank)
         if not pose.bodies:
-            axes.plot([x, x], [pin, piston], color=_METAL, linewidth=2.6, zorder=3)
-            height = _MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
-            place = (x - 0.48 * _MM * bore, piston - 0.5 * height)
-            axes.add_patch(Rectangle(place, 0.96 * _MM * bore, height, **_PISTON, zorder=5))
-        number = next((word for word in pose.part.name.split() if word.isdecimal()), "")
-        # pistons of two banks may stand behind each other
-        aside = -0.25 * _MM * bore * float(np.sign(round(math.sin(pose.part.bank - quarter), 9)))
-        axes.text(x + aside, piston, number, ha="center", va="center", size=7.5, zorder=6)
+            box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, facecolor=METAL)
+            high = MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
+            box(axes, (x - 0.48 * bore, x + 0.48 * bore), (piston - 0.5 * high, piston + 0.5 * high), 5.0, **PISTON)
+        _number(axes, pose, piston, quarter, bore)
     for rotor in scene.weights:
-        low, high = _heights(half_disc(abs(rotor.unbalance)), _direction(rotor, phi) - quarter)
-        place = (_MM * (rotor.x - 0.5 * THICKNESS), level(complex(rotor.shaft.z, rotor.shaft.y)) + _MM * low)
-        look = {"facecolor": scene.colour(rotor), "edgecolor": INK, "linewidth": 0.6, "alpha": 0.75, "zorder": 5.5}
-        axes.add_patch(Rectangle(place, _MM * THICKNESS, _MM * (high - low), **look))
+        low, high = heights_of(half_disc(abs(rotor.unbalance)), direction(rotor, phi) - quarter)
+        middle = level(complex(rotor.shaft.z, rotor.shaft.y))
+        ends = (rotor.x - 0.5 * THICKNESS, rotor.x + 0.5 * THICKNESS)
+        box(axes, ends, (middle + MM * low, middle + MM * high), 5.5, **_weight_look(scene, rotor))
     for mount in scene.engine.mounts:
         x, y, z = mount.position
-        axes.plot(_MM * x, level(complex(z, y)), **_mount_look(mount.name in scene.mounts))
+        axes.plot(MM * x, level(complex(z, y)), **_mount_look(mount.name in scene.mounts))
     axes.set(xlabel="x [mm], the front at the left", ylabel="y [mm]" if scene.is_flat else "z [mm]")
 
 
-def framed(axes: Axes, points: Sequence[tuple[float, float]], backwards: bool = False, down: bool = False) -> None:
-    """One scale both ways, with room around what is seen at any angle [mm]; x to the left, or y down, where told."""
-    corners = np.array([np.min(points, axis=0), np.max(points, axis=0)])
-    panel = np.array(axes.bbox.size)
-    wide, high = 0.5 * 1.12 * float(((corners[1] - corners[0]) / panel).max()) * panel
-    x, y = corners.mean(axis=0)
-    across, up = (x - wide, x + wide), (y - high, y + high)
-    axes.set(xlim=across[::-1] if backwards else across, ylim=up[::-1] if down else up)
+def _number(axes: Axes, pose: Pose, up: float, quarter: float, bore: float) -> None:
+    """Of a cylinder, on its piston, where the piston is large enough for it."""
+    number = next((word for word in pose.part.name.split() if word.isdecimal()), "")
+    # pistons of two banks may stand behind each other
+    lean = float(np.sign(round(math.sin(pose.part.bank - quarter), 9)))
+    inches = 0.96 * MM * bore / abs(np.ptp(axes.get_xlim())) * axes.bbox.width / axes.figure.dpi
+    if width_of(number) < (0.45 if lean else 0.9) * inches:
+        place = MM * (pose.part.x - 0.25 * bore * lean)
+        axes.text(place, up, number, ha="center", va="center_baseline", size=SMALL, zorder=6.0)
 
 
 def reaches(scene: Scene) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
@@ -201,17 +228,17 @@ def reaches(scene: Scene) -> tuple[list[tuple[float, float]], list[tuple[float, 
     front, side = [], []
     for x, centre, radius in _spots(scene):
         for y, z in ((centre.imag - radius, centre.real - radius), (centre.imag + radius, centre.real + radius)):
-            front.append((_MM * y, _MM * z))
-            side.append((_MM * x, _MM * (y if scene.is_flat else z)))
-    bore = _MM * _bore(scene.engine)
+            front.append((MM * y, MM * z))
+            side.append((MM * x, MM * (y if scene.is_flat else z)))
+    bore = MM * bore_of(scene.engine)
     side += [(corner + sign * 0.7 * bore, z) for corner, z in side[:] for sign in (-1.0, 1.0)]
     return front, side
 
 
 def _spots(scene: Scene) -> Iterator[tuple[float, complex, float]]:
-    bore = _bore(scene.engine)
+    bore = bore_of(scene.engine)
     for part in scene.engine.slider_cranks:
-        for pose in (_Pose.of(part, phi) for phi in np.linspace(0.0, math.tau / abs(part.shaft.ratio), 13)):
+        for pose in (Pose.of(part, phi) for phi in np.linspace(0.0, math.tau / abs(part.shaft.ratio), 13)):
             spots = [*(place for body in pose.bodies for place in body.points)] or [pose.piston]
             yield from ((part.x, place, 0.0 if pose.bodies else 0.4 * bore) for place in spots)
             yield part.x, pose.pin, 0.15 * bore
@@ -226,10 +253,13 @@ def _spots(scene: Scene) -> Iterator[tuple[float, complex, float]]:
 def legend_of(scene: Scene) -> list[Line2D | Patch]:
     """What stands for what."""
     crank = f"crank, {scene.state}" if scene.throws else "crank"
-    found: list[Line2D | Patch] = [entry(crank, color=_crank_colour(scene), linewidth=3.0)]
-    colours = {scene.colour(rotor) for rotor in scene.weights}
-    words = {GREY: "weight", AFTER: f"weight, {scene.state}"}
-    found += [Patch(facecolor=colour, edgecolor=INK, alpha=0.75, label=words[colour]) for colour in sorted(colours)]
+    found: list[Line2D | Patch] = [Patch(label=crank, **_crank_look(scene))]
+    # one of each kind
+    kinds = {scene.is_decided(rotor): rotor for rotor in scene.weights}
+    found += [
+        Patch(label=f"weight, {scene.state}" if decided else "weight", **_weight_look(scene, rotor))
+        for decided, rotor in sorted(kinds.items())
+    ]
     if len(scene.mounts) < len(scene.engine.mounts):
         found.append(entry_of_dots("mount", marker="^", color=ORANGE))
     if scene.mounts:
@@ -238,53 +268,15 @@ def legend_of(scene: Scene) -> list[Line2D | Patch]:
 
 
 def _mount_look(decided: bool) -> dict[str, Any]:
-    return {"marker": "^", "markersize": 9.0, "color": AFTER if decided else ORANGE, "linestyle": "none", "zorder": 6.5}
+    return {"marker": "^", "markersize": 9.0, "color": AFTER if decided else ORANGE, "linestyle": "none", "zorder": 9.0}
 
 
-def _crank_colour(scene: Scene) -> str:
-    return AFTER if scene.throws else INK
+def _crank_look(scene: Scene) -> dict[str, Any]:
+    return {"facecolor": PALE, "edgecolor": AFTER} if scene.throws else {"facecolor": IRON, "edgecolor": INK}
 
 
-def _direction(rotor: Rotor, phi: float) -> float:
-    """Angle of its unbalance from z towards y [rad]."""
-    return cmath.phase(rotor.unbalance) + rotor.shaft.ratio * phi
-
-
-def _heights(radius: float, along: float) -> tuple[float, float]:
-    """Lowest and highest point of a half disc about its centre [m]."""
-    up, across = math.cos(along), radius * abs(math.sin(along))
-    return (-radius if up < 0.0 else -across), (radius if up > 0.0 else across)
-
-
-def _bore(engine: Engine) -> float:
-    """Of the largest cylinder; as wide as the stroke where it is not told [m]."""
-    return max(part.bore or part.stroke for part in engine.slider_cranks)
-
-
-def _at(place: complex) -> tuple[float, float]:
-    return _MM * place.imag, _MM * place.real
-
-
-def _line(axes: Axes, places: Sequence[complex], **look: Any) -> None:
-    xs, ys = zip(*(_at(place) for place in places), strict=True)
-    axes.plot(xs, ys, solid_capstyle="round", **look)
-
-
-def _look_of(body: Outline) -> dict[str, Any]:
-    if body.moves:
-        return {**_PISTON, "zorder": 2.2}
-    return {"fill": False, "edgecolor": GREY, "linewidth": 1.4, "zorder": 1.8}
-
-
-def _bodies(axes: Axes, pose: _Pose) -> None:
-    for body in pose.bodies:
-        xs, ys = zip(*(_at(place) for place in body.points), strict=True)
-        axes.fill(xs, ys, **_look_of(body))
-
-
-def _piston(axes: Axes, pose: _Pose, bore: float) -> None:
-    turn = cmath.exp(1j * pose.part.bank)
-    ways = ((-0.25, -0.48), (-0.25, 0.48), (0.25, 0.48), (0.25, -0.48))
-    corners = (pose.piston + turn * bore * complex(up, side) for up, side in ways)
-    xs, ys = zip(*(_at(corner) for corner in corners), strict=True)
-    axes.fill(xs, ys, **_PISTON, zorder=3.5)
+def _weight_look(scene: Scene, rotor: Rotor) -> dict[str, Any]:
+    look = (
+        {"facecolor": AFTER, "edgecolor": AFTER} if scene.is_decided(rotor) else {"facecolor": GREY, "edgecolor": INK}
+    )
+    return {**look, "alpha": 0.6, "linewidth": 0.8}

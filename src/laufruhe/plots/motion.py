@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from laufruhe.plots.machine_view import Scene, framed, front_view, legend_of, reaches, side_view
-from laufruhe.plots.style import Series, headed, page, point_name, series_of
+from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
+from laufruhe.plots.style import Series, headed, point_name, series_of, styled
 from laufruhe.present.measures import Array, hardest_point, has_loads
 from laufruhe.present.numbers import figure as words
 from laufruhe.problem.curves import forces_of
@@ -24,6 +24,7 @@ DPI = 80
 REACH = 0.35
 
 
+@styled()
 def animate(result: Result, path: Path) -> None:
     """One working cycle; arrows are the shaking force at the crank, and the force on each mount."""
     from PIL import Image
@@ -34,16 +35,11 @@ def animate(result: Result, path: Path) -> None:
     largest = max((float(np.abs(one[:, :, 1:]).max()) for one in loads), default=0.0)
     frames = []
     for step in range(FRAMES):
-        drawn = page(1, 2, (5.2, 4.6), across=0.75)
-        phi = result.final.engine.cycle.angle * step / FRAMES
-        front_view(drawn.panels[0], scene, phi)
-        side_view(drawn.panels[1], scene, phi)
-        ahead, beside = reaches(scene)
-        framed(drawn.panels[0], ahead)
-        framed(drawn.panels[1], beside, backwards=True, down=scene.is_flat)
+        drawn, phi = views(scene), result.final.engine.cycle.angle * step / FRAMES
+        draw_views(drawn, scene, phi)
         for one, forces in zip(series, loads, strict=False):
             _arrows(drawn.panels[0], scene, forces[step], largest, one.colour)
-        shown = f"{math.degrees(phi):5.1f} deg after {scene.engine.slider_cranks[0].name} fires"
+        shown = f"{math.degrees(phi):.1f}° after {scene.engine.slider_cranks[0].name} fires"
         scale = f"; longest arrow {words(largest, 'N', 3)}" if largest else ""
         at = f", at {point_name(result, k)}" if loads else ""
         legend = [*legend_of(scene), *(one.entry(": forces") for one in series[: len(loads)])]

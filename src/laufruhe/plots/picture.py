@@ -18,6 +18,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.plots import style
 from laufruhe.plots.style import as_svg, heading, page, save, styled
+from laufruhe.plots.words import SMALL, apart, ink_on, legible, typeset
 from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
@@ -35,9 +36,9 @@ _MORE = {
 def draw(picture: Picture) -> Figure:
     """The figure of a description."""
     rows = -(-len(picture.panels) // picture.columns)
-    drawn = page(rows, picture.columns, picture.size, len(picture.panels), gap=picture.gap)
-    if picture.room:
-        _make_room(drawn.panels, picture.room / drawn.figure.get_figwidth())
+    lead = 0.2 if any(panel.title for panel in picture.panels) else 0.0
+    size = (picture.width, picture.size[1])
+    drawn = page(rows, picture.columns, size, len(picture.panels), picture.gap, lead)
     for axes, panel in zip(drawn.panels, picture.panels, strict=True):
         _panel(axes, panel)
     legend = [_entry(mark) for mark in _named(picture)]
@@ -63,17 +64,20 @@ def hue(colour: Colour) -> str:
 def _panel(axes: Axes, panel: Panel) -> None:
     for mark in panel.marks:
         _mark(axes, mark)
-    axes.set_title(panel.title, loc="left", size=9)
+    axes.set_title(typeset(panel.title), loc="left", size=SMALL)
     if panel.bare:
         axes.set_axis_off()
     _axis(axes, "x", panel.x)
     _axis(axes, "y", panel.y)
+    free = {mark.text for mark in panel.marks if isinstance(mark, Words) and mark.across == "left" and not panel.bare}
+    apart([text for text in axes.texts if text.get_text() in free])
 
 
 def _mark(axes: Axes, mark: Mark) -> None:
     if isinstance(mark, Words):
         drawn = axes.text(
-            mark.x, mark.y, mark.text, size=mark.size, color=hue(mark.colour), clip_on=False,
+            mark.x, mark.y, typeset(mark.text), size=max(mark.size, SMALL), clip_on=False,
+            color=ink_on(hue(mark.inside)) if mark.inside else legible(hue(mark.colour)),
             ha=mark.across, va=mark.along, weight="bold" if mark.bold else "normal",
         )  # fmt: skip
         if mark.boxed:
@@ -85,7 +89,7 @@ def _mark(axes: Axes, mark: Mark) -> None:
         )
         bars = draws(mark.places, mark.values, mark.width, linewidth=1.3 if mark.hollow else 0.0, **fill)
         if mark.numbers:
-            axes.bar_label(bars, list(mark.numbers), size=7.5)
+            axes.bar_label(bars, list(mark.numbers), size=SMALL)
     elif isinstance(mark, Area):
         axes.fill_between(mark.x, mark.low, mark.high, color=hue(mark.colour), linewidth=0)
     elif np.size(mark.x):
@@ -114,7 +118,7 @@ def _axis(axes: Axes, name: Literal["x", "y"], axis: Axis) -> None:
     if axis.ends is not None:
         axes.set(**{f"{name}lim": axis.ends})
     if axis.ticks is not None:
-        own.set_ticks([place for place, _ in axis.ticks], [text for _, text in axis.ticks], size=axis.small)
+        own.set_ticks([place for place, _ in axis.ticks], [text for _, text in axis.ticks])
     if not axis.grid:
         axes.grid(axis=name, visible=False)
         if name == "y":
@@ -134,12 +138,3 @@ def _entry(mark: Mark) -> Artist:
     if isinstance(mark, Line):
         return Line2D([], [], label=mark.label, **_look(mark))
     return Patch(color=hue(mark.colour), label=getattr(mark, "label", ""))
-
-
-def _make_room(panels: Sequence[Axes], shift: float) -> None:
-    """Shift the panels right by a share of the page, for the names of rows."""
-    left, right = panels[0].get_position().x0, panels[-1].get_position().x1
-    factor = (right - left - shift) / (right - left)
-    for axes in panels:
-        own = axes.get_position()
-        axes.set_position((left + shift + (own.x0 - left) * factor, own.y0, own.width * factor, own.height))

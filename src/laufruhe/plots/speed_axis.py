@@ -8,7 +8,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from laufruhe.plots.style import VERMILION, entry
-from laufruhe.plots.words import FAINT
+from laufruhe.plots.words import FAINT, SMALL
 from laufruhe.present.mounting import MountingFacts
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit
@@ -34,7 +34,7 @@ def limits_on(result: Result, channel: Channel) -> list[Limit]:
 def mark_points(axes: Axes, result: Result, share: float) -> None:
     """Operating points as thin lines; names where they do not crowd, at a share of the height."""
     points = result.problem.points
-    words: Any = {"size": 7.5, "color": FAINT, "ha": "right", "rotation": 90, "zorder": 4}
+    words: Any = {"size": SMALL, "color": FAINT, "ha": "right", "rotation": 90, "zorder": 4}
     words |= {"va": "top" if share > 0.5 else "bottom", "transform": axes.get_xaxis_transform()}
     for k, point in enumerate(points):
         axes.axvline(point.speed * RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)

@@ -25,7 +25,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
-from laufruhe.plots.words import FAINT, FONT, INK, SMALL, fitted, round_ticks, width_of, wrapped
+from laufruhe.plots.words import FAINT, FONT, INK, SMALL, fitted, round_ticks, typeset, width_of, wrapped
 from laufruhe.present.measures import changed, load_designs
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
@@ -45,6 +45,8 @@ _TITLE, _ENGINE = 13.0, 10.0
 _LINE = 1.35 / 72.0
 """Height of a line of text of one point [inch]."""
 _HANDLE, _APART = 1.6, 1.6
+_PER_TICK = 0.6
+"""Room that a number of a lying axis takes [inch]."""
 
 # names and titles are the user's: a dollar sign in them starts no formula
 _SETTINGS: Any = {
@@ -105,7 +107,8 @@ def page(
             left, bottom = column * (panel[0] + across), (rows - 1 - row) * (panel[1] + lead + gap)
             panels.append(figure.add_axes((left / wide, bottom / high, panel[0] / wide, panel[1] / high)))
             for axis in (panels[-1].xaxis, panels[-1].yaxis):
-                round_ticks(axis)
+                most = 6 if axis is panels[-1].yaxis else min(max(int(panel[0] / _PER_TICK), 3), 7)
+                round_ticks(axis, most)
     return Page(figure, tuple(panels))
 
 
@@ -120,6 +123,10 @@ def heading(
         Kept free above the panels for what has no extent of its own [inch].
     """
     with styled():
+        for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+            axis.set_label_text(typeset(axis.get_label_text()))
+        for artist in legend:
+            artist.set_label(typeset(str(artist.get_label())))
         drawn = Bbox.union([box for axes in figure.axes if (box := axes.get_tightbbox()) is not None])
         inside = drawn.transformed(figure.dpi_scale_trans.inverted())
         wide = max(inside.width + 2.0 * EDGE, NARROWEST)

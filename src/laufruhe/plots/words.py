@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -10,10 +11,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.font_manager import FontProperties
+from matplotlib.text import Text
 from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
+from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
@@ -22,6 +25,8 @@ INK, FAINT = "#222222", "#5c5c5c"
 FONT = "DejaVu Sans"
 SMALL = 9.0
 """No letter of a picture is smaller [points]."""
+READ = 4.5
+"""Least contrast of letters, as WCAG 2 asks."""
 THIN_SPACE = "\u2009"
 _POINTS = 72.0
 _ROUND = (1.0, 2.0, 5.0, 10.0)
@@ -64,8 +69,18 @@ def contrast(one: str, other: str) -> float:
 
 
 def ink_on(colour: str) -> str:
-    """Dark or white, whichever is read better on a colour."""
-    return max((INK, "#ffffff"), key=lambda ink: contrast(ink, colour))
+    """Black or white, whichever is read better on a colour."""
+    return max(("#000000", "#ffffff"), key=lambda ink: contrast(ink, colour))
+
+
+def legible(colour: str) -> str:
+    """A colour for letters on white: as dark as they need, its hue kept."""
+    share = next(k for k in range(21) if contrast(_darker(colour, k), "#ffffff") >= READ)
+    return _darker(colour, share)
+
+
+def _darker(colour: str, twentieths: int) -> str:
+    return to_hex([(1.0 - 0.05 * twentieths) * part for part in to_rgb(colour)])
 
 
 def _luminance(colour: str) -> float:
@@ -112,6 +127,46 @@ def empty(axes: Axes, words: str) -> None:
 def rows_of(count: int, most: int) -> int:
     """Side by side in as few rows as hold at most so many each, all about as long: 8 of at most 6 are 4 and 4."""
     return math.ceil(count / math.ceil(count / most)) if count else 1
+
+
+def apart(texts: Sequence[Text], room: float = 1.15) -> None:
+    """Words that would cover each other moved up and down, as little as may be."""
+    left = [(text, text.get_window_extent()) for text in texts]
+    while left:
+        group = [left.pop(0)]
+        # all that stand over one stretch of the axis are spread together
+        for text, box in left[:]:
+            if any(box.x0 < other.x1 and other.x0 < box.x1 for _, other in group):
+                group.append((text, box))
+                left.remove((text, box))
+        heights = np.array([0.5 * (box.y0 + box.y1) for _, box in group])
+        least = room * max(box.height for _, box in group)
+        moved = spread(heights, least, -math.inf, math.inf)
+        for (text, _), up in zip(group, moved - heights, strict=True):
+            if abs(up) > 0.1:
+                text.set_transform(text.get_transform() + Affine2D().translate(0.0, up))
+
+
+def typeset(words: str) -> str:
+    """Units as they are printed: m² for m^2, ° for degrees, µs for us."""
+    words = re.sub(r"\^(-?\d)", lambda found: found[1].translate(_RAISED), words)
+    return re.sub(r"\[(.*?)\]", lambda found: f"[{_UNITS.get(found[1], found[1])}]", words)
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_UNITS = {"deg": "°", "us": "µs", "um": "µm", "degC": "°C"}
+
+
+def aligned(panels: Sequence[Axes]) -> None:
+    """Labels of the upright axes of one column above each other, clear of the longest number."""
+    longest = 0.0
+    for axes in panels:
+        low, high = sorted(axes.get_ylim())
+        places = [place for place in axes.yaxis.get_majorticklocs() if low <= place <= high]
+        longest = max([longest, *(width_of(text) for text in axes.yaxis.get_major_formatter().format_ticks(places))])
+    for axes in panels:
+        lines = 1 + axes.get_ylabel().count("\n")
+        axes.yaxis.set_label_coords(-(longest + 0.12 + 0.09 * lines) * axes.figure.dpi / axes.bbox.width, 0.5)
 
 
 class PlainNumbers(ScalarFormatter):

@@ -12,12 +12,21 @@ from typing import Any, TypeAlias
 Colour: TypeAlias = str | float
 SERIES: tuple[Colour, ...] = ("blue", "orange", "green", "vermilion", "purple", "sky", "indigo", "olive")
 WIDE, HIGH = 6.4, 3.6
+WIDEST = 8.8
+"""Of all panels side by side [inch]."""
 DASHES = ((6.0, 2.0), (2.0, 2.0), (1.0, 3.0))
 
 
 def colour(k: int, count: int) -> Colour:
     """Of the k-th line: told apart by hue, or ordered from dark to light where there are too many."""
     return SERIES[k] if count <= len(SERIES) else k / (count - 1)
+
+
+def rows_of(count: int, most: int) -> tuple[list[range], int]:
+    """So many in rows of at most so many, all about as long; and how many one holds."""
+    rows = max(-(-count // max(most, 1)), 1)
+    side = max(-(-count // rows), 1)
+    return [range(first, min(first + side, count)) for first in range(0, count, side)], side
 
 
 @dataclass(frozen=True)
@@ -66,17 +75,18 @@ class Area:
 
 @dataclass(frozen=True)
 class Words:
-    """Text at a place; `across` and `along` say which end or side of it stands there."""
+    """Text at a place; `across` and `along` say which end or side of it stands there, `inside` the colour it is on."""
 
     x: float
     y: float
     text: str
-    size: float = 7.5
+    size: float = 9.0
     colour: Colour = "ink"
     across: str = "left"
     along: str = "center"
     bold: bool = False
     boxed: bool = False
+    inside: Colour = ""
 
 
 Mark: TypeAlias = Line | Bars | Area | Words
@@ -84,7 +94,7 @@ Mark: TypeAlias = Line | Bars | Area | Words
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis, of numbers or of texts at their places (`ticks`, `small` their size [points]).
+    """One axis, of numbers or of texts at their places (`ticks`).
 
     The end may be the smaller value; without ends the marks decide. A logarithmic axis is told the first figures
     of its ticks.
@@ -94,7 +104,6 @@ class Axis:
     ends: tuple[float, float] | None = None
     ticks: Sequence[tuple[float, str]] | None = None
     log: Sequence[float] = ()
-    small: float = 8.0
     grid: bool = True
 
 
@@ -113,7 +122,7 @@ class Panel:
 class Picture:
     """Panels side by side or one under the other, a title and what is seen above, the credit below.
 
-    Size of each panel, the gap between them and room left of the first, for long names, are in inches.
+    Size of each panel and the gap between them are in inches.
     """
 
     title: str
@@ -123,8 +132,12 @@ class Picture:
     size: tuple[float, float] = (WIDE, HIGH)
     columns: int = 1
     gap: float = 0.42
-    room: float = 0.0
     legend: Sequence[Mark] = ()
+
+    @property
+    def width(self) -> float:
+        """Of each panel [inch], where all that stand side by side share a page."""
+        return min(self.size[0], (WIDEST - (self.columns - 1) * self.gap) / self.columns)
 
 
 def credit(data: Any, note: str = "") -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,8 @@ from laufruhe.units import readable
 
 MOST_ROWS, MOST_DOTS = 80, 40
 NEGLIGIBLE = 1e-9
-# width of a letter of a tick [inch]
-LETTER = 0.066
+# width of a letter of a tick [inch], and how many a line of it has
+LETTER, LETTERS = 0.078, 18
 _PROOFS = {"global": "proven", "global within gap": "proven within gap", "local": "local", "none": "not proven"}
 
 
@@ -173,18 +174,32 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
         one = [(k + 0.0, best[k], "before" if plain[k] else "after")]
         pair = [(k - 0.2, given[k], "before"), (k + 0.2, best[k], "after")]
         marks += [_bar(*bar, 0.5 if single.all() else 0.36, most) for bar in (one if single[k] else pair)]
+    labels = ["\n".join(part for line in str(label).split("\n") for part in wrap(line, LETTERS)) for label in labels]
+    widest = max(len(line) for label in labels for line in str(label).split("\n"))
+    each = max(1.15, 0.2 + LETTER * widest)
+    up = metric_axis(data, *(() if single.all() else ("objective_given",)))
+    rows, side = p.rows_of(count, max(int(p.WIDEST / each), 1))
     ticks = [(float(k), str(label)) for k, label in enumerate(labels)]
-    panel = p.Panel(
-        marks,
-        p.Axis(ends=(-0.6, count - 0.4), ticks=ticks, small=7.5, grid=False),
-        metric_axis(data, *(() if single.all() else ("objective_given",))),
-    )
+    panels = [
+        p.Panel(
+            [mark for mark in marks if row[0] - 0.5 < _place(mark) < row[-1] + 0.5],
+            p.Axis(ends=(row[0] - 0.6, row[0] + side - 0.4), ticks=ticks[row[0] : row[-1] + 1], grid=False),
+            up,
+        )
+        for row in rows
+    ]
     grey = "no shafts" if once is not None else "as given"
     legend = [p.Bars(colour="before", label=grey)] if plain.any() or not single.all() else []
     legend += [p.Bars(label=claimed(data))] if not plain.all() else []
-    widest = max(len(line) for label in labels for line in str(label).split("\n"))
-    size = (max(p.WIDE, count * max(1.15, 0.2 + LETTER * widest)), p.HIGH)
-    return p.Picture(data.attrs["title"], words, [panel], p.credit(data), size=size, legend=legend)
+    lines = max(str(label).count("\n") for label in labels)
+    size = (max(p.WIDE, side * each), p.HIGH if len(rows) == 1 else 0.7 * p.HIGH)
+    gap = 0.42 + 0.16 * lines
+    return p.Picture(data.attrs["title"], words, panels, p.credit(data), size=size, gap=gap, legend=legend)
+
+
+def _place(mark: p.Mark) -> float:
+    """Of one bar, or of the words in its place."""
+    return float(mark.places[0] if isinstance(mark, p.Bars) else mark.x)
 
 
 def _bar(place: float, value: float, colour: str, width: float, most: float) -> p.Mark:

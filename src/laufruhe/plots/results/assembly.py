@@ -30,6 +30,7 @@ def figure(result: Result) -> Figure:
     axes.axvline(objective.value, color=AFTER, linewidth=1.8)
     axes.axvline(objective.initial, color=BEFORE, linewidth=1.8)
     axes.axvline(found.mean_parts, color=INK, linewidth=1.2, linestyle=MEAN)
+    axes.margins(x=0.06)
     name, unit = objective.name, objective_unit(result)
     axes.set(
         ylim=(0.0, 104.0), ylabel="assemblies below [%]", xlabel=f"{name} [{unit}]" if len(name) < 60 else f"[{unit}]"

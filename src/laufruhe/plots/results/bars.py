@@ -2,46 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from laufruhe.plots.style import Series, headed, page, series_of, styled, thin
-from laufruhe.plots.words import FAINT, fitted
+from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, ink_on, rows_of
 from laufruhe.present.measures import Array, hardest_point, has_mount_forces
 from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.solvers.result import Result
 
-MOST_POINTS = 4
-WIDTH = 0.36
+MOST_POINTS, MOST_GROUPS = 4, 7
+GROUP, WIDTH = 1.22, 0.42
+"""Width of a group of bars [inch], and of a bar over it."""
 applies = has_mount_forces
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """One group of bars for each mount and one for all; one row for each operating point."""
+    """One group of bars for each mount and one for all; rows for operating points, and for many mounts."""
     several = range(len(result.problem.points))
     shown = list(several) if len(several) <= MOST_POINTS else [hardest_point(result)]
     names = [*result.initial.mount_names, "all mounts"]
-    wide = min(max(6.4, 1.15 * len(names)), 24.0)
-    drawn = page(len(shown), 1, (wide, 3.4 if len(shown) == 1 else 2.3))
+    side = rows_of(len(names), MOST_GROUPS)
+    parts = [range(first, min(first + side, len(names))) for first in range(0, len(names), side)]
+    rows = [(k, part) for k in shown for part in parts]
+    high = 3.2 if len(rows) == 1 else 2.1
+    drawn = page(len(rows), 1, (max(GROUP * (side + 0.3), 4.2), high), lead=0.12 if len(shown) > 1 else 0.0)
     series = series_of(result, loads=True)
-    for axes, k in zip(drawn.panels, shown, strict=True):
-        values = [_measures(one.design, k) for one in series]
-        _groups(axes, values, series)
-        _frame(axes, names, values, wide)
-        axes.tick_params(labelbottom=k == shown[-1])
-        if len(several) > 1:
-            axes.set_title(f"at {result.problem.points[k].name}", loc="left", size=10, parse_math=False)
+    values = {k: [_measures(one.design, k) for one in series] for k in shown}
+    top = thin(float(table.max(initial=0.0)) for tables in values.values() for table in tables)
+    for axes, (k, part) in zip(drawn.panels, rows, strict=True):
+        _groups(axes, values[k], series, part, top)
+        _frame(axes, names, part, side, top)
+        if len(several) > 1 and part is parts[0]:
+            axes.set_title(f"at {result.problem.points[k].name}", loc="left", size=10)
     at = f" at {result.problem.points[shown[0]].name}" if len(shown) == 1 else ""
     lines = f"Magnitude of each mount's force{at}: mean over the working cycle, and its largest value."
-    legend = [patch for one in series for patch in (
-        Patch(facecolor=one.colour, edgecolor=one.colour, label=f"{one.name}: mean"),
-        Patch(facecolor="none", edgecolor=one.colour, linewidth=1.4, label="maximum"),
-    )]  # fmt: skip
-    return headed(drawn, result, "Mean and maximum mount forces", lines, legend)
+    return headed(drawn, result, "Mean and maximum mount forces", lines, _legend(series))
+
+
+def _legend(series: Sequence[Series]) -> list[Artist]:
+    full = Patch(facecolor=FAINT, edgecolor=FAINT, label="full: mean")
+    hollow = Patch(facecolor="none", edgecolor=FAINT, linewidth=1.4, label="outline: maximum")
+    return [*(Patch(facecolor=one.colour, edgecolor=one.colour, label=one.name) for one in series), full, hollow]
 
 
 def _measures(design: Evaluation, k: int) -> Array:
@@ -51,31 +60,32 @@ def _measures(design: Evaluation, k: int) -> Array:
     return np.array([[*mean, mean.mean()], [*most, most.max()]])
 
 
-def _places(count: int) -> Array:
-    """Where groups stand: that of all mounts apart from the others."""
-    places = np.arange(count, dtype=float)
-    places[-1] += 0.35
-    return places
-
-
-def _groups(axes: Axes, values: list[Array], series: list[Series]) -> None:
-    top = thin(float(v.max(initial=0.0)) for v in values)
-    places = _places(values[0].shape[1])
-    for k, ((mean, most), one) in enumerate(zip(values, series, strict=True)):
+def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, top: float) -> None:
+    factor = in_thousands(top, "N")[0]
+    all_mounts = values[0].shape[1] - 1
+    # that of all mounts stands apart from the others
+    places = np.array([k - part[0] + (0.3 if k == all_mounts and len(part) > 1 else 0.0) for k in part])
+    for k, (table, one) in enumerate(zip(values, series, strict=True)):
+        mean, most = factor * table[:, part]
         at = places + (k - 0.5 * (len(values) - 1)) * (WIDTH + 0.04)
         axes.bar(at, mean, WIDTH, color=one.colour, linewidth=0, label="mean")
         axes.bar(at, most, WIDTH, facecolor="none", edgecolor=one.colour, linewidth=1.4, label="maximum")
         for x, low, high in zip(at, mean, most, strict=True):
-            axes.text(x, high + 0.015 * top, number(high, 3, top), ha="center", va="bottom", size=7.5, color=FAINT)
-            if low > 0.07 * top:
-                axes.text(x, low - 0.015 * top, number(low, 3, top), ha="center", va="top", size=7.5, color="white")
+            words, most_room = number(high, 3, factor * top), 0.09 * factor * top
+            axes.annotate(words, (x, high), (0, 2), textcoords="offset points", ha="center", size=SMALL, color=INK)
+            if low > most_room:
+                inside = {"ha": "center", "va": "top", "size": SMALL, "color": ink_on(one.colour)}
+                axes.annotate(number(low, 3, factor * top), (x, low), (0, -2), textcoords="offset points", **inside)
+    axes.set_xticks(places)
+    if all_mounts in part and len(part) > 1:
+        axes.axvline(0.5 * (places[-1] + places[-2]), color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)))
 
 
-def _frame(axes: Axes, names: list[str], values: list[Array], wide: float) -> None:
-    places = _places(len(names))
-    axes.set_xticks(places, [fitted(name, wide / len(names) + 0.5, 9) for name in names], parse_math=False)
+def _frame(axes: Axes, names: list[str], part: range, side: int, top: float) -> None:
+    factor, unit = in_thousands(top, "N")
+    axes.set_xticks(axes.get_xticks(), [fitted(names[k], GROUP - 0.08) for k in part])
     axes.tick_params(axis="x", length=0)
     axes.grid(axis="x", visible=False)
-    axes.axvline(0.5 * (places[-1] + places[-2]), color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)))
-    top = 1.12 * thin(float(v.max(initial=0.0)) for v in values)
-    axes.set(xlim=(-0.6, places[-1] + 0.6), ylim=(0.0, top), ylabel="force on the mount [N]")
+    # for a number over the highest bar
+    room = 1.0 + 0.24 * axes.figure.dpi / axes.bbox.height
+    axes.set(xlim=(-0.55, side - 0.15), ylim=(0.0, room * factor * top), ylabel=f"force on the mount [{unit}]")

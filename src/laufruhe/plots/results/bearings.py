@@ -10,16 +10,15 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from laufruhe.plots.style import ORANGE, entry_of_dots, headed, page, point_name, series_of, styled, thin
-from laufruhe.plots.words import FAINT, INK, fitted
+from laufruhe.plots.style import ORANGE, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
+from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks, rows_of
 from laufruhe.present.measures import BEARINGS, Array, has_loads, load_designs, places_of
 from laufruhe.problem.evaluation import samples_of
 from laufruhe.solvers.result import Result
 
-MOST_BEARINGS, PANEL, STEPS = 6, 2.3, 180
+MOST_BEARINGS, MOST_COLUMNS, PANEL, STEPS = 6, 4, 1.95, 180
 # of a panel: where the ring of wear begins, how thick it is at most, and what the paths fill
 RING, THICK, FILLED = 0.86, 0.12, 0.80
 # a load wears its bearing this far to either side
@@ -42,17 +41,22 @@ def figure(result: Result) -> Figure:
     sizes = np.abs(planes[-1]).max(axis=0)
     chosen = sorted(np.argsort(-sizes, kind="stable")[:MOST_BEARINGS].tolist())
     largest = thin(float(np.abs(plane[:, chosen]).max()) for plane in planes)
-    factor, unit = (1e-3, "kN") if largest >= 1e4 else (1.0, "N")
+    factor, unit = in_thousands(largest, "N")
     turned = np.exp(-1j * result.final.engine.cycle.angle * np.arange(len(planes[0])) / len(planes[0]))
-    drawn = page(2, len(chosen), (PANEL, PANEL), gap=0.55, lead=0.16, across=0.3)
-    for row, (seen, across, along) in enumerate(((1.0, "lateral", "vertical"), (turned, "across", "along"))):
-        for column, m in enumerate(chosen):
-            axes = drawn.panels[row * len(chosen) + column]
-            paths = [factor * plane[:, m] * seen for plane in planes]
-            _draw(axes, paths, [one.colour for one in series], factor * largest / FILLED)
-            title = "on the crankshaft" if row else fitted(f"bearing {names[m]}", PANEL + 0.6, 9)
-            axes.set_title(title, loc="left", size=9, color=INK, parse_math=False)
-            axes.set(xlabel=f"{across} [{unit}]", ylabel="" if column else f"{along} [{unit}]")
+    side = rows_of(len(chosen), MOST_COLUMNS)
+    chunks = [chosen[first : first + side] for first in range(0, len(chosen), side)]
+    drawn = page(2 * len(chunks), side, (PANEL, PANEL), gap=0.55, lead=0.16, across=0.3)
+    for r, (chunk, on_crank) in enumerate((chunk, on_crank) for chunk in chunks for on_crank in (False, True)):
+        for column, axes in enumerate(drawn.panels[r * side : (r + 1) * side]):
+            if column >= len(chunk):
+                axes.remove()
+                continue
+            m, seen = chunk[column], turned if on_crank else 1.0
+            _draw(axes, [factor * plane[:, m] * seen for plane in planes], series, factor * largest / FILLED)
+            name = f"bearing {names[m]}{', on the crankshaft' if on_crank else ''}"
+            axes.set_title(fitted(name, PANEL + 0.2), loc="left", size=SMALL, color=INK)
+            across, up = ("across", "along") if on_crank else ("lateral", "vertical")
+            axes.set(xlabel=f"{across} [{unit}]", ylabel="" if column else f"{up} [{unit}]")
             axes.tick_params(labelleft=column == 0, length=2)
     some = f"The {len(chosen)} most loaded of {len(names)} bearings. " if len(chosen) < len(names) else ""
     lines = f"Force of the crankshaft at {point_name(result, k)}, seen from the front; its axes stand upright at 0°."
@@ -68,16 +72,16 @@ def _hardest(result: Result) -> int:
     return int(np.argmax([np.abs(samples_of(design, k, BEARINGS.channel)).max() for k in range(len(design.loads))]))
 
 
-def _draw(axes: Axes, paths: Sequence[Plane], colours: Sequence[str], size: float) -> None:
+def _draw(axes: Axes, paths: Sequence[Plane], series: Sequence[Series], size: float) -> None:
     axes.set(xlim=(-size, size), ylim=(-size, size), aspect="equal")
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     axes.axvline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     for direction in (axes.xaxis, axes.yaxis):
-        direction.set_major_locator(MaxNLocator(4, symmetric=True, steps=[1, 2, 5, 10]))
-    for path, colour in zip(paths, colours, strict=True):
+        round_ticks(direction, 4, symmetric=True)
+    for path, one in zip(paths, series, strict=True):
         whole = np.append(path, path[0])
-        axes.plot(whole.imag, whole.real, color=colour, linewidth=1.5, solid_joinstyle="round")
-        axes.plot(path[:1].imag, path[:1].real, "o", color=colour, markersize=4.0)
+        axes.plot(whole.imag, whole.real, color=one.colour, linewidth=1.5, solid_joinstyle="round")
+        axes.plot(path[:1].imag, path[:1].real, "o", color=one.colour, markersize=4.0)
     _wear(axes, paths[-1], size)
 
 

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, limits_on, mark_points, order_entries
 from laufruhe.plots.style import AFTER, entry, entry_of_dots, headed, page, styled
-from laufruhe.plots.words import FAINT, INK
+from laufruhe.plots.words import FAINT, INK, beside
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import number
@@ -20,8 +20,6 @@ from laufruhe.present.speed_curves import fastest
 from laufruhe.problem import channels
 from laufruhe.solvers.result import Result
 
-# room for the names of the modes [inch]
-NAMES = 1.5
 applies = is_elastic
 
 
@@ -39,13 +37,9 @@ def figure(result: Result) -> Figure:
     legend = _marked(axes, edges, bands)
     for k, order in enumerate(facts.orders):
         axes.plot([0.0, top * RPM], [0.0, order * top / math.tau], color=AFTER, linestyle=STYLES[k], linewidth=1.4)
-    _modes(axes, facts, reach)
-    mark_points(axes, result, 0.02)
     axes.set(xlim=(0.0, top * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
-    wide, high = drawn.figure.get_size_inches()
-    drawn.figure.set_size_inches(wide + NAMES, high)
-    box, shrunk = axes.get_position(), wide / (wide + NAMES)
-    axes.set_position((box.x0 * shrunk, box.y0, box.width * shrunk, box.height))
+    _modes(axes, facts)
+    mark_points(axes, result, 0.98)
     critical = entry_of_dots("critical speed", color=AFTER, markersize=4.5)
     which = "of the design as decided" if changed(result) else "as given"
     lines = f"Natural frequencies {which}, and the orders that load it most."
@@ -53,19 +47,17 @@ def figure(result: Result) -> Figure:
     return headed(drawn, result, "Critical speeds", lines, legend)
 
 
-def _modes(axes: Axes, facts: MountingFacts, reach: float) -> None:
+def _modes(axes: Axes, facts: MountingFacts) -> None:
     """Natural frequencies with their names, and the speeds at which the excited ones are critical."""
-    height = -math.inf
+    names = []
     for j, (name, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies, strict=True)):
         excited = j in facts.excited
         look: Any = {"color": INK, "linewidth": 1.3} if excited else {"color": FAINT, "linewidth": 0.7, "alpha": 0.6}
         axes.axhline(frequency, **look)
-        # no name covers another
-        height = max(frequency, height + 0.038 * reach)
-        text = f"{name}, {number(frequency, 3)} Hz" + ("" if excited else " (not excited)")
-        axes.text(1.01, height / reach, text, size=7.5, color=INK, va="center", transform=axes.transAxes)
+        names.append(f"{name}, {number(frequency, 3)} Hz" + ("" if excited else " (not excited)"))
         for order in facts.orders if excited else ():
             axes.plot(critical_speed(frequency, order) * RPM, frequency, "o", color=AFTER, markersize=4.5, zorder=5)
+    beside(axes, facts.modes.frequencies.tolist(), names)
 
 
 def _marked(axes: Axes, edges: list[float], bands: list[tuple[float, float]]) -> list[Artist]:
@@ -75,5 +67,5 @@ def _marked(axes: Axes, edges: list[float], bands: list[tuple[float, float]]) ->
     for edge in edges:
         axes.axhline(edge, color=LIMIT, linewidth=2.4, alpha=0.5, zorder=4)
     ends = [entry("limit", color=LIMIT, alpha=0.5, linewidth=2.4)]
-    forbidden = [Patch(facecolor=LIMIT, alpha=0.13, label="no natural frequency")]
+    forbidden = [Patch(facecolor=LIMIT, alpha=0.13, label="to be free of natural frequencies")]
     return [*(ends if edges else []), *(forbidden if bands else [])]

@@ -12,8 +12,8 @@ from matplotlib.ticker import MultipleLocator
 from laufruhe.physics.cylinder_volume import chamber_volume
 from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.physics.gas_loads import chamber_torque
-from laufruhe.plots.style import GREEN, ORANGE, SKY, entry, headed, page
-from laufruhe.plots.words import FAINT, INK
+from laufruhe.plots.style import GREEN, ORANGE, SKY, entry, headed, page, styled
+from laufruhe.plots.words import FAINT, INK, aligned
 from laufruhe.present.measures import hardest_point
 from laufruhe.solvers.result import Result
 
@@ -27,6 +27,7 @@ def applies(result: Result) -> bool:
     return any(len(part.swept.lags) > 1 for part in parts) and bool(result.problem.points)
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Each chamber of rotor 1, and the torque that they make together."""
     engine, fidelity = result.final.engine, result.problem.fidelity
@@ -35,7 +36,7 @@ def figure(result: Result) -> Figure:
     gas, lags = fidelity.gas_of(point), part.swept.lags
     turns = math.tau * len(lags)
     degrees = np.linspace(0.0, math.degrees(turns), STEPS)
-    drawn = page(1 if gas is None else 3, 1, (WIDE, HIGH), gap=0.35, lead=0.15)
+    drawn = page(1 if gas is None else 3, 1, (WIDE, HIGH), gap=0.35)
     whole = np.zeros(STEPS)
     for k, (lag, colour) in enumerate(zip(lags, COLOURS, strict=False)):
         since = np.mod(np.radians(degrees) - lag, turns)
@@ -49,13 +50,14 @@ def figure(result: Result) -> Figure:
         _line(drawn.panels[2], degrees, torque, colour)
         if k == len(lags) - 1:
             _line(drawn.panels[2], degrees, whole, INK)
-    words = ("volume over\nthe least [cm^3]", "pressure over\nthe crankcase [bar]", "torque [N m]")
+    words = ("volume over\nthe least [cm³]", "pressure over\nthe crankcase [bar]", "torque [N m]")
     for axes, label in zip(drawn.panels, words, strict=False):
         axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
         axes.set(xlim=(0.0, degrees[-1]), ylabel=label)
-        axes.xaxis.set_major_locator(MultipleLocator(90.0))
-        axes.tick_params(axis="x", labelsize=7)
-    drawn.panels[-1].set_xlabel("angle of the eccentric shaft [deg]")
+        axes.xaxis.set_major_locator(MultipleLocator(180.0))
+        axes.tick_params(labelbottom=axes is drawn.panels[-1], length=2)
+    aligned(drawn.panels)
+    drawn.panels[-1].set_xlabel("angle of the eccentric shaft [°]")
     legend = [entry(f"chamber {k + 1}", color=colour, linewidth=2.0) for k, colour in enumerate(COLOURS)]
     legend += [] if gas is None else [entry("all", color=INK, linewidth=2.0)]
     lines = f"{part.name[:1].upper()}{part.name[1:]} at {point.name}; each chamber fires a turn after the one before."

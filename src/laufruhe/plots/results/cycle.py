@@ -4,34 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, MultipleLocator
+from matplotlib.ticker import MultipleLocator
 
 from laufruhe.machine import Engine
 from laufruhe.plots.style import Series, entry, headed, page, series_of, styled
-from laufruhe.plots.words import FAINT, INK, fitted
+from laufruhe.plots.words import FAINT, INK, aligned, empty, fitted, in_thousands, round_ticks, width_of
 from laufruhe.present.measures import Array, hardest_point, has_loads
 from laufruhe.solvers.result import Result
 
 STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6
 # width of one panel and of several side by side, height, gaps [inch]
-ALONE, BESIDE, HIGH, GAP, ACROSS = 6.8, 3.7, 1.25, 0.24, 0.6
-# from an axis to the middle of its label [inch]
-LABELS = 0.62
+ALONE, BESIDE, NARROW, HIGH, GAP, ACROSS = 6.8, 4.0, 2.7, 1.1, 0.2, 0.25
 # what did not change is seen under what was decided
 WIDTHS = (2.4, 1.4)
-# width of a digit of 9 points [inch]
+# between two numbers [inch]
 DIGIT = 0.085
 # smaller shares of the largest component of a row, and of all, are roundings
 SHARE, NOTHING = 1e-6, 1e-9
-LARGE = 1e4
 applies = has_loads
 STYLES = ("-", (0, (4, 1.6)), (0, (1.2, 1.2)))
+
+
+_LEGEND: Any = {"facecolor": "white", "edgecolor": "none", "framealpha": 0.85}
 
 
 @dataclass(frozen=True)
@@ -54,33 +54,52 @@ class Row:
 def figure(result: Result) -> Figure:
     """A column an operating point; a row each for shaking force, roll moment, rocking couple, and every mount."""
     shown, mounts, series = _points(result), _mounts(result), series_of(result, loads=True)
-    wide = ALONE if len(shown) == 1 else BESIDE
-    drawn = page(3 + len(mounts), len(shown), (wide, HIGH), gap=GAP, lead=0.12, across=ACROSS)
+    wide = {1: ALONE, 2: BESIDE}.get(len(shown), NARROW)
     degrees = np.linspace(0.0, math.degrees(result.final.engine.cycle.angle), STEPS + 1)
     columns = [list(_rows(series, k, mounts, np.radians(degrees))) for k in shown]
-    thousands = [max(abs(end) for row in rows for end in row.ends) >= LARGE for rows in zip(*columns, strict=True)]
-    for column, (k, rows) in enumerate(zip(shown, columns, strict=True)):
+    every = list(zip(*columns, strict=True))
+    rows = [row for row in every if any(each.curves for each in row)]
+    balanced = [row[0].label for row in every if not any(each.curves for each in row)]
+    drawn = page(len(rows), len(shown), (wide, HIGH), gap=GAP, lead=0.1, across=ACROSS)
+    for j, row in enumerate(rows):
+        panels = drawn.panels[j * len(shown) : (j + 1) * len(shown)]
+        _beside(panels, row, degrees, [one.colour for one in series])
+        for axes in panels:
+            axes.tick_params(labelbottom=j == len(rows) - 1, length=2)
+    for column, k in enumerate(shown):
         panels = drawn.panels[column :: len(shown)]
-        for axes, row, large in zip(panels, rows, thousands, strict=True):
-            _draw(axes, row, degrees, [one.colour for one in series], 1e-3 if large else 1.0)
-            axes.tick_params(labelbottom=axes is panels[-1], length=2)
-            if column == 0:
-                words = f"{fitted(row.words, HIGH + 0.6, 9)}\n[{'k' if large else ''}{row.unit}]"
-                axes.set_ylabel(words, parse_math=False, va="center")
-                axes.yaxis.set_label_coords(-LABELS / wide, 0.5)
         _mark_firings(panels, result.final.engine, wide)
-        panels[-1].set_xlabel("crank angle [deg]")
+        panels[-1].set_xlabel("crank angle [°]")
         if len(shown) > 1:
-            name = fitted(result.problem.points[k].name, wide + 0.6, 10)
-            panels[0].annotate(name, (0, 1), (0, 20), "axes fraction", "offset points", size=10, parse_math=False)
+            name = fitted(result.problem.points[k].name, wide, 10)
+            panels[0].annotate(name, (0, 1), (0, 20), "axes fraction", "offset points", size=10)
+    aligned(drawn.panels[:: len(shown)])
     at = "" if len(result.problem.points) > 1 else f" at {result.problem.points[0].name}"
     what = "Loads on the block and forces on the mounts" if mounts else "Loads on the block"
-    lines = f"{what}{at}; above, the cylinders that fire."
+    none = f" None, so not shown: {', '.join(balanced)}." if balanced else ""
+    lines = f"{what}{at}; above, the cylinders that fire.{none}"
     firing = entry("a cylinder fires", color=FAINT, linewidth=0.8, linestyle=STYLES[2])
     legend = [*(one.entry() for one in series), firing]
     return headed(
         drawn, result, "Forces and moments over one working cycle", lines, legend, _left_out(result, shown, mounts)
     )
+
+
+def _beside(panels: Sequence[Axes], row: Sequence[Row], degrees: Array, colours: Sequence[str]) -> None:
+    """One quantity at every operating point, in one scale."""
+    ends = (min(each.ends[0] for each in row), max(each.ends[1] for each in row))
+    factor, unit = in_thousands(max(map(abs, ends)), row[0].unit)
+    told = max(row, key=lambda each: len(each.curves))
+    for axes, each in zip(panels, row, strict=True):
+        _draw(axes, replace(each, ends=ends), degrees, colours, factor)
+        axes.tick_params(labelleft=axes is panels[0])
+        if each is told and len(told.curves) > 1:
+            axes.legend(loc="upper right", ncols=3, borderaxespad=0.0, borderpad=0.1, **_LEGEND)
+            axes.set_ylim(top=axes.get_ylim()[1] + 0.3 * (axes.get_ylim()[1] - axes.get_ylim()[0]))
+    for axes in panels:
+        axes.set_ylim(top=max(other.get_ylim()[1] for other in panels))
+    first = panels[0]
+    first.set_ylabel(f"{fitted(told.words, HIGH + 0.1)}\n[{unit}]", va="center")
 
 
 def _points(result: Result) -> list[int]:
@@ -137,19 +156,14 @@ def _draw(axes: Axes, row: Row, degrees: Array, colours: Sequence[str], factor: 
         for curve, colour, width in zip(designs, colours, WIDTHS[-len(colours) :], strict=True):
             axes.plot(degrees, factor * curve, color=colour, linestyle=style, linewidth=width)
         axes.plot([], [], color=INK, linestyle=style, linewidth=WIDTHS[-1], label=name)
-    several = len(row.curves) > 1
-    if several:
-        look: Any = {"facecolor": "white", "edgecolor": "none", "framealpha": 0.85, "fontsize": 9}
-        axes.legend(loc="upper right", ncols=3, borderaxespad=0.0, borderpad=0.1, **look)
     low, high = (factor * end for end in row.ends)
     room = 0.06 * (high - low) or 1.0
-    axes.set(xlim=(0.0, degrees[-1]), ylim=(low - room if low else 0.0, high + (6.0 if several else 1.0) * room))
-    axes.xaxis.set_major_locator(MultipleLocator(90.0))
-    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
+    axes.set(xlim=(0.0, degrees[-1]), ylim=(low - room if low else 0.0, high + room))
+    axes.xaxis.set_major_locator(MultipleLocator(90.0 if axes.bbox.width > BESIDE * axes.figure.dpi else 180.0))
+    round_ticks(axes.yaxis, 4)
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     if not row.curves:
-        axes.set_yticks([])
-        axes.text(0.5, 0.5, "none: balanced", transform=axes.transAxes, ha="center", va="center", color=FAINT)
+        empty(axes, "none: balanced")
 
 
 def _firings(engine: Engine) -> dict[float, list[int]]:
@@ -167,7 +181,7 @@ def _mark_firings(panels: Sequence[Axes], engine: Engine, wide: float) -> None:
         for angle in firings:
             axes.axvline(angle, color=FAINT, linewidth=0.8, linestyle=STYLES[2], zorder=0.6)
     texts = {angle: ",".join(map(str, numbers)) for angle, numbers in firings.items()}
-    if sum(len(text) + 1 for text in texts.values()) * DIGIT <= wide:
+    if sum(width_of(text) + DIGIT for text in texts.values()) <= wide:
         for angle, text in texts.items():
             place: Any = {"textcoords": "offset points", "xycoords": panels[0].get_xaxis_transform()}
             panels[0].annotate(text, (angle, 1.0), (0, 3), ha="center", size=9, color=FAINT, **place)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from laufruhe.plots.machine_view import THICKNESS, Scene, framed, front_view, legend_of, reaches, side_view
-from laufruhe.plots.style import headed, page, styled
+from laufruhe.plots.machine_view import THICKNESS, Scene, draw_views, legend_of, views
+from laufruhe.plots.style import headed, styled
 from laufruhe.solvers.result import Result
 
 
@@ -18,15 +18,8 @@ def applies(result: Result) -> bool:
 def figure(result: Result) -> Figure:
     """End and side view of the design at the firing dead centre of cylinder 1."""
     scene = Scene.of(result)
-    drawn = page(1, 2, (5.2, 4.6), across=0.75)
-    front, side = drawn.panels
-    front_view(front, scene)
-    side_view(side, scene)
-    ahead, beside = reaches(scene)
-    framed(front, ahead)
-    framed(side, beside, backwards=True, down=scene.is_flat)
-    for axes, title in ((front, "from the front, turning clockwise"), (side, scene.beside)):
-        axes.set_title(title, loc="left", size=9)
+    drawn = views(scene)
+    draw_views(drawn, scene)
     weights = f" Weights as half discs of steel, {1e3 * THICKNESS:g} mm thick, of the same unbalance."
     first = scene.engine.slider_cranks[0].name
     lines = f"To scale, at the firing dead centre of {first}.{weights if scene.weights else ''}"

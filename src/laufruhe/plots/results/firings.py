@@ -10,12 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from laufruhe.plots.style import AFTER, BEFORE, headed, page, styled
+from laufruhe.plots.style import AFTER, BEFORE, PALE, WIDEST, headed, page, styled
+from laufruhe.plots.words import SMALL, ink_on, width_of
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.solvers.ranking import PhasingResult, RankedOrder
 from laufruhe.solvers.result import Result
 
 SHOWN = 6
+# two shades tell a firing from the next
+BEST, NEXT = (AFTER, PALE), (BEFORE, "#d4d4d4")
 applies = has_ranking
 
 
@@ -25,17 +28,18 @@ def figure(result: Result) -> Figure:
     shown = _shown(ranking_of(result))
     count = len(shown[0][1].order)
     cycle = math.degrees(sum(shown[0][1].intervals))
-    drawn = page(1, 1, (min(max(6.4, 0.42 * count * 1.3), 13.0), 0.3 + 0.52 * len(shown)))
+    uneven = any(max(o.intervals) - min(o.intervals) > 1e-6 for _, o in shown)
+    wide = min(max(6.0, count * (0.5 if uneven else 0.4)), WIDEST - 1.4)
+    drawn = page(1, 1, (wide, 0.1 + (0.52 if uneven else 0.42) * len(shown)))
     axes = drawn.panels[0]
     for row, (k, order) in enumerate(shown):
-        _bar(axes, row, order, cycle / count, AFTER if k == 0 else BEFORE)
+        _bar(axes, row, order, cycle / count, BEST if k == 0 else NEXT)
     axes.set_yticks([-row for row in range(len(shown))], [f"star {k + 1}" for k, _ in shown])
-    axes.set(xlim=(0.0, cycle), ylim=(0.5 - len(shown), 0.5), xlabel="crank angle [deg]")
+    axes.set(xlim=(0.0, cycle), ylim=(0.5 - len(shown), 0.5), xlabel="crank angle [°]")
     axes.set_xticks(np.linspace(0.0, cycle, 9 if cycle > 400 else 5))
     axes.grid(axis="y", visible=False)
-    legend = [Patch(color=AFTER, label="best star"), Patch(color=BEFORE, label="next in the ranking")]
-    uneven = any(max(o.intervals) - min(o.intervals) > 1e-6 for _, o in shown)
-    intervals = " [deg]." if uneven else f", {cycle / count:g} deg for all."
+    legend = [Patch(color=BEST[0], label="best star"), Patch(color=NEXT[0], label="next in the ranking")]
+    intervals = ", in degrees." if uneven else f", {cycle / count:g}° for all."
     lines = f"Cylinder that fires, and the crank angle to the next firing{intervals}"
     return headed(drawn, result, "Firing orders", lines, legend[: 1 + any(k for k, _ in shown)])
 
@@ -50,15 +54,19 @@ def _shown(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:
     return (own + others)[:SHOWN]
 
 
-def _bar(axes: Axes, row: int, order: RankedOrder, even: float, shade: str) -> None:
-    start = 0.0
-    words: Any = {"ha": "center", "va": "center", "color": "white"}
+def _bar(axes: Axes, row: int, order: RankedOrder, even: float, shades: tuple[str, str]) -> None:
+    start, count = 0.0, len(order.order)
+    letters = axes.bbox.width / axes.figure.dpi / count
     for k, (cylinder, interval) in enumerate(zip(order.order, order.intervals, strict=True)):
         width = math.degrees(interval)
-        strong = 0.85 if len(order.order) % 2 == 0 and k % 2 == 0 else 0.6
-        axes.barh(-row, width, 0.62, left=start, color=shade, alpha=strong, edgecolor="white", linewidth=1.0)
-        uneven = abs(width - even) > 1e-6 * even
-        axes.text(start + 0.5 * width, 0.1 * uneven - row, str(cylinder), size=8.5, **words)
-        if uneven:
-            axes.text(start + 0.5 * width, -row - 0.17, f"{width:.1f}", size=6, **words)
+        shade = shades[k % 2]
+        axes.barh(-row, width, 0.78, left=start, color=shade, edgecolor="white", linewidth=1.0)
+        words: Any = {"ha": "center", "va": "center", "color": ink_on(shade), "size": SMALL}
+        told = f"{width:.1f}" if abs(width - even) > 1e-6 * even else ""
+        if width_of(told) > letters - 0.04:
+            told = f"{width:.0f}"
+        up = 0.19 if told else 0.0
+        axes.text(start + 0.5 * width, up - row, f"{cylinder}", weight="bold", **words)
+        if told:
+            axes.text(start + 0.5 * width, -up - row, told, **words)
         start += width

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from laufruhe.machine import Chambers, OperatingPoint, SliderCrank
 from laufruhe.physics.cylinder_volume import dead_centres, swept_volume
 from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
-from laufruhe.plots.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, entry, headed, page
+from laufruhe.plots.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, entry, headed, page, styled
 from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import has_loads
 from laufruhe.solvers.result import Result
@@ -28,6 +28,7 @@ def applies(result: Result) -> bool:
     return has_loads(result) and any(isinstance(point.gas, Chambers) for point in result.problem.points)
 
 
+@styled()
 def figure(result: Result) -> Figure:
     """Of every cylinder that a page holds its diagrams on the left, and the force on its rod on the right."""
     point = next(point for point in result.problem.points if isinstance(point.gas, Chambers))
@@ -57,7 +58,7 @@ def _diagrams(axes: Axes, gas: Chambers, part: SliderCrank) -> None:
         axes.plot(travel, pressures, color=COLOURS[k % len(COLOURS)], linewidth=1.2, label=chamber.name)
     axes.set_ylim(bottom=0.0)
     above: Any = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 2}
-    axes.legend(fontsize=6, frameon=False, handlelength=1.2, borderpad=0.0, **above)
+    axes.legend(frameon=False, handlelength=1.2, borderpad=0.0, **above)
 
 
 def _force(axes: Axes, gas: Chambers, part: SliderCrank, point: OperatingPoint) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.plots.style import entry, headed, page, series_of, styled
-from laufruhe.plots.words import INK
+from laufruhe.plots.style import headed, page, series_of, styled
+from laufruhe.plots.words import SMALL, ink_on
 from laufruhe.present.mounting import MountingFacts, facts_of, is_elastic
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
@@ -20,20 +22,21 @@ applies = is_elastic
 def figure(result: Result) -> Figure:
     """Kinetic-energy share of every motion in every mode."""
     series = series_of(result)
-    drawn = page(1, len(series), (3.4, 3.0), gap=1.0, lead=0.35)
+    drawn = page(1, len(series), (3.5, 3.0), gap=1.0)
     for axes, one in zip(drawn.panels, series, strict=True):
         _shares(axes, facts_of(one.design))
         axes.set_title(one.name, loc="left", size=10, pad=8, parse_math=False)
-    lines = "Percent of kinetic energy; a mode of its own has 100 in one row. Bold: excited."
-    return headed(drawn, result, "Natural modes", lines, [entry("", linestyle="none")])
+    lines = "Percent of each mode's kinetic energy; a motion apart from all others has 100. Bold: excited."
+    return headed(drawn, result, "Natural modes", lines, [])
 
 
 def _shares(axes: Axes, facts: MountingFacts) -> None:
     energy = 100.0 * facts.modes.energy
-    axes.imshow(np.clip(energy, 0.0, 100.0), cmap="Blues", vmin=0.0, vmax=115.0, aspect="auto")
+    shades = colormaps["Blues"]
+    axes.imshow(np.clip(energy, 0.0, 100.0), cmap=shades, vmin=0.0, vmax=115.0, aspect="auto")
     for i, j in np.argwhere(np.abs(energy) >= 0.5):
-        colour = "white" if energy[i, j] > 60.0 else INK
-        axes.text(j, i, f"{energy[i, j]:.0f}", ha="center", va="center", size=8, color=colour)
+        colour = ink_on(to_hex(shades(energy[i, j] / 115.0)))
+        axes.text(j, i, f"{energy[i, j]:.0f}", ha="center", va="center", size=SMALL, color=colour)
     axes.set_xticks(range(6), [number(f, 3) for f in facts.modes.frequencies])
     for j, label in enumerate(axes.get_xticklabels()):
         label.set_fontweight("bold" if j in facts.excited else "normal")

@@ -3,60 +3,93 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MultipleLocator
 
 from laufruhe.machine import Mount
 from laufruhe.plots.style import Page, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
-from laufruhe.plots.words import FAINT, INK, fitted
+from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks, rows_of
 from laufruhe.present.measures import Array, hardest_point, has_mount_forces
+from laufruhe.present.numbers import figure as words
 from laufruhe.present.numbers import trimmed
 from laufruhe.problem.evaluation import samples_of
 from laufruhe.solvers.result import Result
 
-MOST_PANELS = 12
+MOST_PANELS, MOST_COLUMNS = 12, 4
 POINTS = 1440
-PANEL = 2.9
+PANEL, GAP, LEAD = 2.0, 0.42, 0.42
+# how many times a smaller side is enlarged, so that its panel is filled
+ENLARGED = (20, 10, 5, 2, 1)
+NEEDLE = 1.0 / 24.0
+"""Of the larger force: where the smaller one is less than this, the path is a needle and is unrolled."""
+LATERAL, VERTICAL = 1, 2
+NAMES = {LATERAL: "lateral", VERTICAL: "vertical"}
 applies = has_mount_forces
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Ends of all panels, which share them.
+
+    Attributes
+    ----------
+    size
+        The largest force [N].
+    times
+        How many times larger forces are drawn, by direction.
+    along
+        The only direction that counts, whose force is shown over the crank angle; None for paths.
+    others
+        The largest force in the other direction [N].
+    """
+
+    size: float
+    times: dict[int, int]
+    along: int | None
+    others: float
+
+    @classmethod
+    def of(cls, paths: Sequence[Array], count: int) -> Frame:
+        """That the paths of so many mounts fill."""
+        most = {c: max(float(np.abs(path[:, :count, c]).max(initial=0.0)) for path in paths) for c in NAMES}
+        small, large = sorted(NAMES, key=lambda c: most[c])
+        share = most[small] / thin([most[large]])
+        times = next(factor for factor in ENLARGED if factor * share <= 1.0)
+        along = large if share < NEEDLE else None
+        return cls(1.08 * thin([most[large]]), {large: 1, small: times}, along, most[small])
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """One panel for each mount, all to one scale."""
+    """One panel for each mount, all to one scale; forces of one direction over the crank angle."""
     k, series = hardest_point(result), series_of(result, loads=True)
     paths = [_closed(samples_of(one.design, k)) for one in series]
     mounts = result.problem.engine.mounts[:MOST_PANELS]
-    lateral, vertical = _reach(paths, len(mounts))
-    columns = _columns(len(mounts), lateral < 0.7 * vertical)
-    size = max(lateral, vertical)
-    panel = (PANEL * lateral / size, PANEL * vertical / size)
-    drawn = page(math.ceil(len(mounts) / columns), columns, panel, len(mounts), gap=0.5, lead=0.3)
-    quarters = (len(paths[0]) - 1) // (4 * result.problem.engine.cycle.turns)
+    frame, columns = Frame.of(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)
+    drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.36)
+    cycle = result.problem.engine.cycle
+    quarters = (len(paths[0]) - 1) // (4 * cycle.turns)
+    factor, unit = in_thousands(frame.size, "N")
     for m, (axes, mount) in enumerate(zip(drawn.panels, mounts, strict=True)):
-        for path, one in zip(paths, series, strict=True):
-            _path(axes, path[:, m], one, quarters)
-        _frame(axes, mount, result.final.engine.mounts[m], lateral, vertical)
-    _label(drawn, columns)
-    lines = f"Force on each mount at {point_name(result, k)}, seen from the front."
-    return headed(drawn, result, "Mount forces over one working cycle", lines, _legend(series), _left_out(paths))
-
-
-def _reach(paths: list[Array], count: int) -> tuple[float, float]:
-    """Ends of both axes, in one scale; no panel gets narrower than 0.55 of the other side."""
-    lateral, vertical = (1.1 * thin(float(np.abs(p[:, :count, c]).max(initial=0.0)) for p in paths) for c in (1, 2))
-    most = max(lateral, vertical)
-    return max(lateral, 0.55 * most), max(vertical, 0.55 * most)
-
-
-def _columns(count: int, narrow: bool) -> int:
-    if narrow:
-        return min(count, 4)
-    return 2 if count in (2, 4) else min(count, 3)
+        for path, one, width in zip(paths, series, (2.4, 1.5)[-len(series) :], strict=True):
+            if frame.along is None:
+                _path(axes, factor * path[:, m], one, quarters, width)
+            else:
+                angles = np.linspace(0.0, math.degrees(cycle.angle), len(path))
+                axes.plot(angles, factor * path[:, m, frame.along], color=one.colour, linewidth=width, label=one.name)
+        _frame(axes, frame, factor, cycle.turns)
+        _name(axes, mount, result.final.engine.mounts[m])
+    _label(drawn, columns, frame, unit)
+    lines = f"Force on each mount at {point_name(result, k)}, seen from the front.{_told(frame)}"
+    title = "Mount forces over one working cycle"
+    return headed(drawn, result, title, lines, _legend(series, frame), _left_out(paths, frame))
 
 
 def _closed(samples: Array) -> Array:
@@ -66,8 +99,8 @@ def _closed(samples: Array) -> Array:
     return np.concatenate([samples[::step], samples[:1]])
 
 
-def _path(axes: Axes, path: Array, one: Series, quarters: int) -> None:
-    axes.plot(path[:, 1], path[:, 2], color=one.colour, linewidth=1.6, label=one.name, solid_joinstyle="round")
+def _path(axes: Axes, path: Array, one: Series, quarters: int, width: float) -> None:
+    axes.plot(path[:, 1], path[:, 2], color=one.colour, linewidth=width, label=one.name, solid_joinstyle="round")
     if quarters:
         dots = path[:-1:quarters]
         axes.plot(dots[:, 1], dots[:, 2], "o", color=one.colour, markersize=3.6, markeredgewidth=0)
@@ -75,38 +108,64 @@ def _path(axes: Axes, path: Array, one: Series, quarters: int) -> None:
         axes.plot(*dots[0, 1:], "o", **ring)
 
 
-def _frame(axes: Axes, mount: Mount, moved: Mount, lateral: float, vertical: float) -> None:
-    axes.set(xlim=(-lateral, lateral), ylim=(-vertical, vertical), aspect="equal")
+def _frame(axes: Axes, frame: Frame, factor: float, turns: int) -> None:
+    size = factor * frame.size
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
+    round_ticks(axes.yaxis, 5, symmetric=frame.along is None)
+    if frame.along is not None:
+        axes.set(xlim=(0.0, 360.0 * turns), ylim=(-size, size))
+        axes.xaxis.set_major_locator(MultipleLocator(180.0))
+        return
+    across, up = (size / frame.times[direction] for direction in (LATERAL, VERTICAL))
     axes.axvline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
-    for direction in (axes.xaxis, axes.yaxis):
-        direction.set_major_locator(MaxNLocator(4, symmetric=True, steps=[1, 2, 5, 10]))
-    name = fitted(mount.name, PANEL * lateral / max(lateral, vertical) + 0.9, 10)
-    axes.set_title(name, loc="left", pad=17, size=10, color=INK, parse_math=False)
-    words = f"at {_place(mount)} mm" if mount.position == moved.position else f"moved to {_place(moved)} mm"
-    axes.annotate(words, (0, 1), (0, 6), "axes fraction", "offset points", size=7, color=FAINT)
+    axes.set(xlim=(-across, across), ylim=(-up, up))
+    round_ticks(axes.xaxis, 4, symmetric=True)
 
 
-def _place(mount: Mount) -> str:
-    return ", ".join(trimmed(1e3 * value).replace("-", "−") for value in mount.position)
+def _name(axes: Axes, mount: Mount, moved: Mount) -> None:
+    """Name and place of a mount above its panel."""
+    is_moved = mount.position != moved.position
+    place = ", ".join(trimmed(1e3 * value).replace("-", "−") for value in moved.position)
+    over: Any = {"xycoords": "axes fraction", "textcoords": "offset points"}
+    axes.annotate(fitted(mount.name, PANEL + 0.2, 10), (0, 1), (0, 18), size=10, color=INK, **over)
+    words = fitted(f"{'moved to' if is_moved else 'at'} {place} mm", PANEL + 0.3)
+    axes.annotate(words, (0, 1), (0, 5), size=SMALL, color=FAINT, **over)
 
 
-def _label(drawn: Page, columns: int) -> None:
+def _label(drawn: Page, columns: int, frame: Frame, unit: str) -> None:
+    def label(direction: int) -> str:
+        times = frame.times[direction]
+        return f"{NAMES[direction]} force [{unit}]" + (f", enlarged {times} times" if times > 1 else "")
+
+    across = label(LATERAL) if frame.along is None else "crank angle [°]"
+    up = label(VERTICAL if frame.along is None else frame.along)
     for k, axes in enumerate(drawn.panels):
         below = k + columns < len(drawn.panels)
         axes.tick_params(labelbottom=not below, labelleft=k % columns == 0, length=2)
-        axes.set(xlabel="" if below else "lateral force [N]", ylabel="" if k % columns else "vertical force [N]")
+        axes.set(xlabel="" if below else across.replace(", ", ",\n"))
+        axes.set(ylabel="" if k % columns else up.replace(", ", ",\n"))
 
 
-def _left_out(paths: list[Array]) -> str:
-    size = max(float(np.abs(path).max(initial=0.0)) for path in paths)
+def _told(frame: Frame) -> str:
+    """Why there is no path."""
+    if frame.along is None:
+        return ""
+    other = NAMES[LATERAL if frame.along == VERTICAL else VERTICAL]
+    at_most = f"no more than {words(frame.others, 'N', 2)}" if frame.others > 1e-9 * frame.size else "zero"
+    return f" The {other} force is {at_most}, so the {NAMES[frame.along]} one is shown over the crank angle."
+
+
+def _left_out(paths: list[Array], frame: Frame) -> str:
     along = max(float(np.abs(path[..., 0]).max(initial=0.0)) for path in paths)
     count = paths[0].shape[1]
-    forces = "Longitudinal forces are not shown. " if along > 0.01 * size else ""
+    forces = "Longitudinal forces are not shown. " if along > 0.01 * frame.size else ""
     return forces + (f"The first {MOST_PANELS} of {count} mounts. " if count > MOST_PANELS else "")
 
 
-def _legend(series: list[Series]) -> list[Artist]:
+def _legend(series: list[Series], frame: Frame) -> list[Artist]:
+    lines = [one.entry(linewidth=width) for one, width in zip(series, (2.4, 1.5)[-len(series) :], strict=True)]
+    if frame.along is not None:
+        return lines
     dot = entry_of_dots("every 90° of the crank", color=INK, markersize=3.6)
     ring = entry_of_dots("cylinder 1 fires", color=INK, markersize=7, markerfacecolor="none")
-    return [*(one.entry() for one in series), dot, ring]
+    return [*lines, dot, ring]

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled, thin
-from laufruhe.plots.words import FAINT, INK
+from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
@@ -27,7 +27,7 @@ def figure(result: Result) -> Figure:
     found, unit = result.robust, objective_unit(result)
     if found is None:
         raise ValueError("nothing was decided for built engines")
-    drawn = page(2, 1, (6.4, 2.3), gap=0.85)
+    drawn = page(2, 1, (6.4, 2.5), gap=0.7)
     first, second = drawn.panels
     for design, colour in ((found.nominal, BEFORE), (found.robust, AFTER)):
         _curve(first, design, colour)
@@ -59,10 +59,9 @@ def _bars(axes: Axes, found: RobustResult, unit: str) -> None:
     top = thin(one.saving for one in shown)
     axes.barh(range(len(shown)), [max(one.saving, 0.0) for one in shown], color=AFTER, height=0.55)
     for k, one in enumerate(shown):
-        axes.text(0.01 * top, k - 0.36, one.name, size=7.5, color=INK, va="bottom")
-        axes.text(
-            max(one.saving, 0.0) + 0.01 * top, k, f"{number(one.saving, 3)} {unit}", size=7.5, color=FAINT, va="center"
-        )
+        axes.text(0.01 * top, k - 0.36, one.name, size=SMALL, color=INK, va="bottom")
+        price = f"{number(one.saving, 3)} {unit}"
+        axes.text(max(one.saving, 0.0) + 0.01 * top, k, price, size=SMALL, color=FAINT, va="center")
     axes.set(
         ylim=(len(shown) - 0.4, -0.75), xlim=(0.0, 1.15 * top), yticks=[],
         xlabel=f"shadow price times tolerance [{unit}]",

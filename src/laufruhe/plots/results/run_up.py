@@ -17,14 +17,14 @@ from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
 _RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
-_ROWS = (("largest force [N]", RUN_FORCE), ("largest travel [mm]", RUN_TRAVEL), ("largest roll [deg]", RUN_TWIST))
+_ROWS = (("largest force [N]", RUN_FORCE), ("largest travel [mm]", RUN_TRAVEL), ("largest roll [°]", RUN_TWIST))
 applies = is_elastic
 
 
 @styled()
 def figure(result: Result) -> Figure:
     """Envelope of force, travel and roll over speed."""
-    drawn = page(3, 1, (6.8, 1.7), gap=0.3)
+    drawn = page(3, 1, (6.8, 1.5), gap=0.22)
     run, factors = run_of(result), [readable(channel.unit)[1] for _, channel in _ROWS]
     most, legend = [0.0] * len(_ROWS), []
     for one in series_of(result):

@@ -12,12 +12,12 @@ from matplotlib.ticker import MaxNLocator
 
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.plots.style import headed, page, point_name, series_of, styled
-from laufruhe.plots.words import FAINT
+from laufruhe.plots.words import empty, in_thousands, round_ticks
 from laufruhe.present.measures import Array, hardest_point, has_loads, main_load, mount_orders, padded
 from laufruhe.problem.loads import PointLoads
 from laufruhe.solvers.result import Result
 
-Panel = tuple[str, Callable[[PointLoads], Array]]
+Panel = tuple[str, str, Callable[[PointLoads], Array]]
 
 SHARE = 0.005
 LAST_ORDER = 24.0
@@ -33,12 +33,14 @@ def figure(result: Result) -> Figure:
     with_mounts = bool(result.problem.engine.mounts)
     panels = _panels(len(result.problem.engine.mounts))
     base = float(main_load(series[0].design.loads[k]).base)
-    amplitudes = [_seen([measure(one.design.loads[k]) for one in series], base) for _, measure in panels]
+    amplitudes = [_seen([measure(one.design.loads[k]) for one in series], base) for _, _, measure in panels]
     last = base * max(len(values[0]) - 1 for values in amplitudes)
-    drawn = page(len(panels), 1, (6.4, 3.4 if len(panels) == 1 else 1.75))
-    for axes, (label, _), values in zip(drawn.panels, panels, amplitudes, strict=True):
+    drawn = page(len(panels), 1, (6.8, 3.2 if len(panels) == 1 else 1.5), gap=0.25)
+    for axes, (label, unit, _), values in zip(drawn.panels, panels, amplitudes, strict=True):
+        factor, unit = in_thousands(max(float(each.max(initial=0.0)) for each in values), unit)
+        values = [factor * each for each in values]
         _bars(axes, values, base, [one.colour for one in series])
-        _frame(axes, label, values, last)
+        _frame(axes, f"{label} [{unit}]", values, last)
         axes.tick_params(labelbottom=axes is drawn.panels[-1])
     drawn.panels[-1].set_xlabel("order, multiples of crank speed")
     title = "Mount forces by order" if with_mounts else "Shaking force and couples by order"
@@ -50,13 +52,17 @@ def figure(result: Result) -> Figure:
 
 def _panels(mounts: int) -> list[Panel]:
     if mounts:
-        label = "amplitude [N]" if mounts == 1 else f"amplitude, mean of {mounts} mounts [N]"
-        return [(label, lambda loads: mount_orders(main_load(loads)).mean(axis=1))]
+        label = "amplitude" if mounts == 1 else f"amplitude, mean of {mounts} mounts"
+        return [(label, "N", lambda loads: mount_orders(main_load(loads)).mean(axis=1))]
 
     def part(first: int, last: int) -> Callable[[PointLoads], Array]:
         return lambda loads: order_amplitude(loads.wrench.coefficients[:, first:last])
 
-    return [("shaking force [N]", part(0, 3)), ("rocking couple [N m]", part(4, 6)), ("roll moment [N m]", part(3, 4))]
+    return [
+        ("shaking force", "N", part(0, 3)),
+        ("rocking couple", "N m", part(4, 6)),
+        ("roll moment", "N m", part(3, 4)),
+    ]
 
 
 def _seen(series: list[Array], base: float) -> list[Array]:
@@ -81,10 +87,9 @@ def _bars(axes: Axes, series: list[Array], base: float, colours: list[str]) -> N
 def _frame(axes: Axes, label: str, series: list[Array], last: float) -> None:
     top = max(float(values.max(initial=0.0)) for values in series)
     axes.set(xlim=(-0.6, max(last, SHORTEST) + 0.6), ylim=(0.0, 1.1 * top if top > 0.0 else 1.0), ylabel=label)
-    axes.xaxis.set_major_locator(MaxNLocator(12, integer=True))
-    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+    axes.xaxis.set_major_locator(MaxNLocator(12, integer=True, steps=[1, 2, 5, 10]))
+    round_ticks(axes.yaxis, 5)
     axes.grid(axis="x", visible=False)
     axes.tick_params(axis="x", length=2)
     if top <= 0.0:
-        axes.set_yticks([])
-        axes.text(0.5, 0.5, "none: balanced", transform=axes.transAxes, ha="center", va="center", color=FAINT)
+        empty(axes, "none: balanced")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled
-from laufruhe.plots.words import FAINT, INK
+from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import number
 from laufruhe.solvers.ranking import RankedStar
@@ -27,15 +27,15 @@ def figure(result: Result) -> Figure:
     """The best stars: end view from the front, side view with every throw at its height."""
     phasing = ranking_of(result)
     stars = phasing.ranking[:SHOWN]
-    side = min(max(4.0, 0.5 * len(phasing.places)), 6.0)
-    drawn = page(len(stars), 2, (side, 2.4), lead=0.3, gap=0.3)
+    side = min(max(4.0, 0.5 * len(phasing.places)), 4.7)
+    drawn = page(len(stars), 2, (side, 2.1), lead=0.3, gap=0.1)
     for k, star in enumerate(stars):
         end, along = drawn.panels[2 * k], drawn.panels[2 * k + 1]
         colour = AFTER if k == 0 else BEFORE
         _end_view(end, star, colour)
         _side_view(along, star, phasing.places, colour)
-        end.set_title(_title(result, star, k), loc="left", size=9.5, parse_math=False)
-        along.set_title(_balance(star), loc="left", size=8, color=FAINT, parse_math=False)
+        end.set_title(_title(result, star, k), loc="left", size=10, parse_math=False)
+        along.set_title(_balance(star), loc="left", size=SMALL, color=FAINT, parse_math=False)
     legend = [entry("best star", color=AFTER, marker="o"), entry("next in the ranking", color=BEFORE, marker="o")]
     lines = "From the front, turning clockwise; and from the left: full pins point to you, crossed ones away."
     return headed(drawn, result, "Crank stars", lines, legend[: min(len(stars), 2)])
@@ -67,7 +67,7 @@ def _end_view(axes: Axes, star: RankedStar, colour: str) -> None:
         axes.add_patch(Circle((y, z), 0.1, facecolor="white", edgecolor=colour, linewidth=1.8, zorder=3))
         text = ", ".join(str(k + 1) for k in throws)
         reach = 1.28 + 0.05 * abs(y) * max(len(text) - 1, 0)
-        axes.text(reach * y, 1.24 * z, text, ha="center", va="center", size=8.5, color=INK)
+        axes.text(reach * y, 1.24 * z, text, ha="center", va="center", size=SMALL, color=INK)
 
 
 def _together(throws: Sequence[float]) -> list[tuple[float, list[int]]]:
@@ -103,4 +103,4 @@ def _side_view(axes: Axes, star: RankedStar, places: Sequence[float], colour: st
         if depth < -1e-6:
             axes.plot(x[k], height, "x", markersize=3.6, color=colour, zorder=4)
         beside = 1.0 if height >= -1e-9 else -1.0
-        axes.text(x[k], height + 0.24 * beside, str(k + 1), ha="center", va="center", size=8, color=INK)
+        axes.text(x[k], height + 0.28 * beside, str(k + 1), ha="center", va="center", size=SMALL, color=INK)

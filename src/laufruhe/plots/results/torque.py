@@ -8,15 +8,15 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, MultipleLocator
+from matplotlib.ticker import MultipleLocator
 
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.irregularity import swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
 from laufruhe.plots.speed_axis import RPM
-from laufruhe.plots.style import GREEN, ORANGE, PALE, SKY, entry, headed, page, series_of, styled
-from laufruhe.plots.words import FAINT, INK
+from laufruhe.plots.style import GREEN, ORANGE, PALE, SKY, Series, entry, headed, page, series_of, styled
+from laufruhe.plots.words import FAINT, INK, SMALL, in_thousands, round_ticks
 from laufruhe.present.measures import Array, has_loads
 from laufruhe.present.numbers import number
 from laufruhe.present.torque import asks_torque
@@ -46,32 +46,41 @@ def figure(result: Result) -> Figure:
     whole = max(float(np.abs(part.sample(STEPS)).max()) for part in parts.values()) or 1.0
     felt = {name: part for name, part in parts.items() if np.abs(part.sample(STEPS)).max() > FELT * whole}
     degrees = np.linspace(0.0, math.degrees(engine.cycle.angle), STEPS + 1)
-    has_speed = facts[k].irregularity is not None
-    drawn = page(3 + has_speed, 1, (WIDE, HIGH), gap=0.35, lead=0.15)
+    has_speed, turning = facts[k].irregularity is not None, list[Series]()
+    drawn = page(3 + has_speed, 1, (WIDE, HIGH), gap=0.3, lead=0.0)
+    _lower(drawn.panels[-1], 0.5)
     large = whole >= 1e4
     _torque(drawn.panels[0], felt, degrees, facts[k].mean, large)
     _work(drawn.panels[1], parts["all"], degrees, facts[k])
     if has_speed:
-        _speed(drawn.panels[2], result, k, degrees)
+        turning = _speed(drawn.panels[2], result, k, degrees)
     for axes in drawn.panels[:-1]:
         axes.set(xlim=(0.0, degrees[-1]))
         axes.xaxis.set_major_locator(MultipleLocator(90.0))
-        axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
-    drawn.panels[-2].set_xlabel("crank angle [deg]")
+        axes.tick_params(labelbottom=axes is drawn.panels[-2], length=2)
+        round_ticks(axes.yaxis, 4)
+    drawn.panels[-2].set_xlabel("crank angle [°]")
     _orders(drawn.panels[-1], felt, large)
     radii = {part.crank_radius for part in engine.slider_cranks}
     radius = f"; over {1e3 * min(radii):.4g} mm, the tangential force" if len(radii) == 1 else ""
     lines = f"Torque on the crankshaft at {points[k].name}{radius}."
-    legend = [entry(name, color=COLOURS[name], linewidth=2.0) for name in felt]
+    legend = [entry(name, color=COLOURS[name], linewidth=2.6 - 1.2 * (name == "all")) for name in felt]
     legend.append(entry(f"mean, {number(facts[k].mean, scale=whole)} N m", color=FAINT, linestyle=(0, (4, 1.6))))
-    legend += [entry("speed as given", color=one.colour) for one in series_of(result)[:-1] if has_speed]
+    legend += [entry(f"speed {one.name}", color=one.colour, linewidth=1.8) for one in turning]
     return headed(drawn, result, "Torque over one working cycle", lines, legend)
+
+
+def _lower(axes: Axes, inches: float) -> None:
+    """Another axis than that of the panels above needs room for their label."""
+    box, high = axes.get_position(), axes.figure.bbox.height / axes.figure.dpi
+    axes.set_position((box.x0, box.y0 - inches / high, box.width, box.height))
 
 
 def _torque(axes: Axes, parts: Mapping[str, Spectrum], degrees: Array, mean: float, large: bool) -> None:
     factor = 1e-3 if large else 1.0
     for name, part in parts.items():
-        axes.plot(degrees, factor * part.values(np.radians(degrees)), color=COLOURS[name], linewidth=1.4)
+        wide = 1.4 if name == "all" else 2.6
+        axes.plot(degrees, factor * part.values(np.radians(degrees)), color=COLOURS[name], linewidth=wide)
     axes.axhline(factor * mean, color=FAINT, linewidth=1.0, linestyle=(0, (4, 1.6)))
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     axes.set_ylabel(f"torque [{'k' if large else ''}N m]")
@@ -80,20 +89,20 @@ def _torque(axes: Axes, parts: Mapping[str, Spectrum], degrees: Array, mean: flo
 def _work(axes: Axes, torque: Spectrum, degrees: Array, facts: TorqueFacts) -> None:
     work = torque.integral.values(np.radians(degrees))
     work = work - work.min()
-    factor, unit = (1e-3, "kJ") if facts.excursion >= 1e4 else (1.0, "J")
+    factor, unit = in_thousands(facts.excursion, "J")
     axes.fill_between(degrees, 0.0, factor * work, color=PALE, linewidth=0)
     axes.plot(degrees, factor * work, color=INK, linewidth=1.4)
     axes.set(ylim=(0.0, 1.3 * factor * facts.excursion or 1.0), ylabel=f"work stored [{unit}]")
     axes.text(
-        0.99, 0.94, f"at most {number(factor * facts.excursion)} {unit}", ha="right", va="top", size=8,
+        0.99, 0.94, f"at most {number(factor * facts.excursion)} {unit}", ha="right", va="top", size=SMALL,
         transform=axes.transAxes, color=INK,
     )  # fmt: skip
 
 
-def _speed(axes: Axes, result: Result, k: int, degrees: Array) -> None:
-    """Of the design as given, where that keeps turning, and as decided."""
+def _speed(axes: Axes, result: Result, k: int, degrees: Array) -> list[Series]:
+    """Of the design as given, where that keeps turning, and as decided; which of them are drawn."""
     point, fidelity = result.problem.points[k], result.problem.fidelity
-    told = ""
+    told, shown = "", []
     for one in series_of(result):
         inertia = turning_inertia(one.design.engine, fidelity)
         swing = swing_of(one.design.engine, point, fidelity)
@@ -102,12 +111,14 @@ def _speed(axes: Axes, result: Result, k: int, degrees: Array) -> None:
             continue
         speeds = swing.speeds(inertia)[: len(swing.work)]
         angles = degrees[-1] * np.arange(len(speeds)) / len(speeds)
-        axes.plot(angles, RPM * speeds, color=one.colour, linewidth=1.4)
+        axes.plot(angles, RPM * speeds, color=one.colour, linewidth=1.8)
+        shown.append(one)
         told = f"degree of irregularity {number(degree, 3)}" + (f" (1/{1.0 / degree:.4g})" if degree > 0.0 else "")
     axes.axhline(RPM * point.speed, color=FAINT, linewidth=0.7, zorder=0.5)
     axes.set_ylabel("speed [rpm]")
     axes.margins(y=0.25)
-    axes.text(0.99, 0.94, told, ha="right", va="top", size=8, transform=axes.transAxes, color=INK)
+    axes.text(0.99, 0.94, told, ha="right", va="top", size=SMALL, transform=axes.transAxes, color=INK)
+    return shown
 
 
 def _orders(axes: Axes, parts: Mapping[str, Spectrum], large: bool) -> None:
@@ -116,7 +127,10 @@ def _orders(axes: Axes, parts: Mapping[str, Spectrum], large: bool) -> None:
     orders, sizes = total.orders[1:], np.abs(total.coefficients[1:])
     top = float(sizes.max(initial=0.0))
     chosen = sorted(k for k in np.argsort(-sizes, kind="stable")[:MOST_ORDERS].tolist() if sizes[k] > SEEN * top)
-    wide = 0.8 / len(parts)
+    # a part that no bar could show takes no room
+    parts = {name: part for name, part in parts.items()
+             if max((abs(complex(part.at(float(orders[k])))) for k in chosen), default=0.0) > SEEN * top}  # fmt: skip
+    wide = 0.8 / max(len(parts), 1)
     for j, (name, part) in enumerate(parts.items()):
         heights = [factor * abs(complex(part.at(float(orders[k])))) for k in chosen]
         axes.bar(np.arange(len(chosen)) + (j + 0.5) * wide - 0.4, heights, wide, color=COLOURS[name])

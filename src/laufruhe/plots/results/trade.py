@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled
-from laufruhe.plots.words import FAINT
+from laufruhe.plots.words import FAINT, SMALL
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
@@ -36,7 +36,7 @@ def figure(result: Result) -> Figure:
     shown = [number(value, 3, max(y)) for value in y]
     for k, place in enumerate(zip(x, y, strict=True)):
         if k == 0 or shown[k] != shown[k - 1]:
-            axes.annotate(shown[k], place, xytext=(5, 6), textcoords="offset points", size=7.5, color=FAINT)
+            axes.annotate(shown[k], place, xytext=(5, 6), textcoords="offset points", size=SMALL, color=FAINT)
     # what holds with more freedom holds with less: a step reaches back to the point before
     freedom = [math.degrees(p.allowed) for p in trade]
     axes.plot(freedom, [p.lower_bound for p in trade], linewidth=1.2, drawstyle="steps-pre", zorder=1, **_BOUND)
@@ -44,7 +44,7 @@ def figure(result: Result) -> Figure:
     top = max(*y, 1e-300)
     axes.set(
         xlim=(-0.03 * freedom[-1], 1.08 * freedom[-1]), ylim=(-0.03 * top, 1.15 * top),
-        xlabel="largest deviation of a firing interval from even [deg]",
+        xlabel="largest deviation of a firing interval from even [°]",
         ylabel=f"{name} [{unit}]" if len(name) < 42 else f"objective [{unit}]",
     )  # fmt: skip
     legend = [entry("best local optimum found", color=AFTER, marker="o"), entry("proven: no design below", **_BOUND)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,6 +19,8 @@ from laufruhe.problem import channels
 from laufruhe.solvers.result import Result
 
 applies = is_elastic
+LEAST = 1e-4
+"""Smaller ones are not shown."""
 
 
 @styled()
@@ -27,19 +31,25 @@ def figure(result: Result) -> Figure:
     speeds = speeds_of(result)
     drawn = page(1, 1, (6.8, 4.0))
     axes = drawn.panels[0]
-    highest = 1.0
+    highest, lowest = 1.0, 1e-2
     for one in series:
         for k, curve in transmissibility_of(one.design, point, speeds, facts.orders):
             highest = max(highest, float(curve.max(initial=0.0)))
+            lowest = min(lowest, float(curve.min(initial=lowest)))
             axes.plot(speeds * RPM, curve, color=one.colour, linestyle=STYLES[k], linewidth=1.6)
     legend = [*(one.entry() for one in series), *order_entries(facts, INK), *_limits(axes, result, top * RPM)]
     axes.axhline(1.0, color=FAINT, linewidth=0.8)
     mark_points(axes, result, 0.98)
     axes.set_yscale("log")
-    axes.yaxis.set_major_locator(LogLocator(10.0, (1.0, 2.0, 5.0), numticks=12))
+    axes.yaxis.set_major_locator(LogLocator(10.0, (1.0,) if lowest < 1e-2 else (1.0, 2.0, 5.0), numticks=12))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.minorticks_off()
-    axes.set(xlim=(0.0, top * RPM), ylim=(1e-2, 1.6 * highest), xlabel="crank speed [rpm]", ylabel="transmissibility")
+    axes.set(
+        xlim=(0.0, top * RPM),
+        ylim=(max(LEAST, 10.0 ** math.floor(math.log10(max(lowest, LEAST)))), 1.6 * highest),
+        xlabel="crank speed [rpm]",
+        ylabel="transmissibility",
+    )
     lines = f"Force on the mounts over that on mounts that give no way; loads of {point.name}."
     return headed(drawn, result, "Transmissibility over speed", lines, legend)
 

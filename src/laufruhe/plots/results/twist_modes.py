@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,14 +13,14 @@ from matplotlib.figure import Figure
 from laufruhe.physics.torsion import chain_of
 from laufruhe.plots.speed_axis import LIMIT, RPM, limits_on, mark_points
 from laufruhe.plots.style import AFTER, GREEN, ORANGE, entry, entry_of_dots, headed, page, styled
-from laufruhe.plots.words import FAINT, INK
+from laufruhe.plots.words import FAINT, INK, SMALL, fitted, spread
 from laufruhe.present.measures import changed
 from laufruhe.present.numbers import number
 from laufruhe.present.torsion import TorsionFacts, facts_of, is_twisted, speed_range
 from laufruhe.problem.channels.torsional import TORSIONAL_FREQUENCIES
 from laufruhe.solvers.result import Result
 
-MOST_MODES, LARGEST = 3, 11.0
+MOST_MODES, MOST_NAMES, LARGEST = 3, 16, 11.0
 COLOURS = (AFTER, ORANGE, GREEN)
 applies = is_twisted
 
@@ -29,7 +30,7 @@ def figure(result: Result) -> Figure:
     """To the left how far each disc swings, to the right critical speeds, dots as large as their vector sums."""
     low, high = speed_range(result)
     facts = facts_of(result.final, low, high)
-    drawn = page(1, 2, (4.9, 3.6), gap=0.85)
+    drawn = page(1, 2, (3.9, 3.6), gap=0.85)
     shapes, speeds = drawn.panels
     names = [disc.name for disc in chain_of(result.final.engine).discs]
     _shapes(shapes, facts, names)
@@ -51,8 +52,10 @@ def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
     axes.axhline(0.0, color=FAINT, linewidth=0.7)
     for m in range(min(MOST_MODES, facts.modes.shapes.shape[1])):
         axes.plot(places, facts.modes.shapes[:, m], "o-", color=COLOURS[m], linewidth=1.6, markersize=4.0)
-    axes.set(ylim=(-1.1, 1.1), ylabel="swing, the largest one")
-    axes.set_xticks(list(places), names, rotation=60, ha="right", size=7.5)
+    axes.set(ylim=(-1.1, 1.1), ylabel="swing, the largest of a mode is 1")
+    every = -(-len(names) // MOST_NAMES)
+    shown = [fitted(name, 1.1) if k % every == 0 else "" for k, name in enumerate(names)]
+    axes.set_xticks(list(places), shown, rotation=60, ha="right", rotation_mode="anchor")
 
 
 def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> None:
@@ -65,14 +68,8 @@ def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> Non
         is_main = order in facts.main
         look: Any = {"color": INK, "linewidth": 1.4} if is_main else {"color": FAINT, "linewidth": 0.6}
         axes.plot([0.0, high * RPM], [0.0, order * high / math.tau], **look, zorder=1)
-        # its name where it leaves the panel
-        top = min(high, math.tau * reach / order)
-        if is_main or (order == int(order) and order <= 6):
-            across, up = top * RPM, order * top / math.tau
-            at_top = top < high
-            axes.annotate(f"{order:g}", (across, up), (0 if at_top else 3, 2 if at_top else 0), size=7.5, color=INK,
-                          textcoords="offset points", ha="center" if at_top else "left",
-                          va="bottom" if at_top else "center", annotation_clip=False)  # fmt: skip
+    named = [order for order in facts.orders if order in facts.main or (order == int(order) and order <= 6)]
+    _orders(axes, named, high, reach)
     largest = float(facts.sums.max()) or 1.0
     for m, frequency in enumerate(shown):
         axes.axhline(frequency, color=COLOURS[m], linewidth=1.3)
@@ -81,5 +78,19 @@ def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> Non
             if speed <= high:
                 size = LARGEST * math.sqrt(float(facts.sums[k, m]) / largest)
                 axes.plot(speed * RPM, frequency, "o", color=COLOURS[m], markersize=size, zorder=5, alpha=0.85)
-    mark_points(axes, result, 0.02)
+    mark_points(axes, result, 0.98)
     axes.set(xlim=(0.0, high * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
+
+
+def _orders(axes: Axes, orders: list[float], high: float, reach: float) -> None:
+    """Orders by name where they leave the panel, above it or to its right, apart from each other."""
+    above = [order for order in orders if order * high / math.tau > reach]
+    right = [order for order in orders if order not in above]
+    wide, tall = axes.bbox.size / axes.figure.dpi
+    across = spread(np.array([math.tau * reach / (order * high) for order in above]), 0.3 / wide)
+    up = spread(np.array([order * high / (math.tau * reach) for order in right]), 0.15 / tall)
+    look: Any = {"textcoords": "axes fraction", "xycoords": "axes fraction", "size": SMALL, "annotation_clip": False}
+    for order, place in zip(above, across, strict=True):
+        axes.annotate(f"{order:g}", (place, 1.0), (place, 1.01), ha="center", va="bottom", color=INK, **look)
+    for order, place in zip(right, up, strict=True):
+        axes.annotate(f"{order:g}", (1.0, place), (1.01, place), ha="left", va="center", color=INK, **look)

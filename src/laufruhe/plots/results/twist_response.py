@@ -25,7 +25,7 @@ def figure(result: Result) -> Figure:
     """Half of the peak to peak torque: thick in the section that has most, thin in all others of the last design."""
     low, high = speed_range(result)
     speeds = speeds_between(result.final, low, high)
-    drawn = page(1, 1, (7.4, 3.6))
+    drawn = page(1, 1, (7.6, 3.6))
     (axes,) = drawn.panels
     series = series_of(result)
     found = [torque_over_speed(one.design, speeds) for one in series]

@@ -172,7 +172,7 @@ class FreeForces(Part):
         ]
         words = "Pistons alone, over one cylinder's force, couples times the spacing."
         size = (1.75, 0.2 * count + 0.2)
-        return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, 4, 0.3, room=1.1, legend=legend)
+        return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, 4, 0.3, legend=legend)
 
 
 def _beside(row: xr.Dataset, what: str) -> str:
@@ -197,5 +197,5 @@ def _column(data: xr.Dataset, what: str, order: Any, first: bool) -> p.Panel:
     for row, value in zip(rows, free, strict=True):
         marks.append(p.Words(value + 0.04 * most, row, f"{value:.4g}" if value > 1e-9 else "0", 6.5))
     ticks = [(float(k), str(name)) for k, name in enumerate(data["case"].values)] if first else []
-    side = p.Axis(ends=(rows[-1] + 0.6, -0.6), ticks=ticks, small=7.5, grid=False)
+    side = p.Axis(ends=(rows[-1] + 0.6, -0.6), ticks=ticks, grid=False)
     return p.Panel(marks, p.Axis(ends=(0.0, 1.3 * most)), side, f"{what}, order {order}")

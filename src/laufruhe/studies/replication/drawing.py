@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from laufruhe.studies.picture import Area, Axis, Bars, Line, Mark, Panel, Picture, Words, credit
+from laufruhe.studies.picture import Area, Axis, Bars, Line, Mark, Panel, Picture, Words, credit, rows_of
 from laufruhe.studies.replication.expressions import ExpressionError, filled, number_of, value_of
 from laufruhe.studies.replication.functions import join
 from laufruhe.studies.replication.models import AxisTable, BarsTable, CurveTable, PanelTable, PictureTable
@@ -15,28 +16,66 @@ from laufruhe.studies.replication.models import AxisTable, BarsTable, CurveTable
 if TYPE_CHECKING:
     import xarray as xr
 
-GROUP, ABOVE, LEAST_INSIDE, LEAST_SHOWN = 0.84, 0.012, 0.04, 1e-6
+GROUP, ABOVE, LEAST_INSIDE, LEAST_SHOWN = 0.84, 0.012, 0.07, 1e-6
 DIGITS = 3
+BAR = 0.31
+"""Least width of a bar and its number [inch]."""
 
 Names = Mapping[str, Any]
 
 
 def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) -> Picture:
     """A picture of what the names are worth in each reading of the source."""
+    wide = Picture("", "", (), "", (table.size[0], table.size[1]), table.columns, table.gap).width
+    whole = sum(1 if panel.once else len(readings) for panel in table.panels)
     panels = [
-        _panel(panel, names, "" if panel.once else reading, number)
+        row
         for number, panel in enumerate(table.panels, 1)
         for reading, names in list(readings.items())[: 1 if panel.once else None]
+        for row in _rows(_panel(panel, names, "" if panel.once else reading, number), wide)
     ]
     return Picture(
         table.title or data.attrs["title"],
         filled(table.words, next(iter(readings.values()))),
         panels,
         credit(data),
-        size=(table.size[0], table.size[1]),
+        # broken into rows, panels need less height each
+        size=(table.size[0], table.size[1] * (0.75 if len(panels) > whole else 1.0)),
         columns=table.columns,
         gap=table.gap,
     )
+
+
+def _rows(panel: Panel, wide: float) -> list[Panel]:
+    """A panel whose bars have no room for their numbers, broken into rows of fewer groups in one scale."""
+    solid = [mark for mark in panel.marks if isinstance(mark, Bars) and not mark.hollow]
+    others = [mark for mark in panel.marks if not isinstance(mark, Bars | Words)]
+    if not solid or panel.x.ticks is None or others:
+        return [panel]
+    groups = len(solid[0].places)
+    rows, side = rows_of(groups, int(wide * GROUP / (BAR * len(solid))))
+    if len(rows) == 1:
+        return [panel]
+    top = max(float(np.max(mark.values)) for mark in panel.marks if isinstance(mark, Bars))
+    up = panel.y if panel.y.ends is not None else replace(panel.y, ends=(0.0, 1.12 * top))
+    return [
+        Panel(
+            [part for mark in panel.marks for part in _within(mark, row)],
+            replace(panel.x, ends=(row[0] - 0.55, row[0] + side - 0.45), ticks=panel.x.ticks[row[0] : row[-1] + 1]),
+            up,
+            panel.title if row[0] == 0 else "",
+        )
+        for row in rows
+    ]
+
+
+def _within(mark: Mark, row: range) -> Iterator[Mark]:
+    """What of a mark stands over these groups."""
+    if isinstance(mark, Words):
+        yield from [mark] if row[0] - 0.5 < mark.x < row[-1] + 0.5 else []
+    elif isinstance(mark, Bars):
+        kept = list(row)
+        yield replace(mark, places=np.asarray(mark.places)[kept], values=np.asarray(mark.values)[kept])
 
 
 def _panel(panel: PanelTable, names: Names, reading: str, number: int) -> Panel:
@@ -58,7 +97,7 @@ def _drawn_panel(panel: PanelTable, names: Names, reading: str) -> Panel:
         marks += _bars(panel.bars, names)
     for words in panel.words:
         across, up = (number_of(at, names) for at in (words.x, words.y))
-        marks.append(Words(across, up, filled(words.text, names), 8.0, words.colour, words.across, words.along))
+        marks.append(Words(across, up, filled(words.text, names), 9.0, words.colour, words.across, words.along))
     title = ", ".join(words for words in (filled(panel.title, names), reading) if words)
     return Panel(marks, _axis(panel.x, names), _axis(panel.y, names), title)
 
@@ -92,7 +131,7 @@ def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
         xs, ys = np.broadcast_arrays(xs, ys)
         yield Line(xs, ys, colour, filled(curve.label, own), curve.width, curve.dash, curve.marker)
         if curve.end:
-            yield Words(float(xs[-1]), float(ys[-1]), f" {filled(curve.end, own)}", 8.0, colour)
+            yield Words(float(xs[-1]), float(ys[-1]), f" {filled(curve.end, own)}", 9.0, colour)
 
 
 def _bars(bars: BarsTable, names: Names) -> Iterator[Mark]:
@@ -109,9 +148,10 @@ def _bars(bars: BarsTable, names: Names) -> Iterator[Mark]:
         if bars.outline:
             yield Bars(places, high, 0.9 * width, colour, hollow=True)
         for x, inner, outer in zip(places, low, high, strict=True):
-            yield Words(x, outer + ABOVE * top, _number(outer, top, bars.number), 6.5, "faint", "center", "bottom")
+            yield Words(x, outer + ABOVE * top, _number(outer, top, bars.number), 9.0, "ink", "center", "bottom")
             if bars.outline and inner > LEAST_INSIDE * top:
-                yield Words(x, inner - ABOVE * top, _number(inner, top, bars.number), 6.5, "white", "center", "top")
+                number = _number(inner, top, bars.number)
+                yield Words(x, inner - ABOVE * top, number, 9.0, "ink", "center", "top", inside=colour)
 
 
 def _number(value: float, top: float, spec: str) -> str:

@@ -1,0 +1,131 @@
+"""Parts of an engine drawn to scale at a crank angle: pistons, rods, webs, bodies that turn, weights and boxes."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon, Rectangle
+
+from laufruhe.machine import Engine, Rotor, SliderCrank
+from laufruhe.machine.slider_crank import Outline
+from laufruhe.plots.style import GREY
+from laufruhe.plots.words import FAINT, INK
+
+STEEL = 7850.0
+THICKNESS = 0.02
+"""Of the half discs that stand for weights [m]."""
+LONG_ROD = 4.0
+METAL, IRON = "#d5dade", "#b4bcc4"
+PISTON: Any = {"facecolor": "white", "edgecolor": INK}
+MM = 1e3
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a slider-crank is, zeta = z + i y [m] (C4), and the bodies of one that has no piston."""
+
+    part: SliderCrank
+    crank: complex
+    pin: complex
+    piston: complex
+    bodies: tuple[Outline, ...]
+
+    @classmethod
+    def of(cls, part: SliderCrank, phi: float) -> Pose:
+        """At a crank angle (C5)."""
+        centre, axis = complex(part.shaft.z, part.shaft.y), cmath.exp(1j * part.bank)
+        turn = part.throw + part.shaft.ratio * phi
+        rod = part.rod_length if math.isfinite(part.rod_length) else LONG_ROD * part.crank_radius
+        moved = complex(part.motion(np, np.float64(turn - part.bank)).points[0][1][0])
+        way = part.crank_radius + rod + moved
+        bodies = tuple(
+            replace(body, points=centre + axis * body.points) for body in part.outlines(float(turn - part.bank))
+        )
+        return cls(part, centre, centre + part.crank_radius * cmath.exp(1j * turn), centre + way * axis, bodies)
+
+
+def half_disc(unbalance: float) -> float:
+    """Radius of a half disc of steel with this unbalance [m]: its area centre lies 4 R / 3 pi off."""
+    return math.cbrt(1.5 * unbalance / (STEEL * THICKNESS))
+
+
+def direction(rotor: Rotor, phi: float) -> float:
+    """Angle of its unbalance from z towards y [rad]."""
+    return cmath.phase(rotor.unbalance) + rotor.shaft.ratio * phi
+
+
+def heights_of(radius: float, along: float) -> tuple[float, float]:
+    """Lowest and highest point of a half disc about its centre [m]."""
+    up, across = math.cos(along), radius * abs(math.sin(along))
+    return (-radius if up < 0.0 else -across), (radius if up > 0.0 else across)
+
+
+def bore_of(engine: Engine) -> float:
+    """Of the largest cylinder; as wide as the stroke where it is not told [m]."""
+    return max(part.bore or part.stroke for part in engine.slider_cranks)
+
+
+def at(place: complex) -> tuple[float, float]:
+    """Across and up in the view from the front [mm]."""
+    return MM * place.imag, MM * place.real
+
+
+def bar(axes: Axes, one: tuple[complex, float], other: tuple[complex, float], order: float, **look: Any) -> None:
+    """Two circles and what lies between them: a rod or a web."""
+    (first, wide), (second, narrow) = one, other
+    along = cmath.phase(second - first)
+    turns = np.linspace(0.5 * math.pi, 1.5 * math.pi, 13)
+    corners = [first + wide * cmath.exp(1j * (along + turn)) for turn in turns]
+    corners += [second + narrow * cmath.exp(1j * (along + turn + math.pi)) for turn in turns]
+    axes.add_patch(Polygon([at(corner) for corner in corners], closed=True, linewidth=0.8, zorder=order, **look))
+
+
+def box(axes: Axes, xs: tuple[float, float], levels: tuple[float, float], order: float, **look: Any) -> None:
+    """A part from the side: x in metres, levels in millimetres."""
+    low, high = min(levels), max(levels)
+    style = {"edgecolor": INK, "linewidth": 0.7, **look}
+    axes.add_patch(Rectangle((MM * min(xs), low), MM * abs(xs[1] - xs[0]), high - low, zorder=order, **style))
+
+
+def look_of(body: Outline) -> dict[str, Any]:
+    """Of one that turns, and of the housing around it."""
+    if body.moves:
+        return {**PISTON, "zorder": 2.2}
+    return {"fill": False, "edgecolor": GREY, "linewidth": 1.4, "zorder": 1.8}
+
+
+def bodies(axes: Axes, pose: Pose) -> None:
+    """What turns on the pin instead of a piston, from the front."""
+    for body in pose.bodies:
+        axes.add_patch(Polygon([at(place) for place in body.points], closed=True, **look_of(body)))
+
+
+def cylinder(axes: Axes, pose: Pose, bore: float) -> None:
+    """The walls that a piston runs between, from one dead centre to the other."""
+    turn = cmath.exp(1j * pose.part.bank)
+    along = complex((pose.piston - pose.crank) / turn)
+    ends = [Pose.of(pose.part, phi).piston for phi in np.linspace(0.0, math.tau / abs(pose.part.shaft.ratio), 13)]
+    heights = [complex((end - pose.crank) / turn).real for end in ends]
+    for side in (-0.5, 0.5):
+        walls = [pose.crank + turn * complex(height, along.imag + side * bore) for height in
+                 (min(heights) - 0.25 * bore, max(heights) + 0.3 * bore)]  # fmt: skip
+        axes.plot(*zip(*map(at, walls), strict=True), color=FAINT, linewidth=0.8, zorder=2.0)
+
+
+def piston_at(axes: Axes, pose: Pose, bore: float, order: float) -> None:
+    """A piston and its rings, from the front."""
+    turn = cmath.exp(1j * pose.part.bank)
+
+    def corner(up: float, side: float) -> tuple[float, float]:
+        return at(pose.piston + turn * bore * complex(up, side))
+
+    corners = [corner(*place) for place in ((-0.25, -0.48), (-0.25, 0.48), (0.25, 0.48), (0.25, -0.48))]
+    axes.add_patch(Polygon(corners, closed=True, zorder=order - 0.01, linewidth=0.9, **PISTON))
+    for ring in (0.12, 0.19):
+        ends = zip(corner(ring, -0.48), corner(ring, 0.48), strict=True)
+        axes.plot(*ends, color=FAINT, linewidth=0.6, zorder=order - 0.005)

@@ -1,0 +1,115 @@
+"""No picture of any result is cut, covered, small or pale; and all can be read by those who see fewer colours."""
+
+from __future__ import annotations
+
+import importlib
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+
+from lanes import first_fast
+from laufruhe.files.reader import load
+from laufruhe.plots import figures, style
+from laufruhe.plots.results import firings, torque, twist_modes
+from laufruhe.plots.words import FAINT, INK, READ, contrast, grouped, ink_on, legible, rows_of, spread, typeset, wrapped
+from laufruhe.present.pictures import PICTURES
+from laufruhe.solvers import Result, solve
+from laufruhe.studies import picture
+from picture_faults import faults_of
+from problem_files import PROBLEMS
+
+# layouts, cycles, mounts, what is open: each fills other pictures
+MODELS = (
+    "vee-two-90", "inline-seven-uneven", "soft-mounts-run-up", "tractor-four-bearings", "radial-seven",
+    "inline-five-torsion", "selective-assembly", "diesel-70-hp-flywheel", "flat-twelve", "two-machines",
+)  # fmt: skip
+
+
+@cache
+def solved(name: str) -> Result:
+    return solve(load(PROBLEMS / f"{name}.toml"))
+
+
+@pytest.mark.parametrize("name", first_fast(MODELS, 3))
+def test_no_picture_has_a_fault(name: str) -> None:
+    result = solved(name)
+    found = {of: faults for of, figure in figures(result) if (faults := faults_of(figure, result.problem.title))}
+    assert found == {}
+
+
+@pytest.mark.slow
+def test_every_picture_is_looked_at() -> None:
+    drawn = {
+        of for name in (*MODELS, "tractor-four-robust") for of in PICTURES
+        if importlib.import_module(f"laufruhe.plots.results.{of}").applies(solved(name))
+    }  # fmt: skip
+    assert drawn == set(PICTURES)
+    result = solved("tractor-four-robust")
+    for of, figure in figures(result):
+        assert faults_of(figure, result.problem.title) == [], of
+
+
+# Machado, Oliveira and Fernandes 2009, of severity 1, on linear RGB
+SEEN = {
+    "all": np.eye(3),
+    "no red cones": np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    ),
+    "no green cones": np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    ),
+}
+TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+
+
+def lab(colour: str, eye: str) -> np.ndarray:
+    """CIE L*a*b* of a colour as an eye sees it."""
+    rgb = np.array(to_rgb(colour))
+    linear = np.clip(SEEN[eye] @ np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4), 0.0, 1.0)
+    x, y, z = np.cbrt(np.maximum(TO_XYZ @ linear / (0.9505, 1.0, 1.089), 1e-4))
+    return np.array([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)])
+
+
+SIDE_BY_SIDE = {
+    "before and after": (style.BEFORE, style.AFTER),
+    "torque": tuple(torque.COLOURS.values()),
+    "modes of twist": twist_modes.COLOURS,
+    "firings": (*firings.BEST, *firings.NEXT),
+    "series of studies": tuple(getattr(style, str(name).upper()) for name in picture.SERIES[:6]),
+}
+
+
+@pytest.mark.parametrize("eye", SEEN)
+@pytest.mark.parametrize("name", SIDE_BY_SIDE)
+def test_colours_side_by_side_are_told_apart(name: str, eye: str) -> None:
+    for one, other in combinations(SIDE_BY_SIDE[name], 2):
+        assert np.linalg.norm(lab(one, eye) - lab(other, eye)) > 12.0, (one, other)
+
+
+def test_letters_are_read_on_every_colour() -> None:
+    for colour in ("#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73", "#CC79A7", "#8fc4e8", "#ffffff"):
+        assert contrast(legible(colour), "#ffffff") >= READ
+        assert contrast(ink_on(colour), colour) >= READ - 0.6
+    assert contrast(FAINT, "#ffffff") >= READ
+    assert legible(INK) == INK
+
+
+def test_places_are_spread_as_little_as_may_be() -> None:
+    places = np.array([0.5, 0.52, 0.9, 0.1])
+    moved = spread(places, 0.1)
+    assert moved == pytest.approx([0.46, 0.56, 0.9, 0.1])
+    assert np.diff(np.sort(spread(np.full(9, 1.0), 0.1))) == pytest.approx(np.full(8, 0.1))
+    assert spread(np.full(9, 1.0), 0.1).max() <= 1.0 + 1e-12
+
+
+def test_words_are_set_as_print_sets_them() -> None:
+    assert typeset("inertia [kg m^2]") == "inertia [kg m²]"
+    assert typeset("throw [deg]") == "throw [°]"
+    assert grouped("−12500.5") == "−12\u2009500.5"
+    assert grouped("2500") == "2500"
+    assert [rows_of(count, 6) for count in (0, 1, 6, 7, 8, 13)] == [1, 1, 6, 4, 4, 5]
+    assert " ".join(wrapped("one two three four", 0.6)) == "one two three four"
+    assert len(wrapped("one two three four", 0.6)) > 1
