@@ -80,7 +80,8 @@ def legible(colour: str) -> str:
 
 
 def _darker(colour: str, twentieths: int) -> str:
-    return to_hex([(1.0 - 0.05 * twentieths) * part for part in to_rgb(colour)])
+    red, green, blue = ((1.0 - 0.05 * twentieths) * part for part in to_rgb(colour))
+    return str(to_hex((red, green, blue)))
 
 
 def _luminance(colour: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -74,7 +75,7 @@ def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, 
             words, most_room = number(high, 3, factor * top), 0.09 * factor * top
             axes.annotate(words, (x, high), (0, 2), textcoords="offset points", ha="center", size=SMALL, color=INK)
             if low > most_room:
-                inside = {"ha": "center", "va": "top", "size": SMALL, "color": ink_on(one.colour)}
+                inside: Any = {"ha": "center", "va": "top", "size": SMALL, "color": ink_on(one.colour)}
                 axes.annotate(number(low, 3, factor * top), (x, low), (0, -2), textcoords="offset points", **inside)
     axes.set_xticks(places)
     if all_mounts in part and len(part) > 1:

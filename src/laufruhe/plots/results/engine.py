@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from laufruhe.plots.machine_view import THICKNESS, Scene, draw_views, legend_of, views
+from laufruhe.plots.machine_parts import THICKNESS
+from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
 from laufruhe.plots.style import headed, styled
 from laufruhe.solvers.result import Result
 

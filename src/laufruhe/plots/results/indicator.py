@@ -35,14 +35,17 @@ def figure(result: Result) -> Figure:
     gas, parts = point.gas, result.final.engine.slider_cranks
     assert isinstance(gas, Chambers)
     shown = [part for part in parts if gas.of(part)][:MOST_ROWS]
-    drawn = page(len(shown), 2, (WIDE, HIGH), gap=0.45, lead=0.3, across=0.75)
+    # names of chambers stand above their diagram, two a row
+    lead = 0.12 + 0.17 * max(-(-len(gas.of(part)) // 2) for part in shown)
+    drawn = page(len(shown), 2, (WIDE, HIGH), gap=0.3, lead=lead, across=0.75)
     for k, part in enumerate(shown):
         left, right = drawn.panels[2 * k], drawn.panels[2 * k + 1]
         _diagrams(left, gas, part)
         _force(right, gas, part, point)
-        left.set_title(part.name, loc="left", size=9)
         for axes in (left, right):
-            axes.set(xlim=(0.0, 1.0), ylabel="pressure [bar]" if axes is left else "force on the rod [kN]")
+            axes.set(
+                xlim=(0.0, 1.0), ylabel=f"{part.name}\npressure [bar]" if axes is left else "force on the rod [kN]"
+            )
             axes.set_xlabel("part of the stroke from the head end" if part is shown[-1] else "")
     told = "Left: absolute pressure in every chamber. Right: force towards the crank, on the way out and back."
     legend = [entry("force of the chambers", color=INK, linewidth=1.4)]

@@ -86,7 +86,7 @@ def _orders(axes: Axes, orders: list[float], high: float, reach: float) -> None:
     """Orders by name where they leave the panel, above it or to its right, apart from each other."""
     above = [order for order in orders if order * high / math.tau > reach]
     right = [order for order in orders if order not in above]
-    wide, tall = axes.bbox.size / axes.figure.dpi
+    wide, tall = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi
     across = spread(np.array([math.tau * reach / (order * high) for order in above]), 0.3 / wide)
     up = spread(np.array([order * high / (math.tau * reach) for order in right]), 0.15 / tall)
     look: Any = {"textcoords": "axes fraction", "xycoords": "axes fraction", "size": SMALL, "annotation_clip": False}
