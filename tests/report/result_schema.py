@@ -20,7 +20,8 @@ def array(items: Any) -> dict[str, Any]:
 
 ORDERS = array(table(order=NUMBER, amplitude=NUMBER))
 MOUNT = table(name=TEXT, mean=NUMBER, max=NUMBER, rms=NUMBER, orders=ORDERS)
-SHAKING = table(orders=array(NUMBER), force=array(NUMBER), moment=array(NUMBER))
+SHAKING = table(orders=array(NUMBER), force=array(NUMBER), moment=array(NUMBER), roll=array(NUMBER),
+                rocking=array(NUMBER))  # fmt: skip
 SERIES = table(angle=array(NUMBER), components=array(TEXT), shaking=array(array(NUMBER)))
 POINT = table(name=TEXT, speed=NUMBER, weight=NUMBER)
 POINT["properties"]["series"] = SERIES
@@ -46,6 +47,8 @@ SCHEMA = {
         mounts=array(MOUNT),
         shaking=SHAKING,
         points=array(POINT),
+        balance_factors=array(table(cylinders=array(TEXT), factor=NUMBER)),
+        warnings=array(TEXT),
         firing_intervals=array(NUMBER),
         fidelity=table(kinematics=TEXT, samples={"type": "integer"}, error_estimate=MAYBE),
         timing={"type": "object", "additionalProperties": NUMBER},

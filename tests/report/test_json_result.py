@@ -21,7 +21,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.report.json_result import as_json
 from laufruhe.report.markdown import as_markdown
 from laufruhe.report.screen import show
-from laufruhe.report.wording import fired_together
+from laufruhe.report.wording import fired
 from laufruhe.solvers import Result, state
 from report.result_schema import SCHEMA
 
@@ -182,7 +182,25 @@ def test_cylinders_that_fire_at_once_are_named(tmp_path: Path) -> None:
     path.write_text(TWIN, encoding="utf-8")
     result, text = state(load(path)), io.StringIO()
     show(result, text)
-    assert fired_together(result) == "Cylinder 1 and cylinder 2 fire at once."
-    assert fired_together(result) in text.getvalue()
-    assert fired_together(result) in as_markdown(result, (), "laufruhe evaluate twin.toml")
-    assert fired_together(scenes.stated(scenes.GIVEN)) == ""
+    words = "Firing order 1-2-3, intervals 0, 180, 540 deg. Cylinder 1 and cylinder 2 fire at once."
+    assert fired(result) == words
+    assert words in text.getvalue()
+    page = as_markdown(result, (), "laufruhe evaluate twin.toml")
+    assert words in page
+    assert "firing: is at once in cylinder 1 and cylinder 2; give a firing order" in page
+    assert parsed(result)["warnings"] == [str(doubt) for doubt in result.problem.doubts]
+    assert fired(scenes.stated(scenes.GIVEN)) == "Firing order 1-3-4-2, every 180 deg."
+
+
+def test_cylinders_that_are_meant_to_fire_at_once_raise_no_question(tmp_path: Path) -> None:
+    path = tmp_path / "twin.toml"
+    path.write_text(TWIN.replace("[engine]", "[engine]\nfires_together = true"), encoding="utf-8")
+    assert load(path).doubts == ()
+
+
+def test_roll_and_rocking_are_the_parts_of_the_moment() -> None:
+    shaking = parsed(scenes.solved(scenes.PARTS))["shaking"]
+    whole = np.array(shaking["real"]) + 1j * np.array(shaking["imag"])
+    assert shaking["roll"] == pytest.approx(np.abs(whole[:, 3]))
+    assert np.all(np.maximum(shaking["roll"], shaking["rocking"]) <= np.array(shaking["moment"]) * (1.0 + 1e-12))
+    assert max(shaking["rocking"]) > 0.0

@@ -115,7 +115,7 @@ def _write(texts: Mapping[Path, str]) -> None:
     for path, text in texts.items():
         kept = path.name in ready.SCHEMAS
         if path.exists() and not kept and path.read_bytes() != text.encode():
-            raise _refused("file", str(path), "exists already", "name another place")
+            raise _refused("file", str(path), "exists already and is another", "name another place")
     for path, text in texts.items():
         files.write(path, text)
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from laufruhe.cli.screen import complain, is_quiet
+from laufruhe.errors import printed
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -17,6 +19,7 @@ from laufruhe.problem.problem import Problem
 def checked(path: Path) -> tuple[str, Callable[[], str]]:
     """What a problem leaves open, and what makes JSON of the design as given."""
     problem = load(path)
+    doubt(problem, path)
     drawing = problem if problem.over is None else problem.changed(over=None)
     # a load that no mount carries, or a gas cycle that cannot be met, shows only here
     given = evaluate_start(drawing)
@@ -24,6 +27,12 @@ def checked(path: Path) -> tuple[str, Callable[[], str]]:
     if not given.resonance:
         given.excess(drawing.limits)
     return f"ok: {problem.summary}\n", lambda: _as_given(problem)
+
+
+def doubt(problem: Problem, path: Path) -> None:
+    """Ask of numbers that no usual engine has; nothing stops for them."""
+    for one in () if is_quiet() else problem.doubts:
+        complain(printed(f"{path}: warning: {one}"))
 
 
 def _as_given(problem: Problem) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import typer
 
+from laufruhe.cli.check import doubt
 from laufruhe.cli.screen import DONE, FAILED, Watched, above_zero, complain, is_quiet, json_file, progress
 from laufruhe.errors import SolverError
 from laufruhe.files.reader import load
@@ -84,6 +85,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         problem = load(request.problem)
         if request.tolerance is not None:
             problem = replace(problem, tolerance=above_zero("--tolerance", request.tolerance, "1e-3"))
+    doubt(problem, request.problem)
     with ExitStack() as places:
         # a file called '...toml' would name the folder above
         name = (problem.name.strip(".") or "problem") + _SUFFIX[request.verb]

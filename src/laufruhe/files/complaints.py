@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import re
+import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias, get_args
@@ -126,6 +127,16 @@ class Refused(LaufruheError):
     def __init__(self, where: str, value: Any, rule: str, remedy: str) -> None:
         self.complaint = Complaint(where, "" if value is None else short(value), rule, remedy)
         super().__init__(str(self.complaint))
+
+
+def toml_remedy(content: bytes, error: tomllib.TOMLDecodeError) -> str:
+    """What to do where TOML breaks off: 0,26 is how many write a number."""
+    found = re.search(r"at line (\d+)", str(error))
+    line = content.decode("utf-8-sig").split("\n")[int(found.group(1)) - 1] if found is not None else ""
+    value = line.partition("=")[2].strip()
+    if units.DECIMAL_COMMA.match(value):
+        return f"decimals follow a point, as in {printed(value.replace(',', '.', 1), 40)}"
+    return "correct it there"
 
 
 def measured(text: str, unit: str, where: str, given: str | None = None) -> float:

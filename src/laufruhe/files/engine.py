@@ -122,6 +122,7 @@ class EngineTable(Table):
     rod_inertia_deficit: f.Inertia = f.told("True inertia less that of the two masses.", 0.0)
     throws: f.Throws | None = f.told("At phi = 0; even firing where left out.")
     firing_order: FiringOrder | None = None
+    fires_together: bool = f.told("Whether cylinders are meant to fire at once; else you are asked.", False)
     shafts: list[ShaftTable] = Field(default_factory=list)
     slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
 

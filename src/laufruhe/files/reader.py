@@ -22,7 +22,7 @@ from laufruhe.files.asked import Scene, limits_of, objectives_of
 from laufruhe.files.assembly import assembly_of
 from laufruhe.files.bearings import bearings_of
 from laufruhe.files.catalogue import with_catalogue
-from laufruhe.files.complaints import Refused, complaints_of, key_path
+from laufruhe.files.complaints import Refused, complaints_of, key_path, toml_remedy
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import check_told_alike, flywheel_of
@@ -230,7 +230,7 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise _unreadable(path, f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8") from None
     except tomllib.TOMLDecodeError as error:
-        raise _unreadable(path, f"is no TOML: {error}", "correct it there") from None
+        raise _unreadable(path, f"is no TOML: {error}", toml_remedy(content, error)) from None
     except ValueError:
         # the one that is no TOMLDecodeError
         raise _unreadable(path, "holds a whole number of thousands of digits", "write it shorter") from None
@@ -293,6 +293,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         tolerance=file.tolerance,
         mount_numbers=found.numbers,
         search=Search(**file.search.model_dump()),
+        fires_together=table.fires_together,
         assembly=assembly_of(file.assembly, engine, path.parent),
     )
     return at_fidelity(problem, file.fidelity)

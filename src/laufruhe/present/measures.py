@@ -84,6 +84,11 @@ def shaking_orders(wrench: Spectrum) -> tuple[Array, Array]:
     return order_amplitude(wrench.coefficients[:, :3]), order_amplitude(wrench.coefficients[:, 3:])
 
 
+def moment_orders(wrench: Spectrum) -> tuple[Array, Array]:
+    """Amplitude by order of the roll moment, about the crank axis, and of the rocking couple, across it [N m] (C2)."""
+    return order_amplitude(wrench.coefficients[:, 3:4]), order_amplitude(wrench.coefficients[:, 4:])
+
+
 def padded(values: Array, length: int) -> Array:
     """Zeros for orders that one of two designs does not have."""
     return np.pad(values, [(0, length - len(values))] + [(0, 0)] * (values.ndim - 1))

@@ -55,6 +55,17 @@ def figure(value: float, unit: str, digits: int = 4, scale: float = 0.0) -> str:
     return f"{number(value * factor, digits, scale * factor)} {name}".rstrip()
 
 
+_WORKSHOP = {"kg": ("g", 1e3), "kg m": ("g mm", 1e6)}
+
+
+def in_grams(value: float, unit: str, scale: float = 0.0) -> str:
+    """A mass in g or an unbalance in g mm, as a workshop has them, behind an equals sign; empty for all else."""
+    if unit not in _WORKSHOP or abs(value) <= NOTHING * scale:
+        return ""
+    name, factor = _WORKSHOP[unit]
+    return f" = {number(value * factor)} {name}"
+
+
 def percent(share: float) -> str:
     """A change as a reader expects it: with its sign."""
     return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH

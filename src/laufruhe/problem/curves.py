@@ -147,6 +147,8 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
     signals: dict[str, tuple[str, str, tuple[Axis, ...], Callable[[PointLoads], Spectrum]]] = {
         "shaking_force": ("shaking force", "N", (), lambda one: one.wrench.each(lambda c: c[..., :3])),
         "shaking_moment": ("shaking moment", "N m", (), lambda one: one.wrench.each(lambda c: c[..., 3:])),
+        "roll_moment": ("roll moment", "N m", (), lambda one: one.wrench.each(lambda c: c[..., 3:4])),
+        "rocking_couple": ("rocking couple", "N m", (), lambda one: one.wrench.each(lambda c: c[..., 4:])),
     }
     for name, words, place, channel in _places(first):
         own = (Axis(place, tuple(channel.places(first.engine))),)

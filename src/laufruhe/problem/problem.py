@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeAlias
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import Complaint, ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.assembly import Assembly
 from laufruhe.problem.decision import Decision, Kind, Numbers, moved_numbers
 from laufruhe.problem.measure import Limit, Measure, Rank, Term
 from laufruhe.problem.phasing import PhasingOf
+from laufruhe.problem.plausibility import doubts
 from laufruhe.problem.sets import Value
 from laufruhe.problem.tolerance import NO_TOLERANCES, Drawing, Over, Tolerances
 
@@ -90,6 +91,8 @@ class Problem:
         All objectives in order where there are several, `objective` the first of them; else none.
     origin
         The file that it was read from; None where it was made or changed in code.
+    fires_together
+        Whether cylinders are meant to fire at once.
     """
 
     name: str
@@ -112,6 +115,7 @@ class Problem:
     origin: Origin | None = field(default=None, compare=False, repr=False)
     sharply: bool = False
     ranks: tuple[Rank, ...] = ()
+    fires_together: bool = False
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"
@@ -134,6 +138,11 @@ class Problem:
         names += [decision.name + (" and angle" if decision.set.width > 1 else "") for decision in self.decisions]
         names += [f"the {lot.kind} of every cylinder" for lot in self.assembly.lots] if self.assembly else []
         return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
+
+    @property
+    def doubts(self) -> tuple[Complaint, ...]:
+        """What is so unusual that its author is asked whether it is meant; nothing stops for it."""
+        return doubts(self.engine, self.points, self.fires_together or self.phasing is not None)
 
     @property
     def unbalances(self) -> tuple[Decision, ...]:

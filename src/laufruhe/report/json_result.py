@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.balance_factor import balance_factors
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.torque import torque_facts
 from laufruhe.physics.torsion import absorber_heat, chain_of
 from laufruhe.physics.wrench import WRENCH
-from laufruhe.present.measures import Array, is_met, limits_of, mount_orders, places_of, shaking_orders
+from laufruhe.present.measures import Array, is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.run_up import run_of, run_point, shown_runs
 from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range
@@ -64,6 +65,8 @@ def as_dict(result: Result, series: bool = False) -> Record:
         "points": [{key: point[key] for key in own} for point in points],
         **({"modes": _modes(result.final), "run_up": _runs(result)} if is_elastic(result) else {}),
         **({"torsion": _torsion(result)} if is_twisted(result) else {}),
+        "balance_factors": [_of(one, "cylinders factor") for one in balance_factors(result.final.engine)],
+        "warnings": [str(doubt) for doubt in problem.doubts],
         "firing_intervals": list(result.final.engine.firing_intervals),
         **_phasing(result),
         **_robust(result),
@@ -155,9 +158,11 @@ def _series(result: Result, k: int) -> Record:
 def _shaking(wrench: Spectrum) -> Record:
     """Orders side by side with amplitudes, and with the complex coefficients of the wrench (C8)."""
     force, moment = shaking_orders(wrench)
+    roll, rocking = moment_orders(wrench)
     kept = np.flatnonzero((force != 0.0) | (moment != 0.0))
     whole = wrench.coefficients[kept]
-    found = {"orders": wrench.orders[kept], "force": force[kept], "moment": moment[kept], "components": tuple(WRENCH),
+    found = {"orders": wrench.orders[kept], "force": force[kept], "moment": moment[kept],
+             "roll": roll[kept], "rocking": rocking[kept], "components": tuple(WRENCH),
              "real": whole.real, "imag": whole.imag}  # fmt: skip
     return {key: _plain(value) for key, value in found.items()}
 

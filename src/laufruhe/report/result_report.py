@@ -8,7 +8,7 @@ from laufruhe.present.pictures import PICTURES
 from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
 from laufruhe.report.sections import tables_of
 from laufruhe.report.versions import versions
-from laufruhe.report.wording import accuracy, explained, fired_together, headline
+from laufruhe.report.wording import accuracy, explained, fired, headline
 from laufruhe.solvers.result import Result
 
 
@@ -31,10 +31,11 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
         yield Paragraph(f"Source: {problem.source}.")
     if problem.assumptions:
         yield Bullets("Assumptions:", problem.assumptions)
+    if problem.doubts:
+        yield Bullets("Numbers to check:", [str(doubt) for doubt in problem.doubts])
     yield Heading("Result")
     yield Paragraph(headline(result))
-    if together := fired_together(result):
-        yield Paragraph(together)
+    yield Paragraph(fired(result))
     yield from (Illustration(name, PICTURES[name]) for name in pictures)
     yield from tables_of(result)
     yield Heading("Proof")

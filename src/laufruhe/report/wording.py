@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 
 from laufruhe.numerics.turns import as_turn, within
 from laufruhe.present.measures import breaks_a_limit, changed
 from laufruhe.present.numbers import figure, percent, trimmed
+from laufruhe.problem.plausibility import together
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.solvers.result import Result, Status
 
@@ -45,15 +45,18 @@ def accuracy(result: Result) -> str:
     return f"error of the objective at most {100.0 * result.error_estimate:.1g} %"
 
 
-def fired_together(result: Result) -> str:
-    """Cylinders of the design that fire at the same angle, in a sentence; empty where each fires alone."""
-    fires: dict[float, list[str]] = defaultdict(list)
-    for part in result.final.engine.cylinders:
-        turn = within(as_turn(part.firing_angle), result.final.engine.cycle.turns)
-        fires[round(float(turn), 9)].append(part.name)
-    groups = [f"{', '.join(names[:-1])} and {names[-1]} fire at once" for names in fires.values() if len(names) > 1]
+def fired(result: Result) -> str:
+    """Firing order and intervals of the design, and which cylinders fire at once."""
+    engine = result.final.engine
+    turns = [float(within(as_turn(part.firing_angle), engine.cycle.turns)) for part in engine.cylinders]
+    order = "-".join(str(k + 1) for k in sorted(range(len(turns)), key=lambda k: (round(turns[k], 9), k)))
+    angles = [trimmed(math.degrees(interval), 5) for interval in engine.firing_intervals]
+    several = f"Firing order {order}, " if len(turns) > 1 else ""
+    shown = f"intervals {', '.join(angles)} deg" if len(set(angles)) > 1 else f"every {angles[0]} deg"
+    sentence = f"{several or 'Fires '}{shown}."
+    groups = [f"{', '.join(names[:-1])} and {names[-1]} fire at once" for names in together(engine)]
     text = "; ".join(groups)
-    return f"{text[:1].upper()}{text[1:]}." if text else ""
+    return f"{sentence} {text[:1].upper()}{text[1:]}." if text else sentence
 
 
 def _proven(certificate: Certificate | None) -> str:

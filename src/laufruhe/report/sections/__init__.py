@@ -16,10 +16,13 @@ from laufruhe.report.sections import (
     stars,
     torque,
     torsion,
+    weights,
 )
 from laufruhe.solvers.result import Result
 
-SECTIONS = (stars, assembly, ranks, decisions, robust, limits, mounts, torque, torsion, modes, run_up, orders)
+SECTIONS = (
+    stars, assembly, ranks, decisions, weights, robust, limits, mounts, torque, torsion, modes, run_up, orders,
+)  # fmt: skip
 
 
 def tables_of(result: Result) -> list[Grid]:

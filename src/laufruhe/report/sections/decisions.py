@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from laufruhe.present.measures import objective_unit
-from laufruhe.present.numbers import DASH, figure, price_of, trimmed, with_unit
+from laufruhe.present.numbers import DASH, figure, in_grams, price_of, trimmed, with_unit
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import DecisionValue, Result
 from laufruhe.units import readable
@@ -32,4 +32,5 @@ def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str
         return d.name, given, DASH, bounds, DASH, DASH
     upper = abs(d.value - d.upper) <= abs(d.value - d.lower)
     mark = DASH if not d.at_bound else "upper" if upper else "lower"
-    return d.name, given, figure(d.value, d.unit, scale=most), bounds, mark, price_of(d.shadow_price, unit, d.unit)
+    decided = figure(d.value, d.unit, scale=most) + in_grams(d.value, d.unit, most)
+    return d.name, given, decided, bounds, mark, price_of(d.shadow_price, unit, d.unit)

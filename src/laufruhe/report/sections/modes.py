@@ -6,6 +6,8 @@ from laufruhe.physics.modes import MOTIONS
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import DASH, figure, number, trimmed
+from laufruhe.problem.channels import MOUNT_TRAVEL
+from laufruhe.problem.evaluation import measured
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
@@ -38,16 +40,21 @@ def _modes(facts: MountingFacts, title: str) -> Grid:
 
 
 def _mounts(result: Result, facts: MountingFacts) -> Grid:
-    rows = []
-    for mount, sag in zip(result.final.engine.mounts, facts.mount_sag, strict=True):
+    rows, points = [], result.problem.points
+    slowest = min(range(len(points)), key=lambda k: points[k].speed)
+    travels = measured(result.final, slowest, MOUNT_TRAVEL)
+    for mount, sag, travel in zip(result.final.engine.mounts, facts.mount_sag, travels, strict=True):
         stiffness = " / ".join(trimmed(1e-3 * k) for k in mount.stiffness)
         place = ", ".join(trimmed(1e3 * c) for c in mount.position)
-        rows.append((mount.name, place, stiffness, trimmed(mount.loss_factor), number(1e3 * sag)))
+        sags, moved = number(1e3 * sag), number(1e3 * travel.max)
+        rows.append((mount.name, place, stiffness, trimmed(mount.loss_factor), sags, moved))
     axis = ", ".join(f"{c:.3f}" for c in facts.torque_roll_axis)
     note = (
         f"The centre of gravity sags {figure(facts.sag, 'm')}; the mean torque moves a mount by at most "
         f"{figure(facts.torque_travel, 'm', scale=facts.sag)}. "
+        "Travel: the largest at the slowest operating point. "
         f"Torque-roll axis ({axis}), coupling {facts.torque_roll_coupling:.3f}."
     )
-    head = ("mount", "place [mm]", "stiffness along own axes [N/mm]", "loss factor", "sag [mm]")
+    head = ("mount", "place [mm]", "stiffness along own axes [N/mm]", "loss factor", "sag [mm]",
+            f"travel at {points[slowest].name} [mm]")  # fmt: skip
     return Grid("Mounts", head, tuple(rows), left=3, note=note)

@@ -10,6 +10,7 @@ from laufruhe.present.measures import (
     has_loads,
     has_mounts,
     load_designs,
+    moment_orders,
     mount_orders,
     padded,
     shaking_orders,
@@ -41,14 +42,14 @@ def tables(result: Result) -> list[Grid]:
     base = float(result.initial.loads[k].wrench.base)
     cells = ([aligned(value, top) for value, top in zip(table[j], scale, strict=True)] for j in kept)
     rows = tuple((f"{j * base:g}", *row) for j, row in zip(kept, cells, strict=True))
-    names = ("mount force [N]", "shaking force [N]", "moment [N m]")[0 if has_mounts(result) else 1 :]
+    names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
     head = ("order", *(f"{name}{side}" for name in names for side in (("",), (" before", " after"))[len(designs) - 1]))
     many = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(kept) else "orders"
     note = f"Amplitudes; {many} of at least {100.0 * SHARE:g} % of the largest. result.json has every order."
-    return [Grid(f"Orders at {result.problem.points[k].name}", head, rows, note=note)]
+    return [Grid(f"Orders at {result.problem.points[k].name} [N, N m]", head, rows, note=note)]
 
 
 def _columns(loads: PointLoads) -> list[Array]:
-    """Amplitudes by order: mount force if there is one, shaking force, moment."""
-    shaking = list(shaking_orders(loads.wrench))
+    """Amplitudes by order: mount force if there is one, shaking force, roll moment, rocking couple."""
+    shaking = [shaking_orders(loads.wrench)[0], *moment_orders(loads.wrench)]
     return shaking if loads.mount_forces is None else [mount_orders(loads.mount_forces).mean(axis=1), *shaking]

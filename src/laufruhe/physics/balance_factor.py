@@ -1,0 +1,66 @@
+"""What counterweights balance of the pistons on a throw, as the workshop counts it (L9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe.machine import CRANKSHAFT, Engine, Role, SliderCrank
+from laufruhe.numerics.turns import as_turn, cis, within
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class BalanceFactor:
+    """Of the counterweights on one throw.
+
+    Attributes
+    ----------
+    cylinders
+        That work on it.
+    factor
+        Share of their reciprocating mass that the counterweights balance, beyond the rotating mass of the throw.
+    """
+
+    cylinders: tuple[str, ...]
+    factor: float
+
+
+def balance_factors(engine: Engine) -> tuple[BalanceFactor, ...]:
+    """Balance factors of throws that have a counterweight; each weight counts for the nearest throws (L9).
+
+    kappa = (-Re sum U e^{-i theta} - m_rot r) / (m_rec r), with the unbalances U [kg m] of the counterweights of a
+    throw at theta, its rotating mass m_rot [kg] and reciprocating mass m_rec [kg] at the crank radius r [m].
+    """
+    throws = _throws([part for part in engine.slider_cranks if part.shaft == CRANKSHAFT])
+    places = np.array([throw[0].x for throw in throws])
+    opposite, counted = np.zeros(len(throws)), np.zeros(len(throws), dtype=bool)
+    if not throws:
+        return ()
+    weights = [rotor for rotor in engine.rotors if rotor.role is Role.COUNTERWEIGHT and rotor.shaft == CRANKSHAFT]
+    masses = [rotor for rotor in engine.rotors if rotor.role is Role.THROW]
+    masses += [pin for pin in engine.pins if pin.shaft == CRANKSHAFT]
+    for rotor in (*weights, *masses):
+        distance = np.abs(places - rotor.x)
+        near = np.flatnonzero(distance <= distance.min() + _ROUNDING)
+        for j in near.tolist():
+            along = (rotor.unbalance * np.conj(cis(as_turn(throws[j][0].throw)))).real
+            opposite[j] -= along / len(near)
+            counted[j] |= rotor in weights and rotor.unbalance != 0.0
+    found = []
+    for k, throw in enumerate(throws):
+        whole = sum(part.reciprocating_mass * part.crank_radius for part in throw)
+        if counted[k] and whole > 0.0:
+            found.append(BalanceFactor(tuple(part.name for part in throw), float(opposite[k] / whole)))
+    return tuple(found)
+
+
+def _throws(parts: Sequence[SliderCrank]) -> list[list[SliderCrank]]:
+    """Parts that work on one pin, from the front: those of one place and angle."""
+    found: dict[tuple[float, object], list[SliderCrank]] = {}
+    for part in parts:
+        found.setdefault((round(part.x, 9), within(as_turn(part.throw), 1)), []).append(part)
+    return list(found.values())

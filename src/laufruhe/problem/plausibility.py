@@ -1,0 +1,99 @@
+"""Numbers that no usual engine has: a decimal point or a unit may be wrong. Asked, and never refused."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+
+from laufruhe.errors import Complaint
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.turns import as_turn, within
+from laufruhe.units import shown
+
+FASTEST = 30.0
+"""Mean piston speed [m/s]; racing engines reach 26."""
+LIGHTEST, HEAVIEST = 150.0, 20_000.0
+"""Reciprocating mass over the volume that a piston sweeps [kg/m^3], about 700 to 4000 in engines that were built."""
+SHORTEST_ROD = 0.45
+"""Crank radius over rod length."""
+FLATTEST, LONGEST = 0.25, 5.0
+"""Stroke over bore."""
+MOST_UNBALANCE = 20.0
+"""Of one weight, over that of all pistons and pins at their crank radius."""
+MOST_SAG, LEAST_SAG = 0.1, 1e-6
+"""Of a block on its mounts [m]: soft mounts give about 10 mm."""
+
+
+def doubts(engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False) -> tuple[Complaint, ...]:
+    """What of an engine is so unusual that its author is asked.
+
+    Parameters
+    ----------
+    fires_together
+        Whether cylinders are meant to fire at once.
+    """
+    found = [*_of_speed(engine, points), *_of_pistons(engine), *_of_rotors(engine), *_of_mounts(engine)]
+    found += [] if fires_together else _fired_together(engine)
+    once: dict[str, Complaint] = {}
+    for one in found:
+        once.setdefault(one.where, one)
+    return tuple(once.values())
+
+
+def together(engine: Engine) -> list[list[str]]:
+    """Names of cylinders that fire at one crank angle, group by group."""
+    fires: dict[float, list[str]] = defaultdict(list)
+    for part in engine.cylinders:
+        fires[round(float(within(as_turn(part.firing_angle), engine.cycle.turns)), 9)].append(part.name)
+    return [names for names in fires.values() if len(names) > 1]
+
+
+def _of_speed(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Complaint]:
+    longest = max((part.crank_radius for part in engine.slider_cranks), default=0.0)
+    for point in points:
+        speed = 2.0 * longest * point.speed / math.pi
+        if speed > FASTEST:
+            rule = f"makes a mean piston speed of {speed:.4g} m/s, and racing engines reach 26 m/s"
+            yield Complaint(f"operating point {point.name}", "", rule, "check speed and stroke")
+
+
+def _of_pistons(engine: Engine) -> Iterator[Complaint]:
+    for part in engine.slider_cranks:
+        bore, stroke = part.bore or 2.0 * part.crank_radius, 2.0 * part.crank_radius
+        usual = math.pi / 4.0 * bore**2 * stroke
+        if usual > 0.0 and part.reciprocating_mass and not LIGHTEST < part.reciprocating_mass / usual < HEAVIEST:
+            # 1000 kg a cubic metre is what pistons of usual engines have
+            rule = f"is that of no usual piston: one that sweeps {1e6 * usual:.4g} cm^3 has about {1e3 * usual:.2g} kg"
+            yield Complaint("reciprocating mass", shown(part.reciprocating_mass, "kg"), rule, "check its unit")
+        if part.bore and not FLATTEST < stroke / part.bore < LONGEST:
+            rule = f"is {stroke / part.bore:.3g} times the bore"
+            yield Complaint("stroke", shown(stroke, "m"), rule, "check stroke and bore")
+        if part.crank_radius / part.rod_length > SHORTEST_ROD:
+            rule = f"is {part.rod_length / part.crank_radius:.3g} crank radii, and rods of engines are longer than 2.2"
+            yield Complaint("rod length", shown(part.rod_length, "m"), rule, "check rod ratio or rod length")
+
+
+def _of_rotors(engine: Engine) -> Iterator[Complaint]:
+    whole = sum((p.reciprocating_mass + p.rotating_mass) * p.crank_radius for p in engine.slider_cranks)
+    for rotor in engine.rotors:
+        if abs(rotor.unbalance) > MOST_UNBALANCE * whole > 0.0:
+            rule = f"is {abs(rotor.unbalance) / whole:.3g} times that of all pistons and pins at their crank radius"
+            yield Complaint(f"unbalance of {rotor.name}", shown(abs(rotor.unbalance), "kg m"), rule, "check its unit")
+
+
+def _of_mounts(engine: Engine) -> Iterator[Complaint]:
+    stiffness = sum(max(mount.stiffness) for mount in engine.mounts)
+    if engine.block is None or not stiffness:
+        return
+    sag = 9.81 * engine.block.mass / stiffness
+    if not LEAST_SAG < sag < MOST_SAG:
+        rule = f"lets {shown(engine.block.mass, 'kg')} sag by about {shown(sag, 'm')}"
+        yield Complaint("stiffness of the mounts", "", rule, "check stiffness and mass, N/mm and N/m")
+
+
+def _fired_together(engine: Engine) -> Iterator[Complaint]:
+    groups = [f"{', '.join(names[:-1])} and {names[-1]}" for names in together(engine)]
+    if groups:
+        remedy = "give a firing order, or write fires_together = true in [engine] if that is meant"
+        yield Complaint("firing", "", f"is at once in {'; in '.join(groups)}", remedy)

@@ -1,0 +1,70 @@
+"""Counterweights and balancer weights as a workshop makes them: grams, gram millimetres, degrees."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+from laufruhe.machine import Role, Rotor
+from laufruhe.physics.balance_factor import balance_factors
+from laufruhe.present.measures import changed
+from laufruhe.present.numbers import DASH, number, trimmed
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import Result
+
+GRAMS = 1e3
+GRAM_MILLIMETRES = 1e6
+NEXT_TO_NOTHING = 1e-9
+_ANGLES = "Angles are those at phi = 0, from upright towards the left (C4)."
+_FACTOR = (
+    "Share of the reciprocating mass of a throw that its counterweights balance, beyond the rotating mass; "
+    "a counterweight counts for the nearest throw."
+)
+
+
+def tables(result: Result) -> list[Grid]:
+    """A row a weight, and a row a throw that has counterweights."""
+    return [_weights(result), _factors(result)]
+
+
+def _weights(result: Result) -> Grid:
+    before = {rotor.name: rotor for rotor in result.initial.engine.rotors}
+    made = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
+    scale = max((abs(rotor.unbalance) for rotor in made), default=0.0)
+    two = changed(result)
+    rows = []
+    for rotor in made:
+        given = before.get(rotor.name, rotor)
+        if max(abs(rotor.unbalance), abs(given.unbalance)) <= NEXT_TO_NOTHING * scale:
+            continue
+        mass, radius = DASH, DASH
+        if rotor.radius is not None:
+            mass, radius = number(GRAMS * rotor.mass, scale=GRAMS * scale / rotor.radius), trimmed(1e3 * rotor.radius)
+        lead = _in_grams(given, scale) if two else ()
+        rows.append((rotor.name, trimmed(1e3 * rotor.x), *lead, *_in_grams(rotor, scale),
+                     number(abs(rotor.unbalance), scale=scale), mass, radius))  # fmt: skip
+    sides = (" before", " after") if two else ("",)
+    sizes = [f"{what}{side}" for side in sides for what in ("g mm", "deg")]
+    head = ("weight", "x [mm]", *sizes, "kg m", "mass [g]", "at radius [mm]")
+    return Grid("Weights" + (" as decided" if two else ""), head, tuple(rows), note=_ANGLES)
+
+
+def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
+    """Size and angle."""
+    size = abs(rotor.unbalance)
+    if size <= NEXT_TO_NOTHING * scale:
+        return "0", DASH
+    turned = round(math.degrees(cmath.phase(rotor.unbalance)) % 360.0, 4) % 360.0
+    return number(GRAM_MILLIMETRES * size), trimmed(turned, 5)
+
+
+def _factors(result: Result) -> Grid:
+    designs = [result.initial, result.final] if changed(result) else [result.final]
+    found = [{one.cylinders: one.factor for one in balance_factors(design.engine)} for design in designs]
+    names = dict.fromkeys(cylinders for factors in found for cylinders in factors)
+    rows = [
+        (", ".join(cylinders), *(f"{100.0 * each[cylinders]:.1f} %" if cylinders in each else DASH for each in found))
+        for cylinders in names
+    ]
+    head = ("throw of", *(("as given", "as decided") if len(found) > 1 else ("balance factor",)))
+    return Grid("Balance factors", head, tuple(rows), note=_FACTOR)

@@ -1,0 +1,70 @@
+"""Numbers that no usual engine has are asked about, and nothing stops for them."""
+
+from __future__ import annotations
+
+import pytest
+
+from laufruhe import load
+from laufruhe.files.catalogue import engines
+from laufruhe.files.drafts import draft_of_engine
+from laufruhe.units import DECIMAL_COMMA
+from problem_files import READY
+
+SINGLE = """
+title = "Single"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+bore = "90 mm"
+stroke = "90 mm"
+rod_ratio = 0.28
+reciprocating_mass = "0.6 kg"
+throws = [0]
+[[operating_points]]
+speed = "3000 rpm"
+[[counterweights]]
+name = "web"
+opposite_throw = 1
+unbalance = "0.03 kg m"
+"""
+
+
+def doubted(old: str = "", new: str = "") -> list[str]:
+    assert old in SINGLE
+    return [str(doubt) for doubt in load(SINGLE.replace(old, new)).doubts]
+
+
+def test_a_usual_engine_raises_none() -> None:
+    assert doubted() == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("0.6 kg", "450 kg", "reciprocating mass = 450 kg: is that of no usual piston"),
+        ("0.6 kg", "0.6 g", "reciprocating mass = 0.0006 kg"),
+        ("3000 rpm", "5e6 rpm", "makes a mean piston speed of 1.5e+04 m/s"),
+        ("0.28", "0.6", "rod length = 75 mm: is 1.67 crank radii"),
+        ('bore = "90 mm"', 'bore = "900 mm"', "stroke = 90 mm: is 0.1 times the bore"),
+        ("0.03 kg m", "30 kg m", "unbalance of web = 30 kg m"),
+    ],
+)
+def test_what_is_out_of_the_usual_is_told_with_what_to_check(old: str, new: str, said: str) -> None:
+    found = [doubt for doubt in doubted(old, new) if said in doubt]
+    assert len(found) == 1
+    assert "; check" in found[0]
+
+
+def test_engines_that_were_built_raise_none() -> None:
+    built = [load(draft_of_engine(key)) for key in engines()]
+    assert {problem.title: problem.doubts for problem in built if problem.doubts} == {}
+
+
+@pytest.mark.parametrize("path", READY[::6], ids=lambda path: path.stem)
+def test_ready_problems_raise_none(path: object) -> None:
+    assert load(path).doubts == ()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("text", "is_one"), [("1,25 kg", True), (",5", True), ("1,250,000 N", False), ("1.25", False)])
+def test_a_decimal_comma_is_known_from_a_list(text: str, is_one: bool) -> None:
+    assert bool(DECIMAL_COMMA.match(text)) is is_one
