@@ -91,7 +91,7 @@ class TestParse:
         assert remedy == f'write for example "{example(unit)}"'
 
     def test_a_decimal_comma_is_explained(self) -> None:
-        with pytest.raises(UnitError, match='has a comma, and decimals follow a point; write "12.5 mm"'):
+        with pytest.raises(UnitError, match=r'has a comma, and decimals follow a point; write "12\.5 mm"'):
             parse("12,5 mm", "m")
 
     @pytest.mark.parametrize("text", ["50 Hz", "3000 min^-1", "50 s^-1", "3000/min"])
