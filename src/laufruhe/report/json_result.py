@@ -65,9 +65,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         "points": [{key: point[key] for key in own} for point in points],
         **({"modes": _modes(result.final), "run_up": _runs(result)} if is_elastic(result) else {}),
         **({"torsion": _torsion(result)} if is_twisted(result) else {}),
-        "balance_factors": [_of(one, "cylinders factor") for one in balance_factors(result.final.engine)],
-        "warnings": [str(doubt) for doubt in problem.doubts],
-        "firing_intervals": list(result.final.engine.firing_intervals),
+        **_running(result),
         **_phasing(result),
         **_robust(result),
         **_assembly(result),
@@ -93,6 +91,16 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
     return list(value) if isinstance(value, tuple) else value
+
+
+def _running(result: Result) -> Record:
+    """What of the engine itself a reader asks for, and what of it may be a slip."""
+    engine = result.final.engine
+    return {
+        "balance_factors": [_of(one, "cylinders factor") for one in balance_factors(engine)],
+        "firing_intervals": list(engine.firing_intervals),
+        "warnings": [str(doubt) for doubt in result.problem.doubts],
+    }
 
 
 def _objective(result: Result) -> Record | None:
