@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import laufruhe
 from laufruhe.physics.crank_torque import crank_torque
+from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.solvers import Result
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -45,3 +47,38 @@ def test_flywheel_of_the_waterworks_engine() -> None:
     result = laufruhe.solve(PROBLEMS / "waterworks-steam-pump.toml")
     assert result.certificate.kind == "global"
     assert result.final.value(result.problem.limits[0].measure) == pytest.approx(1.0 / 40.0, rel=1e-6)
+
+
+def test_flywheel_of_the_scotch_yoke_pump() -> None:
+    """Speed over a turn from the energy of flywheel and yoke and the work of the chambers, in plain steps."""
+    result = laufruhe.solve(PROBLEMS / "scotch-yoke-steam-pump.toml")
+    assert result.certificate.kind == "global"
+    point = result.problem.points[0]
+    gas = gas_loads(result.final.engine, point.gas)
+    phi = math.tau * np.arange(4096) / 4096
+    torque = gas.values(phi)[:, 3] - gas.coefficients[0, 3].real
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (torque[1:] + torque[:-1]))]) * math.tau / 4096
+    inertia = result.objective.value + 60.0 * (0.1 * np.sin(phi)) ** 2
+
+    def speeds(start: float) -> np.ndarray:
+        return np.sqrt(2.0 * (start + work) / inertia)
+
+    start = brentq(lambda own: np.mean(point.speed / speeds(own)) - 1.0, 1.0 - work.min(), 1e6)
+    assert np.ptp(speeds(start)) / point.speed == pytest.approx(1.0 / 20.0, rel=1e-4)
+
+
+def test_weight_of_kleins_drive() -> None:
+    """No weight tried one by one on a grid about the best is better."""
+    result = laufruhe.solve(PROBLEMS / "klein-steam-pump.toml")
+    assert result.certificate.kind == "global"
+    point, mass, radius, rod, pin = result.problem.points[0], 70.0, 0.1, 0.3, 5.0
+    alpha = math.tau * np.arange(2880) / 2880
+    orders = np.fft.fftfreq(2880, 1.0 / 2880)
+    place = radius * np.cos(alpha) + np.sqrt(rod**2 - (radius * np.sin(alpha)) ** 2)
+    along = mass * np.fft.ifft(orders**2 * np.fft.fft(place)).real + pin * radius * np.exp(1j * alpha)
+    best = min(
+        float(np.abs(along - weight * np.exp(1j * alpha)).max()) * point.speed**2
+        for weight in np.arange(4.0, 5.5, 0.002)
+    )
+    assert result.objective.value == pytest.approx(best, rel=1e-3)
+    assert result.objective.value <= best * (1.0 + 1e-6)

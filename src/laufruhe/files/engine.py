@@ -4,110 +4,40 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.catalogue import with_catalogue_key
 from laufruhe.files.complaints import Refused, blamed_on, nearest, none_of, one_of
-from laufruhe.files.fields import CylinderNumber, Name, Open, Table
+from laufruhe.files.engine_keys import BigEndTable, RodTable, ShaftTable, SliderCrankTable, with_owned_keys
+from laufruhe.files.fields import CylinderNumber, Open, Table
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
+from laufruhe.machine.drives import DRIVES, Sizes
 from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
-from laufruhe.machine.slider_crank import radius_for_stroke
 from laufruhe.numerics.turns import as_turn, within
 
-T = TypeVar("T", bound=BaseModel)
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
 
 _CYCLES = {str(cycle): cycle for cycle in Cycle}
 _OWNED = tuple(dict.fromkeys(key for k in LAYOUTS.values() for key in (*(own.name for own in k.keys), *k.lists)))
 _OF_PISTONS = (
-    "bore", "stroke", "rod_ratio", "rod_length", "offset", "reciprocating_mass", "rod", "rod_inertia_deficit",
+    "drive", "bore", "stroke", "rod_ratio", "rod_length", "offset", "reciprocating_mass", "rod", "rod_inertia_deficit",
 )  # fmt: skip
 # what a slider-crank of a free list takes from [engine] unless it says otherwise
 _INHERITED = {"stroke", "bore", "offset", "reciprocating_mass", "rod_inertia_deficit"}
 
 
-class RodTable(Table):
-    """The connecting rod as a rigid body."""
-
-    mass: f.PositiveMass
-    centre_of_gravity: f.Length = Field(description="Distance from the crank pin, on the line of the pins.")
-    inertia: f.Inertia = Field(description="About the centre of gravity.")
-
-
-class BigEndTable(Table):
-    """The rod's bearing on the crank pin."""
-
-    diameter: f.OpenPositiveLength
-    width: f.OpenPositiveLength
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Diameter and width, where they start if they are open."""
-        return Open.of(self.diameter).start, Open.of(self.width).start
-
-
-class ShaftTable(Table):
-    """A crankshaft of a free list of parts."""
-
-    name: Name
-    ratio: f.Ratio = 1.0
-    position: f.Pair[f.Length] = Field(description="y and z of its axis.")
-
-
-class SliderCrankTable(Table):
-    """One slider-crank of a free list of parts; what it leaves out it takes from [engine]."""
-
-    x: f.Length
-    bank_angle: f.Angle = f.told("Of the cylinder axis, from upright towards the left.", 0.0)
-    throw: f.Angle = 0.0
-    firing_angle: f.Angle | None = f.told("Crank angle at which it fires.")
-    shaft: str = "crankshaft"
-    stroke: f.PositiveLength | None = None
-    bore: f.PositiveLength | None = None
-    rod_ratio: f.NonNegative | None = None
-    rod_length: f.PositiveLength | None = None
-    offset: f.Length | None = None
-    reciprocating_mass: f.Mass | None = None
-    rotating_mass: f.Mass | None = None
-    rod_inertia_deficit: f.Inertia | None = None
-
-
-_KINDS: dict[str, Any] = {
-    "length": f.Length,
-    "positive length": f.PositiveLength,
-    "non-negative length": f.NonNegativeLength,
-    "angle": f.Angle,
-    "open angle": f.OpenAngle,
-    "angles": list[f.Angle],
-    "mass": f.Mass,
-    "inertia": f.Inertia,
-    "cylinder": CylinderNumber,
-    "sign": Literal[1, -1],
-    "rod": RodTable,
-}
-
-
-def _with_layout_keys(table: type[T]) -> type[T]:
-    """[engine] with the names of all layouts, and a key for every one that they own."""
-    names: Any = tuple(LAYOUTS)
-    fields: dict[str, Any] = {"layout": (Literal[names], ...)}
-    for key in (key for kind in LAYOUTS.values() for key in kind.keys):
-        kind = _KINDS[key.kind] if key.default is not None else _KINDS[key.kind] | None
-        fields[key.name] = (kind, Field(default=key.default, description=key.description or None))
-    return f.with_keys(table, fields)
-
-
-@_with_layout_keys
+@with_owned_keys
 class EngineTable(Table):
     """What the engine is."""
 
     model_config = ConfigDict(json_schema_extra=with_catalogue_key)
 
     layout: str
+    drive: str
     cycle: Literal["two-stroke", "four-stroke"]
     cylinders: CylinderNumber | None = f.told("Told by throws or firing order where left out.")
     bore: f.PositiveLength | None = f.told("Needed with gas.")
@@ -130,6 +60,12 @@ class EngineTable(Table):
     def piston_mass(self) -> Open:
         """Reciprocating mass without a share of the rod, which may be open."""
         return Open.of(self.reciprocating_mass or 0.0)
+
+    @property
+    def open_masses(self) -> dict[str, Open]:
+        """Masses that are open, by their keys, which are those of the mechanisms."""
+        keys = ["reciprocating_mass", *(k.name for k in DRIVES[self.drive].keys if k.kind == "open mass")]
+        return {key: own for key in keys if isinstance(own := getattr(self, key), Open) and own.is_open}
 
     @property
     def given_throws(self) -> list[float] | None:
@@ -165,6 +101,7 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
         if table.own(key) and not kind.takes(key):
             raise Refused(f"engine.{key}", None, f"means nothing in layout '{table.layout}'", "leave it out")
     _check_pistons(table)
+    _check_drive(table)
     bores = [part.bore for part in table.slider_cranks] or [None]
     if gas and kind.has_pistons and table.bore is None and None in bores:
         raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
@@ -185,6 +122,18 @@ def _check_pistons(table: EngineTable) -> None:
                 raise Refused(f"engine.{key}", None, "is missing", "add it")
     else:
         none_of(table, _OF_PISTONS, "engine", f"means nothing in layout '{table.layout}'", "leave it out")
+
+
+def _check_drive(table: EngineTable) -> None:
+    """Refuse keys that mean nothing with the drive."""
+    drive, rule = DRIVES[table.drive], f"means nothing with drive '{table.drive}'"
+    none_of(table, [key.name for kind in DRIVES.values() for key in kind.keys if key not in drive.keys], "engine",
+            rule, "leave it out")  # fmt: skip
+    if table.kind.needs_rod and not drive.has_rod:
+        remedy = "leave it out, or take another layout"
+        raise Refused("engine.drive", table.drive, "has no rod that could carry the others", remedy)
+    if not drive.has_rod:
+        none_of(table, ("rod_ratio", "rod_length", "rod", "rod_inertia_deficit"), "engine", rule, "leave it out")
 
 
 def layout_of(table: EngineTable) -> Layout:
@@ -255,7 +204,7 @@ def _mechanism(table: EngineTable, own: Mapping[str, Any] | None = None) -> tupl
     rod = _rod(table, rod_length)
     if rod is not None and table.rod_inertia_deficit != 0.0:
         raise Refused("engine.rod_inertia_deficit", None, "is given twice, here and by [engine.rod]", "keep one")
-    mechanism = Mechanism(
+    plain = Mechanism(
         crank_radius=radius,
         rod_length=rod_length,
         reciprocating_mass=table.piston_mass.start + (rod.reciprocating_mass if rod else 0.0),
@@ -266,7 +215,16 @@ def _mechanism(table: EngineTable, own: Mapping[str, Any] | None = None) -> tupl
         bore=table.bore,
         big_end=big_end,
     )
-    return mechanism, rod
+    return DRIVES[table.drive].mechanism(plain, _sizes(table)), rod
+
+
+def _sizes(table: EngineTable) -> Sizes:
+    """What [engine] says of lengths to its drive."""
+    own = {key.name: getattr(table, key.name) for key in DRIVES[table.drive].keys}
+    told = {name: value.model_dump() if isinstance(value, RodTable) else value for name, value in own.items()}
+    told = {name: value.start if isinstance(value, Open) else value for name, value in told.items()}
+    length = None if table.rod_length is None else Open.of(table.rod_length).start
+    return Sizes(table.stroke or 0.0, table.offset, length, table.rod_ratio, told)
 
 
 def _rod(table: EngineTable, length: float) -> Rod | None:
@@ -280,11 +238,12 @@ def _rod(table: EngineTable, length: float) -> Rod | None:
 
 def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
     """Crank radius and rod length [m] from stroke, offset and one of rod ratio and rod length."""
-    ratio, length = table.rod_ratio, None if table.rod_length is None else Open.of(table.rod_length).start
-    one_of(table, "engine", "rod_ratio", "rod_length", shown=ratio)
-    stroke = table.stroke or 0.0
+    drive, sizes = DRIVES[table.drive], _sizes(table)
+    ratio, length = sizes.rod_ratio, sizes.rod_length
+    if drive.has_rod:
+        one_of(table, "engine", "rod_ratio", "rod_length", shown=ratio)
     with blamed_on("engine.offset"):
-        radius = radius_for_stroke(stroke, table.offset, rod_length=length, rod_ratio=ratio or 0.0)
+        radius = drive.radius(sizes)
     rod = length if length is not None else (radius / ratio if ratio else math.inf)
     turning = (radius + abs(table.offset)) / rod
     if turning >= 1.0:

@@ -1,4 +1,4 @@
-"""Reciprocating masses that are open: the decisions about them."""
+"""Masses of pistons and levers that are open: the decisions about them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from laufruhe.problem.sets import Interval
 def piston_masses(
     table: EngineTable, parts: Sequence[SliderCrank], weights: Sequence[CounterweightTable]
 ) -> list[Decision]:
-    """The decision about the reciprocating mass of all that give none of their own, if it is open."""
-    mass = table.piston_mass
-    if not mass.is_open:
-        return []
-    check_factors(weights, "counts the reciprocating mass, which is open")
-    own = [row.reciprocating_mass is None for row in table.slider_cranks] or [True] * len(parts)
-    drives = tuple(MassDrive(part.name) for part, follows in zip(parts, own, strict=True) if follows)
-    return [Decision("reciprocating mass", "kg", Interval(*mass.bounds), mass.start, drives)]
+    """Decisions about masses of all slider-cranks that give none of their own, where these are open."""
+    found = []
+    for key, mass in table.open_masses.items():
+        check_factors(weights, f"counts the {key.replace('_', ' ')}, which is open")
+        own = [getattr(row, key, None) is None for row in table.slider_cranks] or [True] * len(parts)
+        drives = tuple(MassDrive(part.name, key) for part, follows in zip(parts, own, strict=True) if follows)
+        found.append(Decision(key.replace("_", " "), "kg", Interval(*mass.bounds), mass.start, drives))
+    return found
 
 
 def check_factors(weights: Sequence[CounterweightTable], rule: str) -> None:

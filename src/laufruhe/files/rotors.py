@@ -124,6 +124,9 @@ def counterweights(
     for k, table in enumerate(tables):
         where = f"counterweights[{k + 1}]"
         if table.factor_key is not None:
+            if not all(part.is_balanced_by_share for part in cylinders):
+                rule = "is a share of a mass at a crank pin, and the ram of a swinging yoke does not move as one"
+                raise Refused(f"{where}.{table.factor_key}", None, rule, "give the weight an unbalance, or a mass")
             _opposite_throws(table, pins, where, into)
         else:
             _single_counterweight(table, pins, where, into)

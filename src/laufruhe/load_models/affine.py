@@ -276,10 +276,10 @@ class AffineModel:
 
 @dataclass(frozen=True)
 class _Change:
-    """What one unit of one column adds: rotors, pistons with a kilogram more, and geared shafts with all inertia."""
+    """What one unit of one column adds: rotors, masses with a kilogram more, and geared shafts with all inertia."""
 
     rotors: tuple[Rotor, ...]
-    pistons: tuple[str, ...]
+    pistons: tuple[tuple[str, str], ...]
     shares: tuple[str, ...] = ()
 
 
@@ -300,8 +300,8 @@ def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
 
 def _alone(engine: Engine, change: _Change) -> Engine:
     """What these rotors and pistons load by themselves: the engine without any other mass."""
-    parts = (replace(part, reciprocating_mass=float(part.name in change.pistons), rotating_mass=0.0,
-                     rod_inertia_deficit=0.0) for part in engine.slider_cranks)  # fmt: skip
+    parts = (part.only({mass: 1.0 for name, mass in change.pistons if name == part.name})
+             for part in engine.slider_cranks)  # fmt: skip
     return replace(engine, slider_cranks=tuple(parts), rotors=change.rotors)
 
 
@@ -311,7 +311,7 @@ def _loads(
     """What these alone make at an operating point; torque and an uneven speed are those of the whole engine."""
     without_gas = replace(problem.fidelity, gas=False, gas_orders=None)
     wrench = added_rotor_loads(alone.rotors, problem.engine, point, problem.fidelity)
-    if any(part.reciprocating_mass for part in alone.slider_cranks):
+    if any(part != part.only({}) for part in alone.slider_cranks):
         wrench = shaking_loads(alone, point, without_gas)
     if shares:
         geared = tuple(replace(own, share=1.0) for own in problem.engine.geared if own.name in shares)

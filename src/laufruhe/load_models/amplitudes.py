@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Engine, Role
+from laufruhe.machine import Engine, Role, SliderCrank
 from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import Layout
 from laufruhe.physics.crank_stars import Array, Stars, star_sums
@@ -132,6 +132,8 @@ def _one_throw(engine: Engine, layout: Layout) -> Engine | None:
     if places[0] == 0.0 or any(x != places[pin] for x, pin in zip(layout.positions, pins, strict=True)):
         return None
     own = tuple(part for part, pin in zip(engine.slider_cranks, pins, strict=True) if pin == 0)
+    if any(type(part) is not SliderCrank for part in own):
+        return None
     return Engine(engine.name, engine.cycle, own, tuple(rotor for rotor in engine.rotors if rotor.x == places[0]))
 
 

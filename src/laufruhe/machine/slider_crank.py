@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -163,6 +163,11 @@ class SliderCrank:
     """Whether it is known what it presses its crank pin with."""
     has_rod: ClassVar[bool] = True
     """Whether a rod leans on a cylinder wall."""
+    is_balanced_by_share: ClassVar[bool] = True
+    """Whether a share of its reciprocating mass at the crank pin means anything (eq. 13)."""
+    weightless: ClassVar[Mapping[str, float]] = {
+        "reciprocating_mass": 0.0, "rotating_mass": 0.0, "rod_inertia_deficit": 0.0,
+    }  # fmt: skip
 
     def __post_init__(self) -> None:
         if not self.crank_radius > 0.0:
@@ -228,6 +233,11 @@ class SliderCrank:
         )
         rod = (-kinematics.rod_rate(*shape), -kinematics.rod_acceleration(*shape))
         return Motion(((self.reciprocating_mass, piston),), ((self.rod_inertia_deficit, rod),))
+
+    def only(self, masses: Mapping[str, float]) -> Self:
+        """The same mechanism without any mass but these, by the names of its fields."""
+        told: dict[str, Any] = {**self.weightless, **masses}
+        return replace(self, **told)
 
     def scaled(self, length: float, mass: float) -> Self:
         """The same mechanism in another size."""

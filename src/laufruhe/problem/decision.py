@@ -119,9 +119,9 @@ class Decision:
         return tuple(drive for drive in self.drives if isinstance(drive, RotorDrive))
 
     @property
-    def pistons(self) -> tuple[str, ...]:
-        """Slider-cranks whose reciprocating masses follow."""
-        return tuple(drive.part for drive in self.drives if isinstance(drive, MassDrive))
+    def pistons(self) -> tuple[tuple[str, str], ...]:
+        """Slider-cranks whose masses follow, and which of them."""
+        return tuple((drive.part, drive.mass) for drive in self.drives if isinstance(drive, MassDrive))
 
     @property
     def shares(self) -> tuple[str, ...]:

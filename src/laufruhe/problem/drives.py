@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, ClassVar, Protocol
 
-from laufruhe.machine import Engine, Mount
+from laufruhe.machine import Engine, Mount, SliderCrank
 from laufruhe.machine.running_gear import Size
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.reduced_inertia import turned_by
@@ -68,7 +68,7 @@ class Numbers:
     places: dict[str, list[Any]] = field(default_factory=dict)
     mounts: list[list[Any]] = field(default_factory=list)
     flywheel: list[Any] = field(default_factory=list)
-    pistons: dict[str, Any] = field(default_factory=dict)
+    pistons: dict[tuple[str, str], Any] = field(default_factory=dict)
     torsion: dict[tuple[str, str], Any] = field(default_factory=dict)
     sizes: dict[Size, Any] = field(default_factory=dict)
     shares: dict[str, Any] = field(default_factory=dict)
@@ -96,9 +96,7 @@ class Numbers:
         flywheel, parts = given.flywheel.moved(self.flywheel) if given.flywheel else None, given.slider_cranks
         torsion = given.torsion.moved(self.torsion) if given.torsion else None
         if self.pistons:
-            # a sum of changes may leave a bound of zero by a rounding
-            masses = (max(part.reciprocating_mass + float(self.pistons.get(part.name, 0.0)), 0.0) for part in parts)
-            parts = tuple(replace(part, reciprocating_mass=mass) for part, mass in zip(parts, masses, strict=True))
+            parts = tuple(self._loaded(part) for part in parts)
         # a sum of changes may leave a bound by a rounding
         geared = tuple(replace(g, share=min(max(float(self.shares[g.name]), 0.0), 1.0)) for g in given.geared)
         found = replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, geared=geared)
@@ -108,6 +106,12 @@ class Numbers:
         if torsion is not None and (self.pistons or self.sizes):
             torsion = turned_by(torsion, given.slider_cranks, found.slider_cranks)
         return replace(found, torsion=torsion)
+
+    def _loaded(self, part: SliderCrank) -> SliderCrank:
+        """With its masses changed."""
+        own = {mass: float(change) for (name, mass), change in self.pistons.items() if name == part.name}
+        # a sum of changes may leave a bound of zero by a rounding
+        return replace(part, **{mass: max(getattr(part, mass) + change, 0.0) for mass, change in own.items()})
 
 
 class Drive(Protocol):
@@ -200,15 +204,17 @@ class FlywheelDrive:
 
 @dataclass(frozen=True)
 class MassDrive:
-    """Reciprocating mass of one slider-crank += change."""
+    """A mass of one slider-crank += change."""
 
     part: str
+    mass: str = "reciprocating_mass"
     kind: ClassVar[Kind] = Kind.PISTON
     acts: ClassVar[bool] = True
 
     def move(self, numbers: Numbers, change: Any) -> None:
         """Of the slider-crank."""
-        numbers.pistons[self.part] = numbers.pistons.get(self.part, 0.0) + change.real
+        key = self.part, self.mass
+        numbers.pistons[key] = numbers.pistons.get(key, 0.0) + change.real
 
 
 @dataclass(frozen=True)

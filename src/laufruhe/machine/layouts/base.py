@@ -17,13 +17,13 @@ from laufruhe.machine.slider_crank import Rod, SliderCrank
 
 @dataclass(frozen=True)
 class Key:
-    """A key of [engine] that a layout takes.
+    """A key of [engine] that a layout or a drive takes.
 
     Attributes
     ----------
     kind
         "length", "positive length", "non-negative length", "angle", "open angle", "angles", "cylinder", "sign",
-        "inertia", "mass", or "rod" of a mass, centre of gravity and inertia.
+        "inertia", "ratio", "mass", "open mass", or "rod" of a mass, centre of gravity and inertia.
     default
         Where it is left out.
     remedy
@@ -97,6 +97,8 @@ class LayoutKind(ABC):
         Cylinders that share a throw.
     is_free
         Whether every slider-crank is listed, and nothing is placed.
+    needs_rod
+        Whether a drive without a connecting rod means nothing here.
     has_pistons
         Whether [engine] says what its pistons, rods and strokes are; else the layout's own keys make the mechanism.
     """
@@ -107,6 +109,7 @@ class LayoutKind(ABC):
     openable: ClassVar[tuple[str, ...]] = ()
     cylinders_per_throw: ClassVar[int] = 1
     is_free: ClassVar[bool] = False
+    needs_rod: ClassVar[bool] = False
     has_pistons: ClassVar[bool] = True
 
     def takes(self, key: str) -> bool:

@@ -102,6 +102,7 @@ class Radial(LayoutKind):
     )
     lists = ("firing_order",)
     openable = ("firing_order",)
+    needs_rod = True
 
     def place(self, asked: Asked) -> Layout:
         """Cylinders at equal angles around one throw; phi = 0 is the true dead centre of cylinder 1 (C5)."""

@@ -20,7 +20,7 @@ from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Table
 from laufruhe.files.study_tables import CaseTable
-from laufruhe.machine import Engine
+from laufruhe.machine import Engine, SliderCrank
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
@@ -64,6 +64,8 @@ def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
     if len(shapes) > 1:
         raise ModelError(f"the cylinders of '{engine.name}' differ, so free forces have no unit; make them equal")
     part = engine.slider_cranks[0]
+    if type(part) is not SliderCrank:
+        raise ModelError(f"free forces are counted in those of a slider-crank, which '{part.name}' is not")
     amplitude = abs(piston_acceleration_orders(part.rod_ratio, part.offset_ratio, order)[order])
     unit = part.reciprocating_mass * part.crank_radius * SPEED**2 * float(amplitude)
     load = reciprocating_loads(engine, SPEED).at(order)

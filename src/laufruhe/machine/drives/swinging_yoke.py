@@ -1,0 +1,88 @@
+"""Slotted lever that a crank swings, for a slow stroke and a quick return (Roetscher, Figs. 1071 to 1073)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from laufruhe.errors import KeyedError
+from laufruhe.machine.drives.base import DriveKind, Sizes
+from laufruhe.machine.layouts.base import Key, rod_of
+from laufruhe.machine.layouts.build import Mechanism
+from laufruhe.machine.rotor import CRANKSHAFT, Shaft
+from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.machine.swinging_yoke import SwingingYoke
+
+
+@dataclass(frozen=True, kw_only=True)
+class Yoke(Mechanism):
+    """What all of an engine share; `own` are the fields of `SwingingYoke` beside those of a slider-crank."""
+
+    own: Mapping[str, float]
+
+    def cylinder(
+        self,
+        number: int,
+        x: float,
+        throw: float,
+        bank: float,
+        firing_angle: float,
+        pin_mass: float = 0.0,
+        shaft: Shaft = CRANKSHAFT,
+    ) -> SliderCrank:
+        """One ram and its lever."""
+        plain = super().cylinder(number, x, throw, bank, firing_angle, pin_mass, shaft)
+        told: dict[str, Any] = {shared.name: getattr(plain, shared.name) for shared in fields(plain)}
+        return SwingingYoke(**told | dict(self.own))
+
+
+class SwingingYokeDrive(DriveKind):
+    """Stroke and return ratio fix crank radius and length of the lever over the distance of its pivot (K15)."""
+
+    name = "swinging-yoke"
+    has_rod = False
+    keys = (
+        Key("pivot_distance", "positive length", "From the crank axis to the pivot of a swinging yoke."),
+        Key("return_ratio", "ratio", "Time of the slow stroke over that of the quick one, of a swinging yoke."),
+        Key("lever_length", "positive length", "From pivot to ram, of a swinging yoke, in place of return_ratio."),
+        Key("lever", "rod", "Of a swinging yoke, as a rigid body, its centre of gravity from the pivot."),
+        Key("lever_weight", "open mass", "Behind the pivot of a swinging yoke."),
+        Key("lever_weight_radius", "positive length", "Of lever_weight, from the pivot."),
+    )
+
+    def radius(self, sizes: Sizes) -> float:
+        """e sin of half the angle that the slow stroke is over half a turn."""
+        own = sizes.own
+        pivot, ratio, length = own["pivot_distance"], own["return_ratio"], own["lever_length"]
+        if pivot is None:
+            raise KeyedError("pivot_distance", "is missing; add the distance between crank and pivot")
+        if (ratio is None) == (length is None):
+            state = "is missing" if ratio is None else "is given beside lever_length"
+            raise KeyedError("return_ratio", f"{state}; give one of return_ratio and lever_length")
+        if ratio is not None and not ratio > 1.0:
+            rule = "makes no quick return; give more than 1, 1.2 to 2 is usual"
+            raise KeyedError("return_ratio", rule, f"{ratio:g}")
+        share = math.cos(math.pi / (1.0 + ratio)) if ratio is not None else 0.5 * sizes.stroke / length
+        if share >= 1.0:
+            rule = "is too short, no crank inside its swing makes this stroke; make it longer"
+            raise KeyedError("lever_length", rule, f"{1e3 * length:g} mm")
+        return float(pivot * share)
+
+    def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:
+        """With the lever, its weight, and the ram's path."""
+        own, pivot = sizes.own, sizes.own["pivot_distance"]
+        length = 0.5 * sizes.stroke * pivot / plain.crank_radius
+        if own["lever_weight"] and own["lever_weight_radius"] is None:
+            raise KeyedError("lever_weight_radius", "is missing beside lever_weight; add its distance from the pivot")
+        told: dict[str, Any] = {
+            "pivot": pivot, "lever_length": length, "ram_height": plain.offset,
+            "lever_weight": own["lever_weight"] or 0.0, "lever_weight_radius": own["lever_weight_radius"] or 0.0,
+        }  # fmt: skip
+        if own["lever"] is not None:
+            lever = rod_of("lever", own["lever"], length, "pivot")
+            names = {"lever_mass": lever.mass, "lever_centre": lever.centre_of_gravity, "lever_inertia": lever.inertia}
+            told |= names
+        shared = {part.name: getattr(plain, part.name) for part in fields(plain)}
+        return Yoke(**shared | {"offset": 0.0}, own=told)

@@ -1,0 +1,164 @@
+"""Crank pin in a slotted lever that swings about a pivot and drives a ram (K14-K16; Roetscher, Fig. 1071)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.slider_crank import Motion, Outline, SliderCrank
+
+_THICKNESS = 0.15
+_WEIGHT = 7850.0 * _THICKNESS
+"""Of steel, over its area [kg/m2]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SwingingYoke(SliderCrank):
+    """A crank inside the swing of its lever; the piston of other mechanisms is a ram here.
+
+    The pivot is at -i e beside the crank axis, in the plane turned to the ram's axis (C5). alpha = 0 where the
+    crank pin lies along that axis; the slow stroke, towards the crank, has the pin on the far side of the pivot.
+
+    Attributes
+    ----------
+    pivot
+        Distance e of the pivot from the crank axis [m].
+    lever_length
+        From the pivot to the end that drives the ram, R [m].
+    ram_height
+        Of the ram's path above where the lever's end touches at mid-stroke [m].
+    lever_mass, lever_centre, lever_inertia
+        [kg], centre of gravity from the pivot towards the end [m], inertia about it [kg m2].
+    lever_weight, lever_weight_radius
+        Behind the pivot [kg], [m].
+    """
+
+    pivot: float
+    lever_length: float
+    ram_height: float = 0.0
+    lever_mass: float = 0.0
+    lever_centre: float = 0.0
+    lever_inertia: float = 0.0
+    lever_weight: float = 0.0
+    lever_weight_radius: float = 0.0
+    has_pin_loads: ClassVar[bool] = False
+    is_balanced_by_share: ClassVar[bool] = False
+    weightless: ClassVar[Mapping[str, float]] = {
+        **SliderCrank.weightless, "lever_mass": 0.0, "lever_inertia": 0.0, "lever_weight": 0.0,
+    }  # fmt: skip
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.crank_radius < self.pivot:
+            raise ModelError(
+                f"{self.name}: the lever cannot swing, its pivot at {1e3 * self.pivot:g} mm lies within the crank "
+                f"circle of {1e3 * self.crank_radius:g} mm; move it out"
+            )
+        if not self.lever_length > 0.0:
+            raise ModelError(f"{self.name}: the lever needs a length")
+        if min(self.lever_mass, self.lever_inertia, self.lever_weight, self.lever_weight_radius) < 0.0:
+            raise ModelError(f"{self.name}: masses, inertia and radius of the lever must not be negative")
+
+    @property
+    def path(self) -> Hashable:
+        """What the ram's path depends on, besides the angle of the crank."""
+        return "swinging yoke", self.crank_radius, self.pivot, self.lever_length
+
+    @cached_property
+    def dead_centres(self) -> tuple[float, float]:
+        """Where crank and lever are square (K15)."""
+        lean = math.asin(self.crank_radius / self.pivot)
+        return -lean, math.pi + lean
+
+    @property
+    def stroke(self) -> float:
+        """2 R r / e [m]."""
+        return 2.0 * self.lever_length * self.crank_radius / self.pivot
+
+    @property
+    def return_ratio(self) -> float:
+        """Time of the slow stroke over that of the quick one (K15)."""
+        lean = math.asin(self.crank_radius / self.pivot)
+        return (math.pi + 2.0 * lean) / (math.pi - 2.0 * lean)
+
+    def lever(self, lib: Any, alpha: Any) -> tuple[Any, tuple[Any, Any]]:
+        """Its direction as a unit number, and first and second derivative of its angle (K14)."""
+        r, e = 0.0 * alpha + self.crank_radius, 0.0 * alpha + self.pivot
+        cosine, sine = lib.cos(alpha), lib.sin(alpha)
+        # (r^2 + e^2 + 2 e r sin alpha), which is small where the pin comes near the pivot
+        square = (e - r) * (e - r) + 2.0 * e * r * (1.0 + sine)
+        direction = (r * cosine + 1j * (e + r * sine)) / lib.sqrt(square)
+        rate = r * (r + e * sine) / square
+        return direction, (rate, r * e * cosine * (e - r) * (e + r) / (square * square))
+
+    def travel(self, lib: Any, alpha: Any) -> Any:
+        """Way of the ram towards the crank from alpha = 0 [m]."""
+        start, _ = self.lever(lib, 0.0 * alpha)
+        return self.lever_length * (start.real - self.lever(lib, alpha)[0].real)
+
+    def velocity(self, lib: Any, alpha: Any) -> Any:
+        """Velocity of the ram away from the crank, by the angle of its crank [m] (K16)."""
+        direction, (rate, _) = self.lever(lib, alpha)
+        return -self.lever_length * rate * direction.imag
+
+    def motion(self, lib: Any, alpha: Any) -> Motion:
+        """Ram, lever and its weight."""
+        direction, (rate, swing) = self.lever(lib, alpha)
+        turned, bent = 1j * rate * direction, (1j * swing - rate * rate) * direction
+
+        def on_lever(distance: float) -> tuple[Any, Any, Any]:
+            own = 0.0 * alpha + distance
+            return own * direction - 1j * self.pivot, own * turned, own * bent
+
+        length = 0.0 * alpha + self.lever_length
+        height = self.lever_length - self.pivot + self.ram_height
+        ram = length * direction.real + 1j * height, length * turned.real, length * bent.real
+        return Motion(
+            (
+                (self.reciprocating_mass, ram),
+                (self.lever_mass, on_lever(self.lever_centre)),
+                (self.lever_weight, on_lever(-self.lever_weight_radius)),
+            ),
+            ((self.lever_inertia, (rate, swing)),),
+        )
+
+    def outlines(self, alpha: float) -> tuple[Outline, ...]:
+        """Ram, lever, and its weight as a block of steel 150 mm thick."""
+        direction, pivot = complex(self.lever(np, np.float64(alpha))[0]), -1j * self.pivot
+        ram = complex(self.motion(np, np.float64(alpha)).points[0][1][0])
+        wide, side = 0.06 * self.stroke, math.sqrt(self.lever_weight / _WEIGHT)
+        behind = self.lever_weight_radius if self.lever_weight > 0.0 else wide
+        bodies = [
+            Outline(ram + _box(0.4 * self.stroke, wide), 4.0 * wide, True),
+            Outline(pivot + direction * (0.5 * (self.lever_length - behind) + _box(0.5 * (self.lever_length + behind),
+                    0.5 * wide)), wide, True),
+            Outline(pivot + wide * np.exp(1j * np.linspace(0.0, math.tau, 25)), wide, False),
+        ]  # fmt: skip
+        if self.lever_weight > 0.0:
+            bodies.append(Outline(pivot + direction * (_box(0.5 * side, 0.5 * side) - behind), _THICKNESS, True))
+        return tuple(bodies)
+
+    def scaled(self, length: float, mass: float) -> Self:
+        """The same mechanism in another size."""
+        return replace(
+            super().scaled(length, mass),
+            pivot=self.pivot * length,
+            lever_length=self.lever_length * length,
+            ram_height=self.ram_height * length,
+            lever_mass=self.lever_mass * mass,
+            lever_centre=self.lever_centre * length,
+            lever_inertia=self.lever_inertia * mass * length**2,
+            lever_weight=self.lever_weight * mass,
+            lever_weight_radius=self.lever_weight_radius * length,
+        )
+
+
+def _box(half_length: float, half_width: float) -> Any:
+    """Corners of a rectangle about zero."""
+    return np.array([1, 1, -1, -1]) * half_length + 1j * np.array([1, -1, -1, 1]) * half_width

@@ -1,0 +1,77 @@
+"""Shaper: weights on crank and lever against least squares of positions, and the stroke drives side by side."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.machine.swinging_yoke import SwingingYoke
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers import Result
+
+PROBLEM = Path(__file__).parents[2] / "problems" / "shaper.toml"
+STEPS = 512
+
+
+@pytest.fixture(scope="module")
+def solved() -> Result:
+    return laufruhe.solve(PROBLEM)
+
+
+def acceleration(place: np.ndarray) -> np.ndarray:
+    orders = np.fft.fftfreq(STEPS, 1.0 / STEPS)
+    return np.fft.ifft(-(orders**2) * np.fft.fft(place))
+
+
+def columns(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """Force on the frame of what is given, and of one unit of each open number, from places in the ram's plane."""
+    (part,) = problem.engine.slider_cranks
+    assert isinstance(part, SwingingYoke)
+    alpha = math.tau * np.arange(STEPS) / STEPS
+    pin = part.crank_radius * np.exp(1j * alpha)
+    lever = (pin + 1j * part.pivot) / np.abs(pin + 1j * part.pivot)
+    square = problem.points[0].speed ** 2
+    given = part.reciprocating_mass * acceleration((part.lever_length * lever).real)
+    given = given + part.lever_mass * part.lever_centre * acceleration(lever) + part.rotating_mass * acceleration(pin)
+    turning = np.exp(1j * alpha)
+    units = [-part.lever_weight_radius * acceleration(lever), acceleration(turning), acceleration(1j * turning)]
+    # a weight square to the lever, that the problem does not offer
+    units.append(1j * acceleration(lever))
+    rows = np.stack(units, axis=1)
+    return -square * np.concatenate([given.real, given.imag]), -square * np.concatenate([rows.real, rows.imag])
+
+
+def test_weights_are_those_of_least_squares(solved: Result) -> None:
+    """To 1e-6; a weight beside the line of the lever would be nothing at its optimum."""
+    assert solved.certificate.kind == "global"
+    given, units = columns(solved.problem)
+    best, *_ = np.linalg.lstsq(units, -given, rcond=None)
+    force = math.sqrt(np.square(given + units @ best).sum() / STEPS)
+    assert solved.objective.value == pytest.approx(force, rel=1e-6)
+    assert solved.certificate.lower_bound == pytest.approx(force, rel=1e-6)
+    weight = solved.final.engine.slider_cranks[0].lever_weight
+    assert weight == pytest.approx(best[0], rel=1e-6)
+    (unbalance,) = [rotor.unbalance for rotor in solved.final.engine.rotors]
+    assert abs(unbalance) == pytest.approx(math.hypot(best[1], best[2]), rel=1e-6)
+    assert best[3] == pytest.approx(0.0, abs=1e-8 * best[0])
+    # beside it the crank alone does less
+    alone, *_ = np.linalg.lstsq(units[:, 1:3], -given, rcond=None)
+    assert np.square(given + units[:, 1:3] @ alone).sum() > 2.0 * np.square(given + units @ best).sum()
+
+
+def test_quicker_return_shakes_more(solved: Result) -> None:
+    """The same ram and weights open, a return twice as quick."""
+    quicker = laufruhe.solve(solved.problem.with_values({"engine.return_ratio": 2.2}))
+    assert quicker.certificate.kind == "global"
+    assert quicker.objective.value > solved.objective.value
+
+
+def test_lever_weight_is_named_where_it_cannot_be_decided() -> None:
+    tables = dict(laufruhe.files.reader.given(PROBLEM)[0])
+    tables["fidelity"] = {"crank_inertia": "40 kg m^2"}
+    with pytest.raises(laufruhe.LaufruheError, match="turns evenly"):
+        laufruhe.solve(tables)
