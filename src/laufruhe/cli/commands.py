@@ -53,7 +53,7 @@ def init(
     file: o.FileArgument = Path("problem.toml"),
     name: o.FromOption = None,
 ) -> None:
-    """Write a problem file to begin with, commented, and the schema that editors check it by.
+    """Write a commented problem file to start from, with its schema for editors.
 
     Asks what it is about, unless --from says so.
     """
@@ -68,7 +68,7 @@ def examples(
     names: o.NamesArgument = None,
     to: o.ToOption = Path(),
 ) -> None:
-    """List the ready problems by what they are for, or copy some of them."""
+    """List the ready problems by use, or copy some of them."""
     with exit_statuses(to):
         from laufruhe.cli.begin import copied, listed
 
@@ -79,7 +79,7 @@ def examples(
 def engines(
     names: o.KeysArgument = None,
 ) -> None:
-    """List the engines of the catalogue, or show what is published of some of them."""
+    """List the engines of the catalogue, or show the figures of some of them."""
     with exit_statuses(Path("laufruhe")):
         from laufruhe.cli.begin import catalogue, described
 
@@ -103,7 +103,7 @@ def solve(
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
-    """Decide what the problem leaves open, and prove how good that is."""
+    """Decide what the problem leaves open, and prove how good the design is."""
     with exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler):
         from laufruhe.cli.solve import Request, run, solved
 
@@ -189,7 +189,7 @@ def explain(
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
-    """Say what of the physics this scene needs, what it does not, and why."""
+    """Say which parts of the physics this problem needs, and why."""
     with exit_statuses(problem), spoken(quiet, verbose), handing_out(json, problem) as hand_out:
         from laufruhe.cli.fidelity import explained
 
@@ -206,7 +206,7 @@ def trade(
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
-    """Measure speed against accuracy of every fidelity, on these problems."""
+    """Measure time and error of every fidelity on these problems."""
     with exit_statuses(problems[0]), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler):
         from laufruhe.cli.fidelity import traded
 

@@ -48,32 +48,32 @@ class Format(StrEnum):
         return ("png", "svg") if self is Format.BOTH else (str(self),)
 
 
-FORMAT = "Files of the pictures; the HTML page holds its own."
+FORMAT = "Format of the picture files; the HTML report holds its own."
 FormatOption = Annotated[Format, typer.Option("--format", help=FORMAT)]
 ANIMATE = "Make engine.gif: the engine turning, with the forces that it leaves free."
 AnimateOption = Annotated[bool, typer.Option("--animate", help=ANIMATE)]
 NO_PLOTS = "Draw no pictures; those of an earlier result are removed."
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help=NO_PLOTS)]
-SERIES = "Put the loads over the cycle into the JSON as well."
+SERIES = "Add the loads over the cycle to the JSON."
 SeriesOption = Annotated[bool, typer.Option("--series", help=SERIES)]
-GAP = "Relative gap that counts as proven, in place of the file's."
+GAP = "Relative gap at which an optimum counts as proven, in place of the file's."
 ToleranceOption = Annotated[float | None, typer.Option("--tolerance", metavar="X", help=GAP)]
 ERROR = "Relative error of the objective that is allowed."
 FidelityTolerance = Annotated[float, typer.Option("--tolerance", metavar="X", help=ERROR)]
-LIMIT = "Stop after so many seconds with the best design so far and its bound."
+LIMIT = "End the search after SECONDS with the best design so far and its bound."
 LimitOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=LIMIT)]
-STOP = "Stop after so many seconds; what is finished is kept."
+STOP = "End after SECONDS; finished work is kept."
 StopOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=STOP)]
-JOBS = "Processes that may be used.  [default: one a core]"
+JOBS = "Largest number of processes.  [default: one for each core]"
 JobsOption = Annotated[int | None, typer.Option("--jobs", metavar="N", help=JOBS)]
 SCHEDULER = "Let the Dask workers of the scheduler at ADDRESS do the work."
 SchedulerOption = Annotated[str | None, typer.Option("--scheduler", metavar="ADDRESS", help=SCHEDULER)]
 STUDY = "Study file (TOML); - reads standard input."
 StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help=STUDY, show_default=False)]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Problem file to write.")]
-FROM = "An engine of the catalogue, or a ready problem, to begin with."
+FROM = "Engine of the catalogue, or ready problem, to start from."
 COPIED = "Ready problems to copy, with all files that they refer to."
-SHOWN = "Engines to show: published figures, source, and what is assumed."
+SHOWN = "Engines to show: published figures, source, and assumptions."
 FromOption = Annotated[
     str | None, typer.Option("--from", metavar="NAME", help=FROM, autocompletion=_completed("engines problems"))
 ]
@@ -86,8 +86,8 @@ KeysArgument = Annotated[
     list[str] | None,
     typer.Argument(metavar="[KEY...]", help=SHOWN, show_default=False, autocompletion=_completed("engines")),
 ]
-QUIET = "Say nothing but what is wrong."
+QUIET = "Print errors only."
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help=QUIET)]
-VERBOSE = "Say every step on stderr, a line each, in a pipe too."
+VERBOSE = "Print every step on standard error, in a pipe too."
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help=VERBOSE)]
 Problems = Annotated[list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False)]

@@ -119,7 +119,7 @@ class _Gas(_WholePart):
 
 class _GasSamples(Knob):
     key, kind = "gas_samples", int
-    told: ClassVar = {"description": "Steps for the gas torque.", "ge": 48, "le": 100_000}
+    told: ClassVar = {"description": "Steps of the gas torque over the working cycle.", "ge": 48, "le": 100_000}
 
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
         if not GAS.is_kept(scale.problem, fidelity):
@@ -195,7 +195,7 @@ class _Crankshaft(Knob):
 
 class _CrankInertia(Knob):
     key, kind, unit = "crank_inertia", float, "kg m^2"
-    told: ClassVar = {"description": "Of all that turns with the crank: its speed varies within the cycle."}
+    told: ClassVar = {"description": "Inertia of all that turns with the crank; its speed varies within the cycle."}
     is_decided = False
 
     def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:

@@ -55,13 +55,17 @@ class QuantityTable(Table):
     mounts: list[str] | None = None
     bearings: list[str] | None = None
     cylinders: list[str] | None = None
-    sections: list[str] | None = f.told("Of the crankshaft, named after the discs that they join.")
-    webs: list[str] | None = f.told("And journals beside them: cylinder 1 front, cylinder 1 rear ...")
+    sections: list[str] | None = f.told(
+        "Sections of the crankshaft that count, named after the discs that they join; all by default."
+    )
+    webs: list[str] | None = f.told(
+        "Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ..."
+    )
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     direction_weights: f.Three[f.NonNegative] | None = None
-    motions: list[Motion] | None = f.told("That are to have a mode of their own.")
-    frequency: f.Frequency | None = f.told("Wanted about the torque-roll axis.")
+    motions: list[Motion] | None = f.told("Motions that should have a mode of their own; all by default.")
+    frequency: f.Frequency | None = f.told("Wanted natural frequency about the torque-roll axis.")
 
 
 class TermTable(QuantityTable):
@@ -72,7 +76,7 @@ class TermTable(QuantityTable):
 
 
 class ObjectiveTable(QuantityTable):
-    """What is to be least: one quantity, or a weighted sum of terms."""
+    """What is minimised: one quantity, or a weighted sum of terms."""
 
     minimise: QuantityName | None = None
     terms: list[TermTable] = Field(default_factory=list)
@@ -83,13 +87,17 @@ class ConstraintTable(QuantityTable):
     """A limit on a quantity."""
 
     limit: QuantityName
-    max: f.Side | None = Field(default=None, description="With the unit of the quantity.", examples=["6 kg"])
-    min: f.Side | None = f.told("Of natural frequencies, decoupling, sag or distance.")
+    max: f.Side | None = Field(
+        default=None, description="Largest value allowed, in the unit of the quantity.", examples=["6 kg"]
+    )
+    min: f.Side | None = f.told("Smallest value allowed, of natural frequencies, decoupling, sag or distance.")
     outside: f.Pair[f.Side] | None = Field(
-        default=None, description="A band that holds no natural frequency.", examples=[["12 Hz", "20 Hz"]]
+        default=None,
+        description="Band in which no natural frequency or critical speed may lie.",
+        examples=[["12 Hz", "20 Hz"]],
     )
     name: Name | None = None
-    of: list[str] | None = f.told("Counterweights or balancers whose mass counts, or shafts.")
+    of: list[str] | None = f.told("Names of the counterweights or balancers whose mass counts, or of shafts.")
 
 
 @dataclass(frozen=True)

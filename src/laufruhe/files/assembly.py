@@ -17,11 +17,11 @@ MOST_PARTS = 100
 
 
 class AssemblyTable(Table):
-    """Measured parts, one of each lot for every cylinder; the drawing stands for the mean of a lot."""
+    """Measured pistons and rods: which of them goes into which cylinder is decided."""
 
-    pistons: str | None = f.told("CSV file of their masses.")
-    rods: str | None = f.told("CSV file of their masses at the small end and at the big end.")
-    mass_unit: str = f.told("Of these files.", "g")
+    pistons: str | None = f.told("CSV file with the mass of each piston.")
+    rods: str | None = f.told("CSV file with the masses of each rod at the small end and at the big end.")
+    mass_unit: str = f.told("Unit of the masses in these files.", "g")
 
 
 def assembly_of(table: AssemblyTable | None, engine: Engine, folder: Path) -> Assembly | None:

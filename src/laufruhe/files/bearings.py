@@ -17,10 +17,12 @@ class MainBearingTable(Table):
     """A main bearing."""
 
     x: f.Length
-    name: Name | None = f.told("Its number from the front where left out.")
+    name: Name | None = f.told("Name of the bearing; by default its number from the front.")
     shaft: str = CRANKSHAFT.name
-    diameter: f.OpenPositiveLength | None = f.told("Of the journal; needed for a pressure, and for friction power.")
-    width: f.OpenPositiveLength | None = Field(default=None, description="Of the journal; needed for a pressure.")
+    diameter: f.OpenPositiveLength | None = f.told(
+        "Diameter of the journal; needed for a pressure and for friction power."
+    )
+    width: f.OpenPositiveLength | None = Field(default=None, description="Width of the journal; needed for a pressure.")
     friction: f.NonNegative | None = f.told("Coefficient of friction; needed for friction power.")
 
 

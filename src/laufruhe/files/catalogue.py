@@ -14,7 +14,7 @@ from laufruhe.machine.layouts import LAYOUTS
 
 KEY = "catalogue"
 """Of [engine]; `engine = "name"` says the same."""
-_TOLD = "An engine of the catalogue (laufruhe engines), whose figures stand where this table has none."
+_TOLD = "Engine of the catalogue (laufruhe engines) that supplies every key which this table does not give."
 # of each two one is given: whoever gives one means it
 _EITHER = (("rod_ratio", "rod_length"), ("rod", "rod_inertia_deficit"))
 _PHASES = ("throws", "firing_order")

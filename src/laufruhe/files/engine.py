@@ -39,18 +39,20 @@ class EngineTable(Table):
     layout: str
     drive: str
     cycle: Literal["two-stroke", "four-stroke"]
-    cylinders: CylinderNumber | None = f.told("Told by throws or firing order where left out.")
-    bore: f.PositiveLength | None = f.told("Needed with gas.")
+    cylinders: CylinderNumber | None = f.told("Number of cylinders; by default that of throws or firing order.")
+    bore: f.PositiveLength | None = f.told("Diameter of the cylinder; needed with gas.")
     stroke: f.PositiveLength | None = None
     rod_ratio: f.NonNegative | None = f.told("Crank radius over rod length; 0 is a Scotch yoke.")
     rod_length: f.OpenPositiveLength | None = None
-    offset: f.Length = f.told("Of the pin's path from the crank axis.", 0.0)
-    reciprocating_mass: f.OpenMass | None = f.told("Per cylinder, with the rod's share unless [engine.rod] is given.")
-    rotating_mass: f.Mass = f.told("Per throw, at the crank radius.", 0.0)
+    offset: f.Length = f.told("Distance of the piston pin's path from the crank axis.", 0.0)
+    reciprocating_mass: f.OpenMass | None = f.told(
+        "Reciprocating mass of a cylinder, with the rod's share unless [engine.rod] is given."
+    )
+    rotating_mass: f.Mass = f.told("Rotating mass of a throw, at the crank radius.", 0.0)
     rod: RodTable | None = None
-    big_end: BigEndTable | None = f.told("Needed for the pressure on crank pins.")
-    rod_inertia_deficit: f.Inertia = f.told("True inertia less that of the two masses.", 0.0)
-    throws: f.Throws | None = f.told("At phi = 0; even firing where left out.")
+    big_end: BigEndTable | None = f.told("Big end of the rod; needed for the pressure on crank pins.")
+    rod_inertia_deficit: f.Inertia = f.told("Inertia of the rod less that of two masses at its ends.", 0.0)
+    throws: f.Throws | None = f.told('Angles of the throws at phi = 0, or "open"; by default those of even firing.')
     firing_order: FiringOrder | None = None
     fires_together: bool = f.told("Whether cylinders are meant to fire at once; else you are asked.", False)
     shafts: list[ShaftTable] = Field(default_factory=list)

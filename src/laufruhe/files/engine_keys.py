@@ -18,8 +18,10 @@ class RodTable(Table):
     """The connecting rod as a rigid body."""
 
     mass: f.PositiveMass
-    centre_of_gravity: f.Length = Field(description="Distance from the crank pin, on the line of the pins.")
-    inertia: f.Inertia = Field(description="About the centre of gravity.")
+    centre_of_gravity: f.Length = Field(
+        description="Distance of the centre of gravity from the crank pin, on the line of the pins."
+    )
+    inertia: f.Inertia = Field(description="Moment of inertia about the centre of gravity.")
 
 
 class BigEndTable(Table):
@@ -39,14 +41,14 @@ class ShaftTable(Table):
 
     name: Name
     ratio: f.Ratio = 1.0
-    position: f.Pair[f.Length] = Field(description="y and z of its axis.")
+    position: f.Pair[f.Length] = Field(description="Position of the axis: y to the left, z up.")
 
 
 class SliderCrankTable(Table):
     """One slider-crank of a free list of parts; what it leaves out it takes from [engine]."""
 
     x: f.Length
-    bank_angle: f.Angle = f.told("Of the cylinder axis, from upright towards the left.", 0.0)
+    bank_angle: f.Angle = f.told("Angle of the cylinder axis, from upright towards the left.", 0.0)
     throw: f.Angle = 0.0
     firing_angle: f.Angle | None = f.told("Crank angle at which it fires.")
     shaft: str = "crankshaft"

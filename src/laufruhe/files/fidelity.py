@@ -30,12 +30,13 @@ def _with_knobs(table: type[T]) -> type[T]:
 
 @_with_knobs
 class FidelityTable(Table):
-    """Speed against accuracy."""
+    """How exactly the physics is computed; exact by default."""
 
     kinematics: Literal["exact", "two-order", "auto"] = f.told(
-        "auto: the cheapest choice that keeps the objective within the tolerance.", "exact"
+        "Motion of the pistons; auto takes the cheapest that keeps the objective in tolerance.",
+        "exact",
     )
-    tolerance: f.Positive | None = f.told("Relative error of the objective, for auto.")
+    tolerance: f.Positive | None = f.told("Relative error of the objective that auto may make.")
 
     def own(self, key: str) -> Any:
         """What stands at the key of a choice."""

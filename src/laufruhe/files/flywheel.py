@@ -21,8 +21,10 @@ class ArmsTable(Table):
     """Oval arms between hub and rim."""
 
     count: Annotated[int, Field(ge=2, le=24)]
-    at_rim: f.Pair[f.PositiveLength] = Field(description="Width across the plane of rotation, and depth in it.")
-    at_hub: f.Pair[f.PositiveLength] = Field(description="The same at the hub.")
+    at_rim: f.Pair[f.PositiveLength] = Field(
+        description="Width of an arm across the plane of rotation, and depth in it, at the rim."
+    )
+    at_hub: f.Pair[f.PositiveLength] = Field(description="Width and depth of an arm at the hub.")
     hub_diameter: f.PositiveLength
 
 
@@ -30,19 +32,21 @@ class RimTable(Table):
     """A ring of a rectangular section."""
 
     mean_diameter: f.OpenPositiveLength
-    width: f.OpenPositiveLength = Field(description="Along the shaft.")
-    height: f.OpenPositiveLength = Field(description="Along a radius.")
-    density: f.Density = Field(default=7250.0, description="Of cast iron where left out.")
+    width: f.OpenPositiveLength = Field(description="Width along the shaft.")
+    height: f.OpenPositiveLength = Field(description="Height of the rim along a radius.")
+    density: f.Density = Field(default=7250.0, description="Density of the rim; by default that of cast iron.")
     whole: Annotated[float, f.Number("", least=1.0)] = f.told("Mass of the whole flywheel over that of its rim.", 1.0)
     arms: ArmsTable | None = None
 
 
 class FlywheelTable(Table):
-    """What turns with the crank at its speed, pistons and rods left out."""
+    """Everything that turns at crank speed, except pistons and rods."""
 
-    inertia: f.OpenInertia | None = f.told("Of all of it, in place of a rim.")
+    inertia: f.OpenInertia | None = f.told("Moment of inertia of the whole flywheel, in place of a rim.")
     rim: RimTable | None = None
-    crankshaft_inertia: f.PositiveInertia | None = f.told("Of the rest, beside a rim.")
+    crankshaft_inertia: f.PositiveInertia | None = f.told(
+        "Moment of inertia of the crankshaft and all else that turns, beside a rim."
+    )
 
 
 _SECTION = ("mean_diameter", "width", "height")

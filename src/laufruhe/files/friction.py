@@ -20,17 +20,17 @@ SAME_SPEED = 0.01
 
 
 class FrictionTable(Table):
-    """Friction mean effective pressure, from a CSV file or told, and how far it may be off."""
+    """Friction mean effective pressure, measured in a CSV file or given, with its uncertainty."""
 
-    file: str | None = f.told(
-        "A CSV file: of fuel the speed, the load and the fuel; of motoring the speed and the load."
-    )
+    file: str | None = f.told("CSV file: speed, load and fuel for kind fuel; speed and drag for kind motoring.")
     kind: Literal["fuel", "motoring"] = "fuel"
     speed_unit: str = "rpm"
-    load_unit: str = f.told("Of a torque, or of a mean pressure.", "N m")
-    fmep: f.PositivePressure | None = f.told("In place of a file.")
-    deviation: Annotated[float, f.Number("Pa", least=0.0)] | None = f.told("Of fmep, its standard deviation.")
-    deviations: f.NonNegative = f.told("Standard deviations to either side that are looked at.", 2.0)
+    load_unit: str = f.told("Unit of the load in the file: of a torque, or of a mean pressure.", "N m")
+    fmep: f.PositivePressure | None = f.told("Friction mean effective pressure, in place of a file.")
+    deviation: Annotated[float, f.Number("Pa", least=0.0)] | None = f.told("Standard deviation of fmep.")
+    deviations: f.NonNegative = f.told(
+        "Number of standard deviations to either side for which the load is computed.", 2.0
+    )
 
 
 class Brake:

@@ -78,12 +78,14 @@ class SteamTable(Table):
     makes: ClassVar = Steam
     admission: f.PositivePressure
     back_pressure: f.PositivePressure
-    cut_off: f.Part = Field(description="Where admission ends, from the dead centre.")
-    release: f.Part = f.told("Where the outlet opens.", 1.0)
-    compression: f.Part = f.told("Where the outlet closes on the way back, from the dead centre.", 0.0)
-    lead: f.Part = f.told("Where fresh steam enters on the way back.", 0.0)
+    cut_off: f.Part = Field(description="Part of the stroke from the dead centre at which admission ends.")
+    release: f.Part = f.told("Part of the stroke at which the outlet opens.", 1.0)
+    compression: f.Part = f.told(
+        "Part of the stroke before the dead centre at which the outlet closes on the way back.", 0.0
+    )
+    lead: f.Part = f.told("Part of the stroke before the dead centre at which fresh steam enters on the way back.", 0.0)
     clearance: f.NonNegative = f.told("Volume left at the dead centre, over that of the stroke.", 0.05)
-    exponent: f.Positive = f.told("Of expansion and compression; 1, a hyperbola, unless told.", 1.0)
+    exponent: f.Positive = f.told("Exponent of expansion and compression; 1, a hyperbola, by default.", 1.0)
 
 
 class PumpTable(Table):
@@ -106,8 +108,10 @@ class ChamberTable(Table):
     """A space on one side of a piston, or of a further piston on the same rod."""
 
     name: f.Name | None = None
-    cylinders: list[f.CylinderNumber] | None = f.told("Whose rods carry such a piston; all where left out.")
-    end: Literal["head", "crank"] = Field(description="head drives the piston towards the crank, crank away from it.")
+    cylinders: list[f.CylinderNumber] | None = f.told("Cylinders whose rods carry such a piston; all by default.")
+    end: Literal["head", "crank"] = Field(
+        description="head: pressure drives the piston towards the crank; crank: away from it."
+    )
     bore: f.PositiveLength
     rod: f.NonNegativeLength = f.told("Diameter of the piston rod where it passes through this end.", 0.0)
     steam: SteamTable | None = None
@@ -119,7 +123,7 @@ class ChambersTable(Table):
     """Chambers on both sides of the pistons: steam engines, pumps, and both on one rod."""
 
     model: Literal["chambers"]
-    crankcase_pressure: f.PositivePressure | None = f.told("Of the air around.")
+    crankcase_pressure: f.PositivePressure | None = f.told("Absolute pressure of the ambient air.")
     chambers: Annotated[list[ChamberTable], Field(min_length=1, max_length=100)]
 
 

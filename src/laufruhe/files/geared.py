@@ -23,7 +23,7 @@ class GearedInertiaTable(Table):
 
     name: Name
     ratio: f.Ratio = Field(default=-1.0, description="Speed over crank speed; negative runs against the crank.")
-    share: OpenShare = Field(description="Of the inertia of all that turns, reduced to the crank.")
+    share: OpenShare = Field(description="Share of the inertia of all that turns, reduced to the crank.")
 
 
 def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia, ...], list[Decision]]:

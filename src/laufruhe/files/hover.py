@@ -41,7 +41,8 @@ def explained(schema: dict[str, Any]) -> dict[str, Any]:
     ]
     for (name, key), example in zip(keys, examples, strict=True):
         entry = tables[name]["properties"][key]
-        words = entry.get("description") or _words(schema, entry, f"{_short(name)}.{key}")
+        own = entry.get("description")
+        words = own if own and own != entry.get("x-dimension") else _words(schema, entry, f"{_short(name)}.{key}")
         hover = f"{words}\n\n{kind(schema, entry)}, for example `{json.dumps(example, ensure_ascii=False)}`"
         entry |= {"description": words, "examples": [example], "x-taplo": {"docs": {"main": hover}}}
     return schema

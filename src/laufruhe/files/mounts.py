@@ -44,11 +44,13 @@ _NOT_ELASTIC = ('goes with kind = "rigid"', "give stiffness instead")
 class BlockTable(Table):
     """The rigid body that elastic mounts carry."""
 
-    mass: f.PositiveMass = Field(description="Everything that the mounts carry, moving parts included.")
+    mass: f.PositiveMass = Field(description="Mass of everything that the mounts carry, moving parts included.")
     centre_of_gravity: f.Three[f.Length] = Field(default=[0.0, 0.0, 0.0])
-    inertia: f.Three[f.Inertia] = Field(description="About x, y and z through the centre of gravity.")
+    inertia: f.Three[f.Inertia] = Field(
+        description="Moments of inertia about x, y and z through the centre of gravity."
+    )
     inertia_products: f.Three[f.Inertia] = f.told(
-        "Entries xy, xz, yz of the tensor: xy = - integral of x y dm.", [0.0, 0.0, 0.0]
+        "Products of inertia xy, xz, yz of the tensor: xy = - integral of x y dm.", [0.0, 0.0, 0.0]
     )
     turning_inertia: f.Inertia = f.told(
         "Part of the inertia about x that turns with the crank and does not roll with the block: crankshaft, flywheel.",
@@ -68,11 +70,15 @@ class MountTable(Table):
 
     name: Name | None = None
     position: f.Three[f.OpenLength] | None = None
-    relative_stiffness: f.Three[f.NonNegative] | None = f.told("Along its own x, y, z; 0 carries nothing.")
+    relative_stiffness: f.Three[f.NonNegative] | None = f.told(
+        "Relative stiffness along the mount's own x, y, z; 0 carries nothing."
+    )
     turned: f.Three[f.OpenAngle] | None = f.told("Turns about x, then y, then z that bring the axes of C2 to its own.")
-    stiffness: f.Three[f.OpenStiffness] | None = f.told("Along its own x, y, z.")
-    loss_factor: f.OpenLossFactor | None = f.told("Damping work over deformation work over 2 pi.")
-    damping: f.Three[f.OpenDamping] | None = f.told("Viscous, along its own x, y, z.")
+    stiffness: f.Three[f.OpenStiffness] | None = f.told("Stiffness along the mount's own x, y, z.")
+    loss_factor: f.OpenLossFactor | None = f.told(
+        "Hysteretic loss factor: energy lost in a cycle over 2 pi times the energy stored."
+    )
+    damping: f.Three[f.OpenDamping] | None = f.told("Viscous damping along the mount's own x, y, z.")
     like: Name | None = f.told("Stiffness, loss and damping follow those of this mount.")
     mirror_of: Name | None = f.told("All follows this mount, mirrored in the plane y = 0.")
     stop: StopTable | None = None
@@ -84,9 +90,11 @@ class MountsTable(Table):
     kind: Literal["rigid", "elastic"] = "rigid"
     positions: list[f.Three[f.Length]] = Field(default_factory=list)
     names: list[Name] | None = None
-    relative_stiffness: f.Three[f.NonNegative] = f.told("Of every rigid mount that gives none.", [0.0, 1.0, 1.0])
-    stiffness: f.Three[f.Stiffness] | None = f.told("Of every elastic mount that gives none.")
-    loss_factor: f.LossFactor = f.told("Of every elastic mount that gives none.", 0.0)
+    relative_stiffness: f.Three[f.NonNegative] = f.told(
+        "Relative stiffness along x, y, z of every mount that gives none; not for elastic mounts.", [0.0, 1.0, 1.0]
+    )
+    stiffness: f.Three[f.Stiffness] | None = f.told("Stiffness along x, y, z of every elastic mount that gives none.")
+    loss_factor: f.LossFactor = f.told("Stiffness along x, y, z of every elastic mount that gives none.", 0.0)
     stop: StopTable | None = None
     places: list[MountTable] = Field(default_factory=list)
 
@@ -245,9 +253,11 @@ class RunUpTable(Table):
     """From rest to a speed and back, through resonance."""
 
     up_to: f.Speed
-    time: f.Time = f.told("Of the run-up.", 3.0)
-    shut_down_time: f.Time | None = f.told("That of the run-up unless told.")
-    operating_point: str | None = f.told("Whose gas drives the engine meanwhile; the slowest unless told.")
+    time: f.Time = f.told("Time in which the engine runs up from rest.", 3.0)
+    shut_down_time: f.Time | None = f.told("Time in which the engine is shut down; by default that of the run-up.")
+    operating_point: str | None = f.told(
+        "Operating point whose gas drives the engine during the run; the slowest by default."
+    )
 
 
 def run_of(table: RunUpTable | None, block: Block | None, points: Sequence[str]) -> Run | None:

@@ -27,13 +27,15 @@ class OperatingPointTable(Table):
     name: Name | None = None
     speed: f.Speed | None = None
     mean_piston_speed: f.PistonSpeed | None = None
-    imep: f.Pressure | None = f.told("In place of that of [gas].")
-    bmep: f.PositivePressure | None = f.told("At the brake; [friction] makes imep of it, and of what it may be off.")
-    brake_torque: f.PositiveTorque | None = f.told("In place of bmep.")
-    motored: bool = f.told("The charge is compressed and gets no heat.", False)
-    gas: bool = f.told("false leaves the gas out altogether.", True)
-    up_to: f.Speed | None = f.told("Last speed of a range that starts at speed.")
-    steps: Annotated[int, Field(ge=2, le=1000)] | None = f.told("Speeds in the range.")
+    imep: f.Pressure | None = f.told("Indicated mean effective pressure at this point, in place of that of [gas].")
+    bmep: f.PositivePressure | None = f.told(
+        "Brake mean effective pressure; [friction] adds what friction takes, and its uncertainty."
+    )
+    brake_torque: f.PositiveTorque | None = f.told("Torque at the brake, in place of bmep.")
+    motored: bool = f.told("The charge is compressed without combustion.", False)
+    gas: bool = f.told("false: no gas at this point.", True)
+    up_to: f.Speed | None = f.told("Highest speed of a range that starts at speed.")
+    steps: Annotated[int, Field(ge=2, le=1000)] | None = f.told("Number of speeds in the range.")
     weight: f.Positive = 1.0
 
 

@@ -42,23 +42,27 @@ class IntervalsTable(Table):
 
     min: f.Angle | None = None
     max: f.Angle | None = None
-    largest_deviation: f.Angle | None = f.told("From equal intervals.")
+    largest_deviation: f.Angle | None = f.told("Largest deviation of an interval from equal firing.")
 
 
 class PhasingTable(Table):
     """How open throws, firing orders and shafts are decided."""
 
     phases: Annotated[int, Field(ge=1, le=96)] | None = f.told(
-        "Equal steps of a turn that throws stand on; those of even firing where left out."
+        "Equal steps of a turn on which throws may stand; by default those of even firing."
     )
-    intervals: IntervalsTable | None = f.told("Even firing where left out.")
-    best: Annotated[int, Field(ge=1, le=200)] = f.told("How many stars are ranked.", 10)
+    intervals: IntervalsTable | None = f.told("Bounds on firing intervals; even firing by default.")
+    best: Annotated[int, Field(ge=1, le=200)] = f.told("Number of crank stars in the ranking.", 10)
     rank_orders_by: list[Literal["roll moment", "neighbours", "longest gap"]] = Field(
-        default=["neighbours", "longest gap"], min_length=1, description="Of firing orders; the first counts most."
+        default=["neighbours", "longest gap"],
+        min_length=1,
+        description="What ranks the firing orders of a star; the first counts most.",
     )
-    most_shafts: Annotated[int, Field(ge=0, le=48)] | None = f.told("Optional balancer shafts that may be built.")
-    most_shaft_mass: f.Mass | None = f.told("Of the optional shafts that are built.")
-    time_limit: f.Time = f.told("Of the search.", 600.0)
+    most_shafts: Annotated[int, Field(ge=0, le=48)] | None = f.told(
+        "Largest number of optional balancer shafts that are built."
+    )
+    most_shaft_mass: f.Mass | None = f.told("Largest mass of the optional shafts that are built.")
+    time_limit: f.Time = f.told("Time after which the search ends with the best design so far.", 600.0)
     method: Literal["auto", "search", "program", "enumeration"] = "auto"
 
 

@@ -37,7 +37,10 @@ class SearchTable(Table):
     starts: int = Field(default=16, ge=1, le=10_000)
     seed: int = Field(default=0, ge=0)
     boxes: int | None = Field(
-        default=None, ge=0, le=1_000_000, description="That bounds of stiffness may be divided into for a proof."
+        default=None,
+        ge=0,
+        le=1_000_000,
+        description="Number of boxes into which bounds may be divided for a proof; 0 for none.",
     )
 
 
@@ -64,7 +67,7 @@ class ProblemFile(Table):
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
     objective: Annotated[list[ObjectiveTable], f.OneOrEach(ObjectiveTable)] | None = f.told(
-        "What is to be least; of several tables each among the designs that are best by those before it."
+        "What is minimised; of several tables in order, each among the designs that are best by those before it."
     )
     constraints: list[ConstraintTable] = Field(default_factory=list)
     fidelity: FidelityTable = Field(default_factory=FidelityTable)

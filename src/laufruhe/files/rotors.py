@@ -33,12 +33,12 @@ class CounterweightTable(Table):
 
     name: Name
     balance_factor: f.OpenFraction | None = f.told(
-        "kappa: rotating mass and this share of the reciprocating mass, opposite each throw."
+        "Share of the reciprocating mass that is balanced, with the rotating mass, opposite each throw."
     )
-    balance_fraction: f.OpenFraction | None = f.told("An earlier name of balance_factor.")
+    balance_fraction: f.OpenFraction | None = f.told("Earlier name of balance_factor.")
     throws: list[CylinderNumber] | None = None
     x: f.OpenLength | None = None
-    opposite_throw: CylinderNumber | None = f.told("Angle and place are counted from it.")
+    opposite_throw: CylinderNumber | None = f.told("Number of the throw from which angle and place are counted.")
     unbalance: f.OpenUnbalance | None = None
     mass: f.OpenMass | None = None
     radius: f.PositiveLength | None = None
@@ -77,10 +77,10 @@ class BalancerShaftTable(Table):
 
     name: Name
     ratio: f.Ratio
-    position: f.Pair[f.OpenLength] = Field(description="y and z of its axis.")
+    position: f.Pair[f.OpenLength] = Field(description="Position of the axis: y to the left, z up.")
     unbalances: list[UnbalanceTable] = Field(min_length=1)
-    optional: bool = f.told("Whether it is built is decided too.", False)
-    shaft_mass: f.Mass = f.told("Of an optional shaft, its unbalances not included.", 0.0)
+    optional: bool = f.told("Whether the shaft is built is decided too.", False)
+    shaft_mass: f.Mass = f.told("Mass of an optional shaft without its unbalances.", 0.0)
 
 
 @dataclass

@@ -26,8 +26,8 @@ from laufruhe.problem.sets import Interval
 class WebsTable(Table):
     """The two webs beside every pin."""
 
-    width: f.OpenPositiveLength = Field(description="Across the shaft.")
-    thickness: f.OpenPositiveLength = Field(description="Along the shaft.")
+    width: f.OpenPositiveLength = Field(description="Width of a web across the shaft.")
+    thickness: f.OpenPositiveLength = Field(description="Width along the shaft.")
 
 
 class ShankTable(Table):
@@ -44,22 +44,26 @@ class PistonPinTable(Table):
     bore: f.OpenNonNegativeLength = 0.0
     length: f.OpenPositiveLength
     in_bosses: Annotated[float, f.Number("", above=0.0, most=0.95)] = f.told(
-        "Share of the length that the bosses hold, the rod the rest.", 0.5
+        "Share of the length of the pin that the bosses hold.", 0.5
     )
-    span: f.PositiveLength | None = f.told("Between the middles of the bosses; by that share where left out.")
+    span: f.PositiveLength | None = f.told(
+        "Distance between the middles of the bosses; by default it follows from in_bosses."
+    )
 
 
 class BoltsTable(Table):
     """The bolts of every big end."""
 
     count: Annotated[int, Field(ge=1, le=12)] = 2
-    diameter: f.OpenPositiveLength = Field(description="At the root of the thread.")
+    diameter: f.OpenPositiveLength = Field(description="Diameter of a bolt at the root of the thread.")
 
 
 class RunningGearTable(Table):
-    """Sizes of the running gear that stresses hang on; crank pins are big ends, journals main bearings."""
+    """Sizes of webs, rods, bolts and piston pins, from which their stresses follow."""
 
-    density: f.Density | None = f.told("Adds the masses of these parts and of the crank pins to those of [engine].")
+    density: f.Density | None = f.told(
+        "Density of the parts; their masses and those of the crank pins are then added to those of [engine]."
+    )
     elastic_modulus: f.PositivePressure = STEEL
     webs: WebsTable | None = None
     rod: ShankTable | None = None

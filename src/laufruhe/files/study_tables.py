@@ -39,7 +39,7 @@ class SweepTable(Table):
     values: list[Value] | None = None
     first: End = Field(default=None, alias="from")
     last: End = Field(default=None, alias="to")
-    points: int | None = Field(default=None, description="Values from the first to the last.")
+    points: int | None = Field(default=None, description="Number of values from the first to the last.")
     spacing: Literal["linear", "log"] | None = None
 
 
@@ -58,9 +58,11 @@ class CaseTable(Table):
     name: Name
     problem: str
     set: dict[str, Value] = Field(default_factory=dict, description="Paths of the problem file and their new values.")
-    without: list[str] = Field(default_factory=list, description="Tables left out, as balancer_shafts or gas.")
+    without: list[str] = Field(
+        default_factory=list, description="Tables that are left out, such as balancer_shafts or gas."
+    )
     equal_power_to: Annotated[int, Field(ge=1, le=48)] | None = Field(
-        default=None, description="Rebuilt to the power that this many of its cylinders have."
+        default=None, description="The engine is rebuilt with the power of this many of its cylinders."
     )
 
 

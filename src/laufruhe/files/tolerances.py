@@ -43,22 +43,24 @@ RESIDUAL = "tolerances.residual_unbalance"
 
 
 class TolerancesTable(Table):
-    """What of a built engine has no number in the drawing that it could be off from."""
+    """Tolerances of built engines that are not those of a number in this file."""
 
     residual_unbalance: str | None = Field(
         default=None, description="Left on the crankshaft by balancing: an unbalance on each plane, or a grade of "
         "ISO 21940-11 for all of them together.", examples=["G 6.3", "50 g cm"],
     )  # fmt: skip
-    rotor_mass: f.PositiveMass | None = f.told("That the grade is of: crankshaft, flywheel, clutch.")
-    planes: int = Field(default=2, ge=1, le=48, description="Of balancing, from the first throw to the last.")
+    rotor_mass: f.PositiveMass | None = f.told("Mass of the rotor that has the grade: crankshaft, flywheel, clutch.")
+    planes: int = Field(
+        default=2, ge=1, le=48, description="Number of balancing planes, from the first throw to the last."
+    )
     law: Literal["uniform", "normal"] = "uniform"
 
 
 class RobustTable(Table):
-    """Of which built engines what is minimised and limited is taken."""
+    """Design for engines as built: for the worst case within the tolerances, or for a share of them."""
 
     over: str = Field(default="worst case", description='"worst case", or a share of engines such as "95 %".')
-    engines: int = Field(default=1000, ge=20, le=100_000, description="Drawn where a share is minimised.")
+    engines: int = Field(default=1000, ge=20, le=100_000, description="Number of engines that are drawn.")
     seed: int = Field(default=1, ge=0)
 
 

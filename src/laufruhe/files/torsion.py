@@ -34,11 +34,11 @@ class PieceTable(Table):
 
 
 class SectionTable(Table):
-    """What is told of any shaft between two discs."""
+    """What any shaft between two discs has."""
 
-    pieces: list[PieceTable] = f.told("One behind another, in place of the stiffness.", [])
+    pieces: list[PieceTable] = f.told("Round pieces, one behind another, in place of the stiffness.", [])
     diameter: f.PositiveLength | None = f.told(
-        "Of its weakest place; needed for a stress. That of the pieces if left out."
+        "Diameter of the weakest section, needed for a stress; by default that of the pieces."
     )
     bore: f.NonNegativeLength = 0.0
     damping: f.TorsionalDamping = 0.0
@@ -63,8 +63,8 @@ class DiscTable(Table):
     name: Name
     end: Literal["front", "rear"]
     inertia: f.OpenInertia
-    damping: f.TorsionalDamping = Field(default=0.0, description="Against the block.")
-    shaft: ShaftTable = Field(description="From this disc to the next towards the throws.")
+    damping: f.TorsionalDamping = Field(default=0.0, description="Viscous damping against the block.")
+    shaft: ShaftTable = Field(description="Shaft from this disc to the next one towards the throws.")
 
 
 class AbsorberTable(Table):
@@ -76,19 +76,23 @@ class AbsorberTable(Table):
     damping: f.OpenTorsionalDamping = 0.0
     stiffness: f.OpenTorsionalStiffness | None = None
     loss_factor: f.LossFactor = 0.0
-    order: f.Positive | None = f.told("That a pendulum is tuned to.")
+    order: f.Positive | None = f.told("Order to which a pendulum is tuned.")
     damping_ratio: f.NonNegative = 0.0
 
 
 class TorsionTable(Table):
-    """Discs and shafts that the crankshaft twists between."""
+    """Discs and shafts of the torsional system of the crankshaft."""
 
-    throw_inertia: f.Inertias = Field(description="Of pin, webs and counterweights, without rods and pistons.")
-    cylinder_damping: f.TorsionalDampings = f.told("Of every throw, against the block.", [0.0])
-    loss_factor: f.LossFactor = f.told("Of every shaft that has none of its own.", 0.0)
+    throw_inertia: f.Inertias = Field(
+        description="Moment of inertia of a throw: pin, webs and counterweights, without rod and piston."
+    )
+    cylinder_damping: f.TorsionalDampings = f.told("Viscous damping of every throw against the block.", [0.0])
+    loss_factor: f.LossFactor = f.told("Hysteretic loss factor of every shaft that has none of its own.", 0.0)
     shear_modulus: f.PositivePressure = STEEL
-    speeds: f.Pair[f.Speed] | None = f.told("Range over which the response is shown and speeds are barred.")
-    output: str | None = f.told("Disc where the load takes its torque; the last one where left out.")
+    speeds: f.Pair[f.Speed] | None = f.told(
+        "Range of speeds in which the response is shown and barred speeds are looked for."
+    )
+    output: str | None = f.told("Disc at which the load takes its torque; the last one by default.")
     crank: CrankTable | None = None
     discs: list[DiscTable] = Field(default_factory=list)
     absorbers: list[AbsorberTable] = Field(default_factory=list)

@@ -30,9 +30,7 @@ else:
 class StudyTable(Table):
     """What a study consists of."""
 
-    common: dict[str, Any] = Field(
-        default_factory=dict, description="Keys that every part has; it may give its own, and tables are joined."
-    )
+    common: dict[str, Any] = Field(default_factory=dict, description="Keys of every part that does not give its own.")
     parts: list[AnyPart] = Field(min_length=1)
 
     @model_validator(mode="before")

@@ -30,7 +30,7 @@ _WORDS = 4
 class Sampled(Part):
     """Cases with many draws each, all with the same random numbers."""
 
-    draws: Annotated[int, Field(ge=1, le=MOST_DRAWS)] = Field(description="Of each case.")
+    draws: Annotated[int, Field(ge=1, le=MOST_DRAWS)] = Field(description="Number of draws of each case.")
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1964
     chunk: Annotated[int | None, Field(ge=1, le=1_000_000)] = Field(
         default=None, description="Draws in one piece of work."

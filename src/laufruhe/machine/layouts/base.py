@@ -37,7 +37,11 @@ class Key:
     remedy: str = ""
 
 
-SPACING = Key("cylinder_spacing", "positive length", "Between throws; in a boxer, of a bank.")
+SPACING = Key(
+    "cylinder_spacing",
+    "positive length",
+    "Distance between neighbouring throws; in a boxer between neighbours of a bank.",
+)
 
 
 @dataclass(frozen=True)

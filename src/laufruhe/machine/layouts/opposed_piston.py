@@ -61,9 +61,13 @@ class OpposedPiston(Inline):
     name = "opposed-piston"
     keys = (
         SPACING,
-        Key("crank_distance", "positive length", "Of the two cranks of opposed pistons."),
-        Key("crank_ratio", "sign", "Of the second crank of opposed pistons; -1, against the first, where left out."),
-        Key("crank_lead", "angle", "By which the second crank of opposed pistons leads.", 0.0),
+        Key("crank_distance", "positive length", "Distance of the two cranks of opposed pistons."),
+        Key(
+            "crank_ratio",
+            "sign",
+            "Speed ratio of the second crank of opposed pistons; -1 by default, against the first.",
+        ),
+        Key("crank_lead", "angle", "Angle by which the pistons of the second crank of opposed pistons lead.", 0.0),
     )
     openable = ()
 

@@ -93,12 +93,24 @@ class Radial(LayoutKind):
 
     name = "radial"
     keys = (
-        Key("knuckle_radius", "non-negative length", "From the crank pin to the knuckle pins of the master rod."),
-        Key("master_cylinder", "cylinder", "Its rod is the master rod; 1 where left out."),
-        Key("knuckle_angles", "angles", "Of every knuckle pin from the master rod; those of the banks where left out."),
-        Key("articulated_rod_length", "positive length", "Such that all pistons come equally high where left out."),
-        Key("articulated_rod", "rod", "An articulated rod as a rigid body, from its knuckle pin."),
-        Key("knuckle_mass", "mass", "At every knuckle pin, beside the share of articulated_rod.", 0.0),
+        Key(
+            "knuckle_radius",
+            "non-negative length",
+            "Distance of the knuckle pins of the master rod from the crank pin.",
+        ),
+        Key("master_cylinder", "cylinder", "Number of the cylinder with the master rod; 1 by default."),
+        Key(
+            "knuckle_angles",
+            "angles",
+            "Angle of every knuckle pin from the master rod; by default those of the cylinders.",
+        ),
+        Key(
+            "articulated_rod_length",
+            "positive length",
+            "Length of the articulated rods; by default such that all pistons reach the same height.",
+        ),
+        Key("articulated_rod", "rod", "Articulated rod as a rigid body, counted from its knuckle pin."),
+        Key("knuckle_mass", "mass", "Mass at every knuckle pin, beside the share of articulated_rod.", 0.0),
     )
     lists = ("firing_order",)
     openable = ("firing_order",)

@@ -54,11 +54,11 @@ class Rotary(Inline):
     has_pistons = False
     keys = (
         SPACING,
-        Key("eccentricity", "positive length", "Of the shaft under every rotor."),
-        Key("rotor_radius", "positive length", "From a rotor's centre to its apexes."),
-        Key("rotor_width", "positive length", "Along the shaft."),
-        Key("rotor_mass", "mass", "Of a rotor with its seals; rotating_mass is the eccentric's."),
-        Key("rotor_inertia", "inertia", "Of a rotor about its centre.", 0.0),
+        Key("eccentricity", "positive length", "Eccentricity of the shaft under every rotor."),
+        Key("rotor_radius", "positive length", "Distance from a rotor's centre to its apexes."),
+        Key("rotor_width", "positive length", "Width along the shaft."),
+        Key("rotor_mass", "mass", "Mass of a rotor with its seals; rotating_mass is that of the eccentric."),
+        Key("rotor_inertia", "inertia", "Moment of inertia of a rotor about its centre.", 0.0),
     )
 
     def cycle(self, said: Cycle) -> Cycle:

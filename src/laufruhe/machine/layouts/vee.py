@@ -48,10 +48,10 @@ class Vee(LayoutKind):
     keys = (
         SPACING,
         Key(
-            "bank_angle", "open angle", "Between the banks of a vee.",
+            "bank_angle", "open angle", "Angle between the banks of a vee.",
             remedy="add the angle between the banks, or its bounds",
         ),
-        Key("split_pin_angle", "open angle", "By which the right bank's pin leads."),
+        Key("split_pin_angle", "open angle", "Angle by which the right bank's crank pin leads."),
         STAGGER,
     )  # fmt: skip
     openable = ("throws", "firing_order", "bank_angle", "split_pin_angle")

@@ -37,7 +37,7 @@ def shaft_groups(problem: Problem) -> list[tuple[str, ...]]:
 
 
 class BalancerSizing(SweptPart):
-    """Engines with and without each of their balancer shafts, each at its proven optimum."""
+    """Engines with and without each of their balancer shafts, every set at its proven optimum."""
 
     kind: Literal["balancer sizing"]
 

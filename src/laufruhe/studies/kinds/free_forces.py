@@ -82,7 +82,7 @@ def printed_agree(data: xr.Dataset) -> tuple[int, int]:
 
 
 class LiteratureTable(Table):
-    """Printed free forces and couples, over those of one cylinder."""
+    """Published free forces and couples, relative to those of one cylinder."""
 
     force_1: f.NonNegative | None = None
     couple_1: f.NonNegative | None = None
@@ -102,7 +102,7 @@ class FreeForces(Part):
     kind: Literal["free forces"]
     cases: list[FreeForcesCase] = Field(min_length=1)  # type: ignore[assignment]
     spacing: f.PositiveLength = Field(description="Unit of length of the couples: the distance of the throws.")
-    digits: Annotated[int, Field(ge=0, le=12)] = Field(default=4, description="Printed after the point.")
+    digits: Annotated[int, Field(ge=0, le=12)] = Field(default=4, description="Digits after the decimal point.")
 
     def settings(self) -> dict[str, Any]:
         """The unit of length alone: what is printed elsewhere changes nothing."""

@@ -35,7 +35,9 @@ class RandomScenes(Sampled):
     """Numbers of the problem file drawn at random; every scene decided as `solve` does."""
 
     kind: Literal["random scenes"]
-    vary: list[DrawnTable] = Field(min_length=1, max_length=20, description="What is drawn, each evenly and by itself.")
+    vary: list[DrawnTable] = Field(
+        min_length=1, max_length=20, description="Quantities that are drawn, each uniformly and independently."
+    )
     own_chunk: ClassVar[int] = 1000
 
     def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:

@@ -38,7 +38,7 @@ MOST_SPEEDS, MOST_ORDERS, PRESENT = 20_000, 8, 0.01
 
 
 class SpeedsTable(f.Table):
-    """Crank speeds: so many, or in steps, from the lower to the higher."""
+    """Crank speeds from the lower to the higher, by their number or by steps."""
 
     first: f.Speed = Field(alias="from")
     last: f.Speed = Field(alias="to")
@@ -67,7 +67,7 @@ class MeasureTable(QuantityTable):
     """One line of the map."""
 
     quantity: QuantityName
-    limit: str | None = Field(default=None, description="Drawn beside those of the problem.")
+    limit: str | None = Field(default=None, description="Limit that is drawn beside those of the problem.")
 
 
 class SpeedMap(Part):
@@ -76,11 +76,16 @@ class SpeedMap(Part):
     kind: Literal["speed map"]
     speeds: SpeedsTable
     measures: list[MeasureTable] = Field(
-        default_factory=list, description="In place of all that the problem minimises or limits and speed changes."
+        default_factory=list,
+        description="Measures of the map; by default all that the problem minimises or limits.",
     )
-    operating_point: str | None = Field(default=None, description="Whose load is kept; the first where left out.")
+    operating_point: str | None = Field(
+        default=None, description="Operating point whose load is kept at every speed; the first by default."
+    )
     designs: list[DesignName] = Field(default=["as given", "as decided"], min_length=1)
-    by_order: bool = Field(default=False, description="Also the amplitude of every order of the first measure.")
+    by_order: bool = Field(
+        default=False, description="Whether the amplitude of every order of the first measure is shown too."
+    )
 
     def points(self, scenes: Scenes) -> list[Point]:
         """A case each: what is decided does not hang on the speeds."""

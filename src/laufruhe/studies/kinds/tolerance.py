@@ -49,10 +49,12 @@ LEAST, TALL = 0.1, 0.7
 
 
 class TolerancesTable(Table):
-    """How far a built engine may stand from its drawing."""
+    """How far a built engine may differ from its drawing."""
 
-    reciprocating_mass: f.Mass = Field(default=0.0, description="Of each cylinder, either way.")
-    unbalance: f.Unbalance = Field(default=0.0, description="Left on each balancing plane, at any angle.")
+    reciprocating_mass: f.Mass = Field(
+        default=0.0, description="Tolerance of the reciprocating mass of each cylinder, either way."
+    )
+    unbalance: f.Unbalance = Field(default=0.0, description="Unbalance left on each balancing plane, at any angle.")
     planes: Annotated[int, Field(ge=1, le=48)] = 2
     alignment: f.NonNegativeLength = Field(default=0.0, description="Eccentricity of each aligned mass.")
     aligned_masses: list[f.Mass] = Field(
@@ -184,11 +186,13 @@ _RANDOM = {
 class ToleranceCase(CaseTable):
     """One engine, and what the source says of finer balancing for it."""
 
-    claim: Literal["promises nothing", "matters"] | None = Field(default=None, description="Of finer balancing.")
+    claim: Literal["promises nothing", "matters"] | None = Field(
+        default=None, description="What the source says of finer balancing."
+    )
 
 
 class MarkTable(Table):
-    """A force that a picture shows beside ours."""
+    """A force that the picture shows beside those computed."""
 
     name: Name
     force: f.Force
@@ -200,7 +204,9 @@ class Tolerance(Part):
     kind: Literal["tolerance"]
     cases: list[ToleranceCase] = Field(min_length=1)  # type: ignore[assignment]
     tolerances: TolerancesTable
-    engines: Annotated[int, Field(ge=100, le=1_000_000)] = Field(default=10_000, description="Built at random.")
+    engines: Annotated[int, Field(ge=100, le=1_000_000)] = Field(
+        default=10_000, description="Number of engines that are drawn."
+    )
     seed: Annotated[int, Field(ge=0)] = 1964
     marks: list[MarkTable] = Field(default_factory=list)
 

@@ -13,7 +13,8 @@ from laufruhe.studies.picture import SERIES
 
 Expression: TypeAlias = int | float | str
 Each: TypeAlias = Annotated[
-    dict[str, list[int | float | str]], Field(alias="for", description="Drawn once for every value of one name.")
+    dict[str, list[int | float | str]],
+    Field(alias="for", description="Name and values: it is drawn once for every value."),
 ]
 
 
@@ -28,7 +29,7 @@ EXPRESSIONS = frozenset({"x", "y", "ends", "filled", "outline", "value", "is", "
 
 
 class GridTable(Table):
-    """Numbers listed, or so many between two ends."""
+    """Numbers: listed, or equally spaced between two ends."""
 
     values: list[int | float] | None = None
     first: int | float | None = Field(default=None, alias="from")
@@ -47,7 +48,7 @@ class ReplicaCase(CaseTable):
     """One scene, its numbers in place of those of the part."""
 
     problem: str = Field(description="A name under problems, or a problem file.")
-    numbers: dict[str, Any] = Field(default_factory=dict, description="In place of those of the study.")
+    numbers: dict[str, Any] = Field(default_factory=dict, description="Numbers in place of those of the part.")
     sweep: dict[str, GridTable] = Field(default_factory=dict, description="Numbers that take several values.")
 
 
@@ -56,7 +57,9 @@ class StatementTable(Table):
 
     text: Annotated[str, Field(min_length=1)]
     where: str = Field(default="", description="Figure, page or equation.")
-    printed: str | None = Field(default=None, description="As the source has it; left out where ours goes beyond it.")
+    printed: str | None = Field(
+        default=None, description="Words or number of the source; without it the statement is not counted."
+    )
     value: str
     unit: str = ""
     expected: Expression | None = Field(default=None, alias="is", description="Printed number in that unit.")
@@ -80,10 +83,12 @@ class AxisTable(Table):
 
     label: str = ""
     ends: list[Expression] | None = Field(default=None, min_length=2, max_length=2)
-    names: list[str] | str | None = Field(default=None, description="Of the places 0, 1, 2 ..., in place of numbers.")
+    names: list[str] | str | None = Field(
+        default=None, description="Names of the places 0, 1, 2 ..., in place of numbers."
+    )
     ticks: list[int | float] | None = None
     log: list[Annotated[float, Field(ge=1.0, lt=10.0)]] = Field(
-        default_factory=list, description="First figures of the ticks of a logarithmic axis."
+        default_factory=list, description="First digits of the ticks of a logarithmic axis."
     )
 
 
@@ -92,11 +97,11 @@ class CurveTable(Table):
 
     y: Expression
     x: Expression | None = Field(
-        default=None, description="The dimension of y where left out; a name means its places."
+        default=None, description="Place along the horizontal axis; by default the dimension of y."
     )
     each: Each = Field(default_factory=dict, alias="for")
     label: str = ""
-    end: str = Field(default="", description="Words at the last point.")
+    end: str = Field(default="", description="Words beside the last point.")
     colours: list[Hue] = Field(default=list(SERIES), min_length=1)  # type: ignore[arg-type]
     width: Points = 2.0
     dash: list[Points] = Field(default_factory=list, max_length=2)
@@ -114,7 +119,7 @@ class BarsTable(Table):
     number: str = Field(
         default="",
         pattern=r"^(#?(\.\d)?[efg])?$",
-        description="Format of the numbers on the bars; three figures where left out.",
+        description="Format of the numbers on the bars; three figures by default.",
     )
     colours: list[Hue] = Field(default=["grey", "sky", "orange", "blue", "vermilion", "green"], min_length=1)
 
@@ -140,7 +145,7 @@ class AreaTable(Table):
 
 
 class PanelTable(Table):
-    """What shares two axes; drawn once for every reading."""
+    """A panel with two axes, drawn once for every reading."""
 
     title: str = ""
     once: bool = Field(default=False, description="Whether one drawing serves all readings.")
@@ -157,7 +162,9 @@ class PictureTable(Table):
 
     title: str | None = None
     words: str = ""
-    size: list[Inches] = Field(default=[7.2, 4.0], min_length=2, max_length=2, description="Of a panel [inch].")
+    size: list[Inches] = Field(
+        default=[7.2, 4.0], min_length=2, max_length=2, description="Width and height of a panel, in inches."
+    )
     columns: Annotated[int, Field(ge=1, le=8)] = 1
     gap: Annotated[float, Field(ge=0.0, le=5.0)] = 0.7
     panels: list[PanelTable] = Field(min_length=1, max_length=24)

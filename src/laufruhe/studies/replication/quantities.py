@@ -44,7 +44,9 @@ class AskedTable(QuantityTable):
     """A quantity of every case, narrowed."""
 
     quantity: str
-    of: list[str] | None = Field(default=None, description="Counterweights or balancers whose mass counts.")
+    of: list[str] | None = Field(
+        default=None, description="Names of the counterweights or balancers whose mass counts."
+    )
 
 
 @dataclass(frozen=True)
