@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,13 @@ import pytest
 
 from cli import scenes
 from laufruhe.files.reader import load
-from laufruhe.present.pictures import PRINTED, PRINTED_SHEETS, SHEETS
+from laufruhe.physics.torsion import chain_of, shaft_torque
+from laufruhe.present.pictures import CURVES, PRINTED, PRINTED_SHEETS, SHEETS
 from laufruhe.problem.evaluation import measured
+from laufruhe.report import curves
 from laufruhe.report.sections import SECTIONS
-from laufruhe.report.tables import Sheet, sheets_of, write_book, write_tables
+from laufruhe.report.sheet import Sheet
+from laufruhe.report.tables import sheets_of, write_book, write_tables
 from laufruhe.solvers import Result, solve, state
 from problem_files import PROBLEMS, loaded
 
@@ -107,7 +111,7 @@ def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
 
 
 def test_names_are_known_before_anything_is_made(result: Result) -> None:
-    assert set(sheets_of(result)) <= {*SHEETS, *PRINTED_SHEETS}
+    assert set(sheets_of(result)) <= {*SHEETS, *CURVES, *PRINTED_SHEETS}
     known = {section.__name__.rpartition(".")[2] for section in SECTIONS}
     # every section of a report is a file: in full precision, or as it is printed
     assert known - set(PRINTED) == {"stars", "decisions", "limits", "mounts", "modes", "orders"}
@@ -116,9 +120,32 @@ def test_names_are_known_before_anything_is_made(result: Result) -> None:
 
 @pytest.mark.slow
 def test_what_only_the_report_knows_is_a_file_too() -> None:
-    found = sheets_of(state(load(PROBLEMS / "inline-five-torsion.toml")))
-    assert {"table-torque", "table-torsion", "table-torsion-2"} <= set(found) <= {*SHEETS, *PRINTED_SHEETS}
+    result = state(load(PROBLEMS / "inline-five-torsion.toml"))
+    found = sheets_of(result)
+    assert {"table-torque", "table-torsion", "table-torsion-2"} <= set(found) <= {*SHEETS, *CURVES, *PRINTED_SHEETS}
     assert any(isinstance(cell, float) for row in found["table-torque"].rows for cell in row)
+    assert set(curves.CURVES) == set(CURVES)
+    # at every speed of the curve the torque is that of the operating point, were it there
+    sheet = found["twist-response"]
+    chain = chain_of(result.final.engine)
+    assert sheet.head[1:] == [f"as given: alternating torque in {section.name} [N m]" for section in chain.sections]
+    speeds, torque = np.array(sheet.rows)[:, 0], np.array(sheet.rows)[:, 1:]
+    k = len(speeds) // 2
+    point = replace(result.problem.points[0], speed=float(speeds[k]) * math.tau / 60.0)
+    signal = shaft_torque(result.final.engine, point, result.problem.fidelity).sample(2880)
+    assert torque[k] == pytest.approx(0.5 * np.ptp(signal, axis=0), rel=2e-3)
+    modes = found["twist-modes"].rows
+    assert len(modes) == len(chain.discs) * len({row[1] for row in modes})
+    assert max(abs(row[4]) for row in modes) == pytest.approx(1.0)
+    assert len(found["critical-speeds"].rows) > len(found["table-torsion-2"].rows)
+    work = np.array([row[found["torque"].head.index("as given: work stored [J]")] for row in found["torque"].rows])
+    whole = np.array([row[found["torque"].head.index("as given: torque of all [N m]")] for row in found["torque"].rows])
+    # the work is what the torque does beyond its mean
+    half = len(work) // len(result.problem.points)
+    step = result.final.engine.cycle.angle / half
+    beyond = whole[:half] - whole[:half].mean()
+    done = np.cumsum(0.5 * (beyond + np.roll(beyond, 1))) * step
+    assert np.ptp(done - work[:half]) < 1e-3 * np.ptp(work[:half])
 
 
 def test_pages_of_a_workbook_have_names_that_it_takes(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from laufruhe.errors import Complaint, InputError
-from laufruhe.present.pictures import PICTURES, PRINTED_SHEETS, SHEETS
+from laufruhe.present.pictures import CURVES, PICTURES, PRINTED_SHEETS, SHEETS
 
 try:
     import fcntl
@@ -32,7 +32,7 @@ KINDS = ("png", "svg")
 RESULT_FILES = (
     RESULT, REPORT, PAGE, BOOK, MOTION,
     *(f"{name}.{kind}" for name in PICTURES for kind in KINDS),
-    *(f"{name}.csv" for name in (*SHEETS, *PRINTED_SHEETS)),
+    *(f"{name}.csv" for name in (*SHEETS, *CURVES, *PRINTED_SHEETS)),
 )  # fmt: skip
 MADE = ".laufruhe.json"
 """What stands in a folder of results beside them: the command that made them, and their names."""

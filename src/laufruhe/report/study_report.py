@@ -12,8 +12,8 @@ from laufruhe.report import files, tables
 from laufruhe.report.document import Block, Bullets, Document, Heading, Illustration, Paragraph
 from laufruhe.report.grid import Grid
 from laufruhe.report.markdown import rendered
+from laufruhe.report.sheet import Sheet
 from laufruhe.report.strict_json import strict
-from laufruhe.report.tables import Sheet
 from laufruhe.report.web_page import as_html
 from laufruhe.studies.part import Part
 from laufruhe.studies.picture import Picture

@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import astuple, fields
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from laufruhe.physics.run_up import RunUp
 from laufruhe.present.measures import has_loads, has_ranking, limits_of, load_designs, places_of, ranking_of
@@ -18,31 +18,18 @@ from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.pictures import MOST_PRINTED, PRINTED, SHEETS
 from laufruhe.present.run_up import shown_runs
 from laufruhe.present.speed_curves import speeds_of, transmissibility_of
-from laufruhe.problem.curves import STEPS, Fields, forces_of, modes_of, orders_of
+from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.report import files
+from laufruhe.report.curves import CURVES
 from laufruhe.report.sections import SECTIONS
+from laufruhe.report.sheet import Sheet
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
 from laufruhe.units import readable
 
-Cells: TypeAlias = list[Any]
 RPM, DEGREE = readable("rad/s")[1], readable("rad")[1]
 MOST_ROWS = 20 * STEPS
 _WHENEVER = datetime(2000, 1, 1, tzinfo=UTC)
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """Heads with their units, and rows of numbers and names."""
-
-    head: Sequence[str]
-    rows: Sequence[Cells]
-
-    @classmethod
-    def of(cls, found: Fields) -> Sheet:
-        """Of labelled fields."""
-        head, rows = found.table()
-        return cls(head, list(rows))
 
 
 def sheets_of(result: Result) -> dict[str, Sheet]:
@@ -173,7 +160,7 @@ def _loaded(result: Result) -> Mapping[str, Evaluation]:
 _FILLED = (
     _decisions, _limits, _measures, _forces, _orders, _modes, _transmissibility, _run_up, _rankings,
 )  # fmt: skip
-_SHEETS = dict(zip(SHEETS, _FILLED, strict=True))
+_SHEETS = dict(zip(SHEETS, _FILLED, strict=True)) | CURVES
 
 
 def write_tables(result: Result, folder: Path) -> None:

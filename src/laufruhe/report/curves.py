@@ -1,0 +1,138 @@
+"""Curves of pictures as sheets: torque over a cycle, twist over speed, modes of the crankshaft, shares of engines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.irregularity import swing_of
+from laufruhe.physics.reduced_inertia import turning_inertia
+from laufruhe.physics.torque import torque_parts
+from laufruhe.physics.torsion import chain_of
+from laufruhe.present.measures import Array, has_loads, has_ranking, objective_unit, ranking_of
+from laufruhe.present.torque import asks_torque
+from laufruhe.present.torsion import facts_of, is_twisted, speed_range, speeds_between, torque_over_speed
+from laufruhe.problem.curves import STEPS
+from laufruhe.report.sheet import Sheet
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.robust_result import SHARES
+from laufruhe.units import readable
+
+RPM = readable("rad/s")[1]
+
+
+def _torque(result: Result) -> Sheet | None:
+    """Torque part by part, the work that it stores and the speed that it makes, of every design and point."""
+    if not (asks_torque(result) and has_loads(result)):
+        return None
+    points, fidelity = result.problem.points, result.problem.fidelity
+    angles = result.final.engine.cycle.angle * np.arange(STEPS) / STEPS
+    found = [
+        {f"{name}: {of}": values for name, design in result.designs.items()
+         for of, values in _torques(design.engine, point, fidelity, angles).items()}
+        for point in points
+    ]  # fmt: skip
+    # without gas at one point there is none of that part
+    names = list(dict.fromkeys(name for columns in found for name in columns))
+    rows = [
+        [point.name, *row]
+        for point, columns in zip(points, found, strict=True)
+        for row in np.column_stack([np.degrees(angles), *(columns.get(name, 0.0 * angles) for name in names)]).tolist()
+    ]
+    return Sheet(["point", "angle [deg]", *names], rows)
+
+
+def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: Array) -> dict[str, Array]:
+    """Columns of one design at one point; no speed of a crank that would stop."""
+    parts = torque_parts(engine, point, fidelity)
+    work = parts["all"].integral.values(angles)
+    columns = {f"torque of {part} [N m]": torque.values(angles) for part, torque in parts.items()}
+    columns["work stored [J]"] = work - work.min()
+    swing, inertia = swing_of(engine, point, fidelity), turning_inertia(engine, fidelity)
+    if inertia is not None and swing.irregularity(inertia) <= 1.0:
+        speeds = RPM * swing.speeds(inertia)[: len(swing.work)]
+        at = engine.cycle.angle * np.arange(len(speeds)) / len(speeds)
+        columns["speed [rpm]"] = np.interp(angles, at, speeds, period=engine.cycle.angle)
+    return columns
+
+
+def _twist_response(result: Result) -> Sheet | None:
+    """Half of the peak to peak torque in every section of the crankshaft, over its speed."""
+    if not is_twisted(result):
+        return None
+    speeds = speeds_between(result.final, *speed_range(result))
+    head, columns = ["speed [rpm]"], [RPM * speeds]
+    for name, design in result.designs.items():
+        sections = [section.name for section in chain_of(design.engine).sections]
+        head += [f"{name}: alternating torque in {section} [N m]" for section in sections]
+        columns += list(torque_over_speed(design, speeds).T)
+    return Sheet(head, np.column_stack(columns).tolist())
+
+
+def _twist_modes(result: Result) -> Sheet | None:
+    """Swing of every disc in every natural mode of the crankshaft."""
+    if not is_twisted(result):
+        return None
+    rows = []
+    for name, design in result.designs.items():
+        modes = facts_of(design, *speed_range(result)).modes
+        discs = [disc.name for disc in chain_of(design.engine).discs]
+        for m, frequency in enumerate(modes.frequencies.tolist()):
+            rows += [
+                [name, m + 1, frequency, disc, swing]
+                for disc, swing in zip(discs, modes.shapes[:, m].tolist(), strict=True)
+            ]
+    return Sheet(["design", "mode", "natural frequency [Hz]", "disc", "swing"], rows)
+
+
+def _critical_speeds(result: Result) -> Sheet | None:
+    """Where orders meet natural modes of the crankshaft: all of them."""
+    if not is_twisted(result):
+        return None
+    rows = [
+        [name, RPM * each.speed, each.order, each.mode, each.vector_sum, each.is_main,
+         math.nan if each.torque is None else each.torque]
+        for name, design in result.designs.items()
+        for each in facts_of(design, *speed_range(result)).criticals
+    ]  # fmt: skip
+    head = ["design", "speed [rpm]", "order", "mode", "vector sum", "main order", "torque [N m]"]
+    return Sheet(head, rows) if rows else None
+
+
+def _uneven_firing(result: Result) -> Sheet | None:
+    """What deviations from even firing buy, and what no design with them goes under."""
+    if not has_ranking(result) or not ranking_of(result).trade:
+        return None
+    unit = objective_unit(result) or "-"
+    rows = [
+        [math.degrees(one.allowed), math.degrees(one.deviation), one.value, one.lower_bound]
+        for one in ranking_of(result).trade
+    ]
+    return Sheet(["allowed deviation [deg]", "deviation [deg]", f"objective [{unit}]", f"not under [{unit}]"], rows)
+
+
+def _shares(result: Result) -> Sheet | None:
+    """Share of engines built, or of assemblies, that stay below a value."""
+    unit, columns = objective_unit(result) or "-", dict[str, list[float]]()
+    if result.robust is not None:
+        columns["best drawing"] = list(result.robust.nominal.quantiles)
+        columns["decided"] = list(result.robust.robust.quantiles)
+    if result.assembly is not None:
+        columns["assemblies at random"] = list(result.assembly.quantiles)
+    rows = [[100.0 * share, *values] for share, *values in zip(SHARES, *columns.values(), strict=True)]
+    return Sheet(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows) if columns else None
+
+
+CURVES: dict[str, Callable[[Result], Sheet | None]] = {
+    "torque": _torque,
+    "twist-response": _twist_response,
+    "twist-modes": _twist_modes,
+    "critical-speeds": _critical_speeds,
+    "uneven-firing": _uneven_firing,
+    "shares": _shares,
+}
+"""By the name of the file."""
