@@ -109,7 +109,7 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
         raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
     if kind.is_free:
         parts = _free_parts(table)
-        return parts, tuple(Throw(p.x, p.throw, (k,)) for k, p in enumerate(parts) if p.shaft == CRANKSHAFT)
+        return parts, tuple(Throw(p.x, p.throw, (k,), shaft=p.shaft) for k, p in enumerate(parts))
     asked, layout = _asked(table, gas), layout_of(table)
     throws = _throws(table, layout)
     with blamed_on("engine.firing_order" if table.given_order else "engine"):

@@ -24,14 +24,18 @@ _HOW = {"equal": (1.0, False), "opposite": (-1.0, False), "mirrored": (1.0, True
 _UNITS = {"unbalance": "kg m", "mass": "kg"}
 
 
+EVERY = "every"
 FACTORS = ("balance_factor", "balance_fraction")
 """Names of the balance factor (C9), the earlier one last."""
 
 
 class CounterweightTable(Table):
-    """A counterweight on the crankshaft, or one opposite every throw."""
+    """A counterweight on a crankshaft, or one opposite every throw."""
 
     name: Name
+    shaft: str = f.told(
+        'Shaft that it turns with; "every" puts a balance factor opposite the throws of all shafts.', CRANKSHAFT.name
+    )
     balance_factor: f.OpenFraction | None = f.told(
         "Share of the reciprocating mass that is balanced, with the rotating mass, opposite each throw."
     )
@@ -119,17 +123,29 @@ class RotorList:
 def counterweights(
     tables: Sequence[CounterweightTable], cylinders: Sequence[SliderCrank], throws: Sequence[Throw], into: RotorList
 ) -> None:
-    """Counterweights on the crankshaft: opposite every throw, or one at a time."""
+    """Counterweights on shafts with throws: opposite every throw, or one at a time."""
     pins = [_pin_of(throw, cylinders) for throw in throws]
     for k, table in enumerate(tables):
         where = f"counterweights[{k + 1}]"
+        own = _pins_on(table, pins, where)
         if table.factor_key is not None:
             if not all(part.is_balanced_by_share for part in cylinders):
                 rule = "is a share of a mass at a crank pin, and the ram of a swinging yoke does not move as one"
                 raise Refused(f"{where}.{table.factor_key}", None, rule, "give the weight an unbalance, or a mass")
-            _opposite_throws(table, pins, where, into)
+            _opposite_throws(table, own, where, into)
         else:
-            _single_counterweight(table, pins, where, into)
+            _single_counterweight(table, own, where, into)
+
+
+def _pins_on(table: CounterweightTable, pins: Sequence[_Pin], where: str) -> list[_Pin]:
+    """Throws of the shaft that a counterweight turns with."""
+    if table.shaft == EVERY and table.factor_key is not None:
+        return list(pins)
+    found = [pin for pin in pins if pin.shaft.name == table.shaft]
+    if not found and table.shaft != CRANKSHAFT.name:
+        names = list(dict.fromkeys(pin.shaft.name for pin in pins))
+        raise Refused(f"{where}.shaft", table.shaft, "is no shaft with throws", nearest(table.shaft, names))
+    return found
 
 
 @dataclass(frozen=True)
@@ -140,13 +156,14 @@ class _Pin:
     angle: float
     rotating: complex
     reciprocating: float
+    shaft: Shaft
 
 
 def _pin_of(throw: Throw, cylinders: Sequence[SliderCrank]) -> _Pin:
     parts = [cylinders[k] for k in throw.cylinders]
     rods = sum(part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)) for part in parts)
     reciprocating = sum(part.reciprocating_mass * part.crank_radius for part in parts)
-    return _Pin(throw.x, throw.angle, rods + throw.unbalance, reciprocating)
+    return _Pin(throw.x, throw.angle, rods + throw.unbalance, reciprocating, throw.shaft)
 
 
 def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
@@ -158,7 +175,8 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
         pin = _pin(pins, number, f"{where}.throws")
         gain = -pin.reciprocating * cis(as_turn(pin.angle))
         name = f"{table.name}.{number}"
-        into.add(Rotor(name, pin.x, -pin.rotating + fraction.start * gain, radius=table.radius), f"{where}.name")
+        size = -pin.rotating + fraction.start * gain
+        into.add(Rotor(name, pin.x, size, pin.shaft, radius=table.radius), f"{where}.name")
         drives.append(RotorDrive(name, gain))
     if fraction.is_open:
         name, start = f"{table.name}.{key}", complex(fraction.start)
@@ -167,7 +185,8 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
 
 def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
     if number > len(pins):
-        raise Refused(where, number, f"is no throw, the crankshaft has {len(pins)}", "count them from the front")
+        name = pins[0].shaft.name if pins else CRANKSHAFT.name
+        raise Refused(where, number, f"is no throw, the {name} has {len(pins)}", "count them from the front")
     return pins[number - 1]
 
 
@@ -179,7 +198,8 @@ def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where
         reference, x = pin.angle + math.pi, pin.x if x is None else x
     if x is None:
         raise Refused(f"{where}.x", None, "is missing", "give its place, or opposite_throw")
-    _place(Rotor(table.name, x, 0j, radius=table.radius), table, reference, where, into)
+    shaft = pins[0].shaft if pins else CRANKSHAFT
+    _place(Rotor(table.name, x, 0j, shaft, radius=table.radius), table, reference, where, into)
     into.move(f"{table.name}.x", [table.name], 0, table.x)
 
 

@@ -78,11 +78,13 @@ def weighed(
     """Sizes at the start of what is open, and slider-cranks and throws with their masses (Z2)."""
     if table is None:
         return None, parts, throws
+    others = tuple(throw for throw in throws if throw.shaft != CRANKSHAFT)
+    throws = tuple(throw for throw in throws if throw.shaft == CRANKSHAFT)
     gear = _gear_of(table, parts, throws)
     bare = Moving(gear, parts, (), bearings)
     ways, size = dict(gear.throws).values(), bare.throw_unbalance
     heavy = tuple(replace(t, unbalance=t.unbalance + size * way) for t, way in zip(throws, ways, strict=True))
-    return gear, bare.weighed().parts, heavy
+    return gear, bare.weighed().parts, (*heavy, *others)
 
 
 def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> RunningGear:

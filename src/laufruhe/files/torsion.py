@@ -127,6 +127,7 @@ def torsion_of(
     if len(table.discs) > MOST_DISCS:
         rule = f"has {len(table.discs)} discs, and at most {MOST_DISCS} may be told beside the throws"
         raise Refused("torsion.discs", None, rule, "join those that turn together")
+    throws = [throw for throw in throws if throw.shaft == CRANKSHAFT]
     opened, own = _Opened(), _throw_discs(table, parts, throws)
     ends = {end: [(k, disc) for k, disc in enumerate(table.discs) if disc.end == end] for end in ("front", "rear")}
     front, rear = ([_disc(disc, opened) for _, disc in ends[end]] for end in ("front", "rear"))

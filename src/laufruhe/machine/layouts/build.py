@@ -137,7 +137,7 @@ def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tu
 
 @dataclass(frozen=True)
 class Throw:
-    """One throw of the crankshaft.
+    """One throw of a crankshaft.
 
     Attributes
     ----------
@@ -155,12 +155,13 @@ class Throw:
     angle: float
     cylinders: tuple[int, ...]
     unbalance: complex = 0.0
+    shaft: Shaft = CRANKSHAFT
 
 
 def throw_rotors(throws: Sequence[Throw]) -> tuple[Rotor, ...]:
     """The rotating masses of the throws."""
     return tuple(
-        Rotor(f"throw {k + 1}", throw.x, throw.unbalance, role=Role.THROW)
+        Rotor(f"throw {k + 1}", throw.x, throw.unbalance, throw.shaft, Role.THROW)
         for k, throw in enumerate(throws)
         if throw.unbalance != 0.0
     )

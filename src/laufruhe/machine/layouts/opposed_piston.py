@@ -74,7 +74,7 @@ class OpposedPiston(Inline):
     def parts(
         self, asked: Asked, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-        """The lower pistons, then the upper ones, and the throws of the lower crank."""
+        """The lower pistons, then the upper ones, and the throws of both cranks."""
         lower, cranks = super().parts(asked, layout, throws)
         distance, lead = asked.own["crank_distance"], asked.own["crank_lead"]
         if distance is None:
@@ -86,4 +86,6 @@ class OpposedPiston(Inline):
             rule = "means nothing for pistons on one axis; leave it out"
             raise KeyedError("offset", rule, units.shown(asked.mechanism.offset, "m"))
         crank = Shaft("second crankshaft", float(asked.own["crank_ratio"] or -1), 0.0, distance)
-        return (*lower, *facing_pistons(lower, crank, lead, asked.mechanism.rotating_mass)), cranks
+        upper = facing_pistons(lower, crank, lead, asked.mechanism.rotating_mass)
+        above = tuple(Throw(p.x, p.throw, (len(lower) + k,), shaft=crank) for k, p in enumerate(upper))
+        return (*lower, *upper), (*cranks, *above)
