@@ -66,7 +66,7 @@ def test_the_layout_is_its_list_of_parts(tmp_path: Path) -> None:
     [
         ('crank_distance = "500 mm"\n', "", "engine.crank_distance: is missing"),
         ('"500 mm"', '"500 mm"\ncrank_ratio = 2', "engine.crank_ratio = 2: is not allowed"),
-        ('"500 mm"', '"500 mm"\ncrank_lead = 10', "engine.crank_lead"),
+        ('"500 mm"', '"500 mm"\ncrank_lead = 120', "bring them within 90 deg"),
         ('"500 mm"', '"500 mm"\noffset = "5 mm"', "engine.offset"),
         ('"500 mm"', '"500 mm"\nbank_angle = 60', "engine.bank_angle"),
         ("[1, 2]", '"open"', "engine.firing_order"),

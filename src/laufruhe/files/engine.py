@@ -16,6 +16,7 @@ from laufruhe.files.engine_keys import BigEndTable, RodTable, ShaftTable, Slider
 from laufruhe.files.fields import CylinderNumber, Open, Table
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
 from laufruhe.machine.drives import DRIVES, Sizes
+from laufruhe.machine.facing import least_room, with_shared_chambers
 from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
 from laufruhe.numerics.turns import as_turn, within
 
@@ -108,12 +109,24 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     if gas and kind.has_pistons and table.bore is None and None in bores:
         raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
     if kind.is_free:
-        parts = _free_parts(table)
+        parts = _sharing_chambers(table, _free_parts(table), gas)
         return parts, tuple(Throw(p.x, p.throw, (k,), shaft=p.shaft) for k, p in enumerate(parts))
     asked, layout = _asked(table, gas), layout_of(table)
     throws = _throws(table, layout)
     with blamed_on("engine.firing_order" if table.given_order else "engine"):
-        return kind.parts(asked, layout, throws)
+        parts, cranks = kind.parts(asked, layout, throws)
+    return _sharing_chambers(table, parts, gas), cranks
+
+
+def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: bool) -> tuple[SliderCrank, ...]:
+    """Pistons that face each other: with room between them and, where gas acts, with the chamber that both sweep."""
+    for k, part in enumerate(parts):
+        for other in parts[:k]:
+            if part.faces(other) and least_room(part, other) <= 0.0:
+                rule = f"leaves {part.name} and {other.name} no chamber: their pins meet"
+                raise Refused("engine", None, rule, "move the cranks apart, or shorten the rods")
+    with blamed_on("engine"):
+        return with_shared_chambers(parts, cycle_of(table).angle) if gas else tuple(parts)
 
 
 def _check_pistons(table: EngineTable) -> None:
@@ -147,7 +160,11 @@ def layout_of(table: EngineTable) -> Layout:
 def _asked(table: EngineTable, gas: bool = False) -> Asked:
     """What [engine] says to its layout."""
     given = {key.name: table.own(key.name) for key in table.kind.keys}
-    own = {name: None if isinstance(value, Open) else value for name, value in given.items()}
+    masses = [key.name for key in table.kind.keys if key.kind == "open mass"]
+    own = {
+        name: value if not isinstance(value, Open) else value.start if name in masses else None
+        for name, value in given.items()
+    }
     rods = {name: value.model_dump() for name, value in own.items() if isinstance(value, RodTable)}
     order = None if table.given_order is None else tuple(table.given_order)
     count, (mechanism, rod) = _cylinders(table), _mechanism(table, own)
@@ -281,7 +298,7 @@ def _free_part(table: EngineTable, part: SliderCrankTable, k: int, shafts: dict[
     where = f"engine.slider_cranks[{k + 1}]"
     if part.shaft not in shafts:
         raise Refused(f"{where}.shaft", part.shaft, "is no shaft of this engine", nearest(part.shaft, list(shafts)))
-    own = part.model_dump(include=_INHERITED, exclude_none=True)
+    own = {key: getattr(part, key) for key in _INHERITED if getattr(part, key) is not None}
     if part.rod_ratio is not None or part.rod_length is not None:
         own |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}
     shaft = shafts[part.shaft]

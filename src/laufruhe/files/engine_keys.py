@@ -57,7 +57,7 @@ class SliderCrankTable(Table):
     rod_ratio: f.NonNegative | None = None
     rod_length: f.PositiveLength | None = None
     offset: f.Length | None = None
-    reciprocating_mass: f.Mass | None = None
+    reciprocating_mass: f.OpenMass | None = None
     rotating_mass: f.Mass | None = None
     rod_inertia_deficit: f.Inertia | None = None
 

@@ -6,23 +6,42 @@ from collections.abc import Sequence
 
 from laufruhe.files.complaints import Refused
 from laufruhe.files.engine import EngineTable
+from laufruhe.files.fields import Open
 from laufruhe.files.rotors import CounterweightTable
-from laufruhe.machine import SliderCrank
+from laufruhe.machine import CRANKSHAFT, SliderCrank
 from laufruhe.problem.decision import Decision, MassDrive
 from laufruhe.problem.sets import Interval
+
+SECOND, RECIPROCATING = "second_reciprocating_mass", "reciprocating_mass"
 
 
 def piston_masses(
     table: EngineTable, parts: Sequence[SliderCrank], weights: Sequence[CounterweightTable]
 ) -> list[Decision]:
-    """Decisions about masses of all slider-cranks that give none of their own, where these are open."""
+    """Decisions about masses of slider-cranks: of all that give none of their own, and of those open themselves."""
+    second = getattr(table, SECOND)
     found = []
     for key, mass in table.open_masses.items():
-        check_factors(weights, f"counts the {key.replace('_', ' ')}, which is open")
-        own = [getattr(row, key, None) is None for row in table.slider_cranks] or [True] * len(parts)
-        drives = tuple(MassDrive(part.name, key) for part, follows in zip(parts, own, strict=True) if follows)
-        found.append(Decision(key.replace("_", " "), "kg", Interval(*mass.bounds), mass.start, drives))
+        own = [getattr(row, key, None) for row in table.slider_cranks] or [
+            second if part.shaft != CRANKSHAFT and key == RECIPROCATING else None for part in parts
+        ]
+        drives = tuple(MassDrive(part.name, key) for part, given in zip(parts, own, strict=True) if given is None)
+        found.append(_decision(key.replace("_", " "), mass, drives))
+    if isinstance(second, Open):
+        drives = tuple(MassDrive(part.name) for part in parts if part.shaft != CRANKSHAFT)
+        found.append(_decision("second reciprocating mass", second, drives))
+    for part, row in zip(parts, table.slider_cranks, strict=False):
+        if isinstance(row.reciprocating_mass, Open):
+            name = f"reciprocating mass of {part.name}"
+            found.append(_decision(name, row.reciprocating_mass, (MassDrive(part.name),)))
+    found = [decision for decision in found if decision.lower < decision.upper]
+    for decision in found[:1]:
+        check_factors(weights, f"counts the {decision.name}, which is open")
     return found
+
+
+def _decision(name: str, mass: Open, drives: tuple[MassDrive, ...]) -> Decision:
+    return Decision(name, "kg", Interval(*mass.bounds), mass.start, drives)
 
 
 def check_factors(weights: Sequence[CounterweightTable], rule: str) -> None:

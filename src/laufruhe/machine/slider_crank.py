@@ -6,7 +6,7 @@ import math
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Protocol, Self
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
@@ -105,12 +105,33 @@ class Swept:
         Crank angles of the engine by which each fires before the first [rad].
     four_strokes
         Whether a chamber makes four strokes whatever the cycle of the engine.
+    charge
+        What sweeps the chamber, where that is not the piston alone.
+    late
+        Crank angle from the firing of the piston to that of its chamber [rad].
     """
 
     piston: SliderCrank
     pace: float = 1.0
     lags: tuple[float, ...] = (0.0,)
     four_strokes: bool = False
+    charge: SliderCrank | None = None
+    late: float = 0.0
+
+    @property
+    def chamber(self) -> SliderCrank:
+        """What makes its volume."""
+        return self.charge or self.piston
+
+
+class Shared(Protocol):
+    """Another piston that works in the same chamber."""
+
+    def scaled(self, length: float) -> Any:
+        """The same in another size."""
+
+    def swept(self, part: SliderCrank) -> Swept:
+        """What both sweep, as one of them sees it."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +162,8 @@ class SliderCrank:
         Piston diameter [m]; needed with gas only.
     firing_angle
         Crank angle phi at which this cylinder fires [rad], within the cycle (C5).
+    facing
+        Another piston that works in its chamber, out of step with it; None where there is none.
     big_end
         Diameter and width of the rod's bearing on the crank pin [m]; needed for a pressure only.
     """
@@ -159,6 +182,7 @@ class SliderCrank:
     firing_angle: float = 0.0
     shaft: Shaft = CRANKSHAFT
     big_end: tuple[float, float] | None = None
+    facing: Shared | None = None
     has_pin_loads: ClassVar[bool] = True
     """Whether it is known what it presses its crank pin with."""
     has_rod: ClassVar[bool] = True
@@ -253,6 +277,7 @@ class SliderCrank:
             rod_inertia_deficit=self.rod_inertia_deficit * mass * length**2,
             shaft=replace(self.shaft, y=self.shaft.y * length, z=self.shaft.z * length),
             big_end=self.big_end and (self.big_end[0] * length, self.big_end[1] * length),
+            facing=self.facing and self.facing.scaled(length),
         )
 
     @cached_property
@@ -270,7 +295,7 @@ class SliderCrank:
     @property
     def swept(self) -> Swept:
         """What a charge works in."""
-        return Swept(self)
+        return Swept(self) if self.facing is None else self.facing.swept(self)
 
     def lean(self, lib: Any, angles: Any) -> Any:
         """Force on the crank pin over that of the gas away from it, some crank angles after firing (B2).
@@ -312,34 +337,3 @@ class SliderCrank:
         top = math.sqrt((self.rod_length + self.crank_radius) ** 2 - e2)
         bottom = math.sqrt((self.rod_length - self.crank_radius) ** 2 - e2)
         return 4.0 * self.rod_length * self.crank_radius / (top + bottom)
-
-
-def radius_for_stroke(
-    stroke: float, offset: float, *, rod_length: float | None = None, rod_ratio: float = 0.0
-) -> float:
-    """Crank radius [m] that makes a stroke [m], at a given rod length or rod ratio.
-
-    Squaring stroke = sqrt((l + r)^2 - e^2) - sqrt((l - r)^2 - e^2) twice leaves an
-    equation linear in r^2 for a given l, and quadratic for a given r / l.
-
-    Raises
-    ------
-    ModelError
-        If no crank with this rod turns through this stroke.
-    """
-    s2, e2 = stroke * stroke, offset * offset
-    if offset == 0.0:
-        return 0.5 * stroke
-    if rod_length is not None and math.isfinite(rod_length):
-        l2 = rod_length * rod_length
-        square = s2 * (4.0 * (l2 - e2) - s2) / (4.0 * (4.0 * l2 - s2)) if 4.0 * l2 > s2 else -1.0
-    else:
-        k2 = rod_ratio * rod_ratio
-        root = (s2 * (1.0 + k2)) ** 2 - 4.0 * k2 * s2 * (4.0 * e2 + s2)
-        square = (s2 * (1.0 + k2) + math.sqrt(root)) / 8.0 if root >= 0.0 else -1.0
-    if square <= 0.0:
-        raise ModelError(
-            f"no crank makes a stroke of {stroke * 1e3:.6g} mm with an offset of {offset * 1e3:.6g} mm on this rod; "
-            "lengthen the rod or lessen the offset"
-        )
-    return math.sqrt(square)

@@ -41,8 +41,8 @@ def swept_rate(part: SliderCrank, angles: FloatArray) -> FloatArray:
 
 def chamber_volume(part: SliderCrank, since: FloatArray) -> FloatArray:
     """Volume of a chamber over its least [m3], some crank angles after it fired [rad] (Y3)."""
-    own = part.swept.piston
-    return own.piston_area * own.stroke * swept_volume(own, part.swept.pace * since)
+    own = part.swept.chamber
+    return own.piston_area * own.stroke * swept_volume(own, part.swept.pace * (since - part.swept.late))
 
 
 def dead_centres(part: SliderCrank) -> tuple[float, float]:

@@ -39,6 +39,7 @@ def cylinder_pressure(gas: OneChamber, part: SliderCrank, cycle: Cycle, samples:
 def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """As `cylinder_pressure`, at any crank angles from the firing dead centre [rad], shape of `angles`."""
     gas, own, cycle, pace = _worked(gas, part, cycle)
+    angles = angles - part.swept.late
     if isinstance(gas, PressureTrace):
         return trace_pressure(gas, cycle, angles, pace)
     if isinstance(gas, Seiliger):
@@ -52,7 +53,7 @@ def _worked(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> tuple[OneChambe
     swept = part.swept
     if isinstance(gas, Wiebe) and swept.pace != 1.0:
         gas = replace(gas, start=swept.pace * gas.start, duration=swept.pace * gas.duration)
-    return gas, swept.piston, Cycle.FOUR_STROKE if swept.four_strokes else cycle, swept.pace
+    return gas, swept.chamber, Cycle.FOUR_STROKE if swept.four_strokes else cycle, swept.pace
 
 
 def check_chamber(gas: GasModel, part: SliderCrank) -> None:
@@ -79,7 +80,11 @@ def thrust_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[np
 
 def alike_under(gas: GasModel, part: SliderCrank) -> Hashable:
     """Equal where the gas drives two cylinders alike, each from its own dead centre."""
-    return part.path, tuple(chamber.drive for chamber in gas.of(part)) if isinstance(gas, Chambers) else part.bore
+    return (
+        part.path,
+        part.facing,
+        tuple(chamber.drive for chamber in gas.of(part)) if isinstance(gas, Chambers) else part.bore,
+    )
 
 
 def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:
@@ -89,7 +94,7 @@ def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[n
     """
     if isinstance(gas, Chambers):
         return chambers_breaks(gas, part)
-    return np.ravel(_breaks_of_one(gas, part, cycle)[:, None] - np.array(part.swept.lags))
+    return np.ravel(_breaks_of_one(gas, part, cycle)[:, None] + part.swept.late - np.array(part.swept.lags))
 
 
 def _breaks_of_one(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:

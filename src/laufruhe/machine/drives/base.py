@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from laufruhe.machine.layouts.base import Key
 from laufruhe.machine.layouts.build import Mechanism
-from laufruhe.machine.slider_crank import radius_for_stroke
+from laufruhe.machine.stroke import radius_for_stroke
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,12 @@ class OpposedPiston(Inline):
             "Speed ratio of the second crank of opposed pistons; -1 by default, against the first.",
         ),
         Key("crank_lead", "angle", "Angle by which the pistons of the second crank of opposed pistons lead.", 0.0),
+        Key(
+            "second_reciprocating_mass",
+            "open mass",
+            "Reciprocating mass of each piston of the second crank; by default that of the others.",
+        ),
+        Key("port_arc", "angle", "Crank angle for which the ports of a piston are open; a lead has to be less."),
     )
     openable = ()
 
@@ -79,13 +85,18 @@ class OpposedPiston(Inline):
         distance, lead = asked.own["crank_distance"], asked.own["crank_lead"]
         if distance is None:
             raise KeyedError("crank_distance", "is missing; add the distance between the two cranks")
-        if asked.gas and lead:
-            rule = "puts pistons out of step, and gas is known of pistons that mirror each other"
-            raise KeyedError("crank_lead", f"{rule}; leave it out, or [gas]", units.shown(lead, "rad"))
+        ports = asked.own["port_arc"]
+        if ports is not None and abs(lead) >= ports:
+            rule = f"is beyond the ports, which are open for {units.shown(ports, 'rad')} and never together"
+            raise KeyedError("crank_lead", f"{rule}; lessen it", units.shown(lead, "rad"))
         if asked.mechanism.offset:
             rule = "means nothing for pistons on one axis; leave it out"
             raise KeyedError("offset", rule, units.shown(asked.mechanism.offset, "m"))
         crank = Shaft("second crankshaft", float(asked.own["crank_ratio"] or -1), 0.0, distance)
         upper = facing_pistons(lower, crank, lead, asked.mechanism.rotating_mass)
+        own = asked.own["second_reciprocating_mass"]
+        if own is not None:
+            heavier = own - asked.piston_mass
+            upper = tuple(replace(part, reciprocating_mass=part.reciprocating_mass + heavier) for part in upper)
         above = tuple(Throw(p.x, p.throw, (len(lower) + k,), shaft=crank) for k, p in enumerate(upper))
         return (*lower, *upper), (*cranks, *above)

@@ -24,7 +24,7 @@ def tables(result: Result) -> list[Grid]:
     if not ranks:
         return []
     rows = tuple(_row(k, rank, ranks[-1]) for k, rank in enumerate(ranks, 1))
-    names = [found.name for found in ranks[0].designs]
+    names = [found.name for found in ranks[0].designs] if any(rank.equal for rank in ranks) else []
     ends = tuple((name, *(_ends(rank, name) for rank in ranks)) for name in names)
     head = ("decision", *(f"best by {k}" if k == 1 else f"by 1 to {k}" for k in range(1, len(ranks) + 1)))
     return [Grid("Objectives in order", HEAD, rows, note=ORDER), Grid("Equal optima", head, ends, note=EQUAL)]

@@ -1,0 +1,147 @@
+"""One chamber between two pistons that face each other, on cranks that need not be in step (G18).
+
+Both sweep it: V = A (x_1(gamma) + x_2(gamma + ahead)), each from its own crank. It is least between the dead
+centres of the two, and from there its charge counts the angle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import kinematics
+from laufruhe.machine.slider_crank import SliderCrank, Swept
+from laufruhe.numerics.roots import rising_root
+
+MOST_AHEAD = 0.5 * math.pi
+"""Crank angle by which one of two pistons may come to its dead centre first: farther apart they hardly compress."""
+STEPS = 720
+
+
+@dataclass(frozen=True)
+class Facing:
+    """The other piston of a cylinder.
+
+    Attributes
+    ----------
+    crank_radius, rod_length
+        Of it [m].
+    ahead
+        Crank angle by which it comes to its dead centre first [rad].
+    """
+
+    crank_radius: float
+    rod_length: float
+    ahead: float
+
+    def scaled(self, length: float) -> Facing:
+        """The same in another size."""
+        return Facing(self.crank_radius * length, self.rod_length * length, self.ahead)
+
+    def swept(self, part: SliderCrank) -> Swept:
+        """The chamber that a piston shares with it."""
+        own = {field.name: getattr(part, field.name) for field in fields(SliderCrank)}
+        chamber = SharedChamber(**own)
+        return Swept(part, charge=chamber, late=chamber.fires_at * part.shaft.ratio)
+
+
+@dataclass(frozen=True)
+class SharedChamber(SliderCrank):
+    """As if one piston swept what two of them sweep together."""
+
+    @property
+    def _other(self) -> Facing:
+        assert isinstance(self.facing, Facing)
+        return self.facing
+
+    def travel(self, lib: Any, alpha: Any) -> Any:
+        """Of both, from where this one's own piston stands highest [m]."""
+        other = self._other
+        angle = self.shaft.ratio * alpha + other.ahead
+        far = other.crank_radius * kinematics.travel(lib, angle, other.crank_radius / other.rod_length)
+        return super().travel(lib, alpha) + far
+
+    def velocity(self, lib: Any, alpha: Any) -> Any:
+        """Of both, against the growth of the chamber, by the angle of this one's crank [m]."""
+        other = self._other
+        angle = self.shaft.ratio * alpha + other.ahead
+        far = other.crank_radius * kinematics.piston_velocity(lib, angle, other.crank_radius / other.rod_length)
+        return super().velocity(lib, alpha) + self.shaft.ratio * far
+
+    @cached_property
+    def dead_centres(self) -> tuple[float, float]:
+        """Angles of its crank at which the chamber is least and largest, between the dead centres of both (G18)."""
+        ratio, first = self.shaft.ratio, -self._other.ahead
+        low, high = min(first, 0.0), max(first, 0.0)
+
+        def rate(angle: float) -> float:
+            return -ratio * float(self.velocity(math, ratio * angle))
+
+        top = rising_root(rate, low, high) if high > low else 0.0
+        bottom = rising_root(lambda angle: -rate(angle), math.pi + low, math.pi + high) if high > low else math.pi
+        return ratio * top, ratio * bottom
+
+    @property
+    def fires_at(self) -> float:
+        """Where the chamber is least."""
+        return self.dead_centres[0]
+
+    @property
+    def stroke(self) -> float:
+        """Largest less least of both together [m]."""
+        top, bottom = self.dead_centres
+        return float(self.travel(math, bottom) - self.travel(math, top))
+
+
+def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tuple[SliderCrank, ...]:
+    """Pistons that face each other and do not mirror each other, each with the chamber that both sweep.
+
+    Raises
+    ------
+    ModelError
+        If two pistons have no chamber between them that is modelled.
+    """
+    found = list(parts)
+    for k, part in enumerate(parts):
+        for other in parts:
+            if other is not part and part.faces(other):
+                facing = _facing(part, other, cycle_angle)
+                mirrors = facing.ahead == 0.0 and part.path == other.path
+                found[k] = part if mirrors else replace(part, facing=facing)
+    return tuple(found)
+
+
+def _facing(part: SliderCrank, other: SliderCrank, cycle_angle: float) -> Facing:
+    ahead = math.remainder(part.firing_angle - other.firing_angle, cycle_angle)
+    ahead = 0.0 if abs(ahead) < 1e-12 else ahead
+    if abs(ahead) >= MOST_AHEAD:
+        raise ModelError(
+            f"{part.name} and {other.name} share a chamber and come to their dead centres "
+            f"{math.degrees(abs(ahead)):.6g} deg apart; bring them within {math.degrees(MOST_AHEAD):g} deg"
+        )
+    plain = all(
+        type(each) is SliderCrank and abs(each.shaft.ratio) == 1.0 and not each.offset for each in (part, other)
+    )
+    if not plain:
+        raise ModelError(
+            f"{part.name} and {other.name} share a chamber, which is known of plain slider-cranks without offset on "
+            "cranks of a ratio of 1 or -1; leave [gas] out"
+        )
+    if part.bore != other.bore:
+        raise ModelError(f"{part.name} and {other.name} share a chamber and have two bores; give them one")
+    return Facing(other.crank_radius, other.rod_length, ahead)
+
+
+def least_room(part: SliderCrank, other: SliderCrank) -> float:
+    """Least distance between the pins of two pistons that face each other [m]; infinite for Scotch yokes."""
+    apart = math.hypot(other.shaft.y - part.shaft.y, other.shaft.z - part.shaft.z)
+    reach = part.crank_radius + part.rod_length + other.crank_radius + other.rod_length
+    if math.isinf(reach):
+        return math.inf
+    ahead = math.remainder(part.firing_angle - other.firing_angle, math.tau)
+    angles = (math.tau * k / STEPS for k in range(STEPS))
+    return apart - reach + min(float(part.travel(math, at) + other.travel(math, at + ahead)) for at in angles)
