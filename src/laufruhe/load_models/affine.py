@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor
-from laufruhe.numerics.norms import MEAN, Grid, Norm
+from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_geared_loads, added_rotor_loads, shaking_loads
@@ -26,6 +26,7 @@ from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
+MAXIMUM = NORMS["maximum"]
 NEEDED, LEAST_UNIT = 1e3, 1e-9
 FEASIBLE = 1e-6
 """Relative excess over a limit that counts as none."""
@@ -234,7 +235,10 @@ class AffineModel:
 
     def norm(self, measure: Measure, samples: int, averaged: bool = False) -> AffineNorm:
         """A measure at `samples` steps over the common period, a mean averaged about them where asked."""
-        channel = measure.channel
+        channel, known = measure.channel, self.problem.known_rows.get(measure)
+        if known is not None:
+            grid = Grid(np.ones(len(known.constant)), len(known.constant))
+            return AffineNorm(MAXIMUM, known.constant, known.slope, grid)
         if channel.is_number:
             # of mounts or of a flywheel that stay: the same for every design
             only = Rows(MEAN, np.array([[self.bare.value(measure)]]), Grid(np.ones(1), 1))
@@ -244,14 +248,14 @@ class AffineModel:
             slopes = [mass_rows(measure, _only(self.bare.engine, change.rotors)).vectors for change in self._changes]
             return _stacked(bare, slopes, self._keep_all)
         averaged = averaged and measure.norm.averages
-        known = self.bare.signals(channel)
+        own = self.bare.signals(channel)
         alone = [[channel.signal(by[k]) for by in self._slopes] for k in range(len(self._changes))]
-        base = self._own_base([*known, *(signal for by in alone for signal in by)], samples)
+        base = self._own_base([*own, *(signal for by in alone for signal in by)], samples)
         samples = int(samples * self.base / base)
         # what is open does not bend, but has to be known at the same angles
-        lead = [signal.over(base) for signal in (known if self.lead is None else self.lead.bare.signals(channel))]
+        lead = [signal.over(base) for signal in (own if self.lead is None else self.lead.bare.signals(channel))]
         bends = bends_of(measure, lead, self.problem.engine)
-        bare = self._rows(measure, known, base, samples, averaged, bends)
+        bare = self._rows(measure, own, base, samples, averaged, bends)
         if bare.vectors.size * len(self._changes) > MOST_NUMBERS:
             size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"
             raise ModelError(f"{size} are needed; give fewer operating points, open numbers or samples", "problem")

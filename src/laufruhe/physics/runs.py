@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Literal
 
+import numpy as np
+
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Run
-from laufruhe.physics.elastic_mounts import elastic_mounting
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.run_up import RunUp, run_through
+from laufruhe.physics.linear_run import LinearRun, Loads, Response
+from laufruhe.physics.run_up import LEAST_STEPS, MOST_STEPS, STEPS_PER_PERIOD, RunUp, run_through, time_model
 from laufruhe.physics.speed_map import split_loads
 
 HIGHEST = 12.0
 """Last order of the loads that is followed: those beyond shake the block by less than what the steps leave open."""
 STRETCHES, TOLERANCE = 60, 1e-4
 MOST_SWINGS = 2e3
+COARSEST = 4.0
+"""Times as long as usual that steps may be."""
 
 
 def point_of(run: Run, points: Sequence[OperatingPoint]) -> OperatingPoint:
@@ -39,16 +47,65 @@ def runs_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run)
 
 @lru_cache(maxsize=32)
 def _found_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[RunUp, RunUp]:
-    if engine.block is None:
-        raise ModelError("a run-up through resonance needs elastic mounts")
-    mounting = elastic_mounting(engine.block, engine.mounts)
-    inertia, gas = split_loads(engine, point, fidelity)
-    loads = inertia.kept(HIGHEST), None if gas is None else gas.kept(HIGHEST)
+    mounting, parts = _elastic(engine), _loads(engine, point, fidelity)
 
     def through(first: float, last: float, seconds: float) -> RunUp:
+        steps = linear_steps(mounting, first, last, seconds)
+        if steps is not None:
+            return _envelope(steps.response(_by_modes(mounting, parts)), first, last)
         # a mode that swings a million times in a run is followed, not resolved
         stiff = seconds * mounting.modes.frequencies[-1] > MOST_SWINGS
         method: Literal["RK45", "Radau"] = "Radau" if stiff else "RK45"
-        return run_through(mounting, *loads, first, last, seconds, STRETCHES, method, TOLERANCE)
+        return run_through(mounting, *parts, first, last, seconds, STRETCHES, method, TOLERANCE)
 
     return through(0.0, run.speed, run.up), through(run.speed, 0.0, run.down)
+
+
+def responses_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[Response, ...] | None:
+    """Motion in run-up and shut-down at equal steps of time, linear in the loads; None with bump stops (E28a)."""
+    engine = replace(engine, bearings=(), flywheel=None, torsion=None, run=None)
+    mounting, parts = _elastic(engine), _loads(engine, point, fidelity)
+    found = []
+    for first, last, seconds in ((0.0, run.speed, run.up), (run.speed, 0.0, run.down)):
+        steps = linear_steps(mounting, first, last, seconds)
+        if steps is None:
+            return None
+        found.append(steps.response(_by_modes(mounting, parts)))
+    return tuple(found)
+
+
+def linear_steps(mounting: ElasticMounting, first: float, last: float, seconds: float) -> LinearRun | None:
+    """Equal steps that follow the fastest order that any load may have; None where they are no answer."""
+    fastest = max(first, last) * HIGHEST
+    wanted = STEPS_PER_PERIOD * fastest * (seconds / STRETCHES) / math.tau
+    if wanted > COARSEST * MOST_STEPS:
+        return None
+    count = STRETCHES * int(min(max(wanted + 1.0, LEAST_STEPS), MOST_STEPS))
+    run = LinearRun(time_model(mounting), first, (last - first) / seconds, seconds / count, count)
+    return run if run.is_known else None
+
+
+def _elastic(engine: Engine) -> ElasticMounting:
+    if engine.block is None:
+        raise ModelError("a run-up through resonance needs elastic mounts")
+    return elastic_mounting(engine.block, engine.mounts)
+
+
+def _loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum, Spectrum | None]:
+    inertia, gas = split_loads(engine, point, fidelity)
+    return inertia.kept(HIGHEST), None if gas is None else gas.kept(HIGHEST)
+
+
+def _by_modes(mounting: ElasticMounting, parts: tuple[Spectrum, Spectrum | None]) -> Loads:
+    model = time_model(mounting)
+    return [(part.orders, part.coefficients @ model.load.T) for part in parts if part is not None]
+
+
+def _envelope(response: Response, first: float, last: float) -> RunUp:
+    """The most within every stretch, its ends included."""
+    edges = np.arange(0, len(response.twist), (len(response.twist) - 1) // STRETCHES)
+    signals = (response.force, response.travel, response.twist)
+    sizes = [np.linalg.norm(signal, axis=-1).max(axis=-1) for signal in signals]
+    most = [np.array([own[a : b + 1].max() for a, b in itertools.pairwise(edges)]) for own in sizes]
+    speeds = first + (last - first) * edges[1:] / edges[-1]
+    return RunUp(speeds, *most)

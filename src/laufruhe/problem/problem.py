@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from laufruhe.errors import Complaint, ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -47,6 +50,20 @@ class Origin(Protocol):
 
     def fixed(self, name: str, value: Any) -> Problem:
         """A number fixed."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownRows:
+    """Rows of a measure that is the largest length of constant + slope x, x the columns of what loads are affine in.
+
+    Attributes
+    ----------
+    constant, slope
+        Shapes (k, d) and (k, d, n).
+    """
+
+    constant: NDArray[np.float64]
+    slope: NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
@@ -93,6 +110,8 @@ class Problem:
         The file that it was read from; None where it was made or changed in code.
     fires_together
         Whether cylinders are meant to fire at once.
+    known_rows
+        Of measures in time, whose largest length is convex in what loads are affine in.
     """
 
     name: str
@@ -116,6 +135,7 @@ class Problem:
     sharply: bool = False
     ranks: tuple[Rank, ...] = ()
     fires_together: bool = False
+    known_rows: Mapping[Measure, KnownRows] = field(default_factory=dict, compare=False, repr=False)
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"
@@ -178,7 +198,9 @@ class Problem:
     @property
     def load_limits(self) -> tuple[Limit, ...]:
         """Limits on norms of loads and masses."""
-        return tuple(limit for limit in self.limits if not limit.measure.channel.is_number)
+        return tuple(
+            limit for limit in self.limits if not limit.measure.channel.is_number or limit.measure in self.known_rows
+        )
 
     @property
     def mount_limits(self) -> tuple[Limit, ...]:

@@ -24,6 +24,7 @@ from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.places import solve_places
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.robust import solve_robust
+from laufruhe.solvers.run_limits import solve_runs
 from laufruhe.solvers.unbalances import beyond_mounts, solve_sharply
 
 __all__ = ["METHODS", "Result", "Status", "solve", "state"]
@@ -233,12 +234,18 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
 
 
 def _checked(problem: Problem, checked: Sequence[Limit]) -> Result:
-    """The best design without limits that no method designs for: where it keeps them, it is the best with them."""
+    """The best design without limits that no method designs for: where it keeps them, it is the best with them.
+
+    Where run-ups are linear in what is open they are designed for.
+    """
     others = tuple(limit for limit in problem.limits if limit not in checked)
     found = with_limits(_decided(problem.changed(limits=others)), problem.limits)
     broken = broken_limits(checked, found.final) if found.status in (Status.OPTIMAL, Status.FEASIBLE) else ()
     if not broken:
         return found
+    designed = solve_runs(problem, checked, _decided)
+    if designed is not None:
+        return designed
     names = " and ".join(f"'{name}'" for name in broken)
     why = f"the best design found breaks {names}: a run-up is checked, not designed for; relax it, or limit travel"
     return replace(found, status=Status.FAILED, certificate=None, message=why)
@@ -265,7 +272,8 @@ def _decided(problem: Problem) -> Result:
             return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
         return with_limits(_decided(problem.changed(limits=moved)), problem.limits)
-    checked = [limit for limit in problem.limits if limit.measure.channel.is_checked]
+    told = problem.known_rows
+    checked = [x for x in problem.limits if x.measure.channel.is_checked and x.measure not in told]
     if checked and kinds:
         return _checked(problem, checked)
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):

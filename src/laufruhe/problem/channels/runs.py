@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.physics.linear_run import Response
 from laufruhe.physics.run_up import RunUp
 from laufruhe.physics.runs import point_of, runs_of
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import Needs, NumberChannel
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True, eq=False)
 class RunChannel(NumberChannel):
-    """The most of a number in run-up and shut-down, integrated in time: no method designs for it."""
+    """The most of a number in run-up and shut-down, integrated in time.
 
+    Attributes
+    ----------
+    part
+        Of a linear response what it is the largest length of.
+    """
+
+    part: Callable[[Response], Array] = field(kw_only=True)
     needs: Needs = Needs.RUN
     minimised: bool = False
     is_checked: ClassVar[bool] = True
 
 
-def _most(name: str, unit: str, number: Callable[[RunUp], float]) -> RunChannel:
+def _most(name: str, unit: str, number: Callable[[RunUp], float], part: Callable[[Response], Array]) -> RunChannel:
     def values(_: Asked, evaluation: Answered) -> Sequence[float]:
         run = evaluation.engine.run
         if run is None or not evaluation.loads:
@@ -29,10 +42,10 @@ def _most(name: str, unit: str, number: Callable[[RunUp], float]) -> RunChannel:
         point = point_of(run, [loads.point for loads in evaluation.loads])
         return (max(map(number, runs_of(evaluation.engine, point, evaluation.fidelity, run))),)
 
-    return RunChannel(name, unit, values=values)
+    return RunChannel(name, unit, values=values, part=part)
 
 
-RUN_FORCE = _most("run-up force", "N", lambda run: run.worst_force)
-RUN_TRAVEL = _most("run-up travel", "m", lambda run: run.worst_travel)
-RUN_TWIST = _most("run-up twist", "rad", lambda run: run.worst_twist)
+RUN_FORCE = _most("run-up force", "N", lambda run: run.worst_force, lambda response: response.force)
+RUN_TRAVEL = _most("run-up travel", "m", lambda run: run.worst_travel, lambda response: response.travel)
+RUN_TWIST = _most("run-up twist", "rad", lambda run: run.worst_twist, lambda response: response.twist)
 OF_RUNS = (RUN_FORCE, RUN_TRAVEL, RUN_TWIST)
