@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from laufruhe.machine import Engine
 from laufruhe.physics.linear_run import Response
 from laufruhe.physics.runs import STRETCHES, point_of, responses_of
-from laufruhe.problem.channels.runs import RunChannel
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import KnownRows, Problem
@@ -89,7 +88,7 @@ def _responses(problem: Problem, engine: Engine) -> tuple[Response, ...] | None:
 
 
 def _rows(measure: Measure, responses: Sequence[Response]) -> Array:
-    channel = measure.channel
-    if not isinstance(channel, RunChannel):
+    of_run = measure.channel.of_run
+    if of_run is None:
         raise TypeError(f"{measure.name} is not of a run-up")
-    return np.concatenate([channel.part(response) for response in responses])
+    return np.concatenate([of_run(response) for response in responses])

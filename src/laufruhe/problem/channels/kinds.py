@@ -14,6 +14,7 @@ from laufruhe.machine import Engine, Flywheel, OperatingPoint, Role
 from laufruhe.machine.clearances import Span
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.linear_run import Response
 from laufruhe.physics.strength import Factor
 from laufruhe.physics.torsion import Factors, unit_factors
 from laufruhe.problem.asking import Answered, Asked
@@ -92,6 +93,8 @@ class Channel:
         Whether it never falls where a number of the flywheel grows, if it is of that; else it never rises.
     of_wheel
         The value as a function of the flywheel of an engine, if it is of that.
+    of_run
+        Of a linear run-up what it is the largest length of, if it is of that.
     of_torque
         Whether the torque of the crank is in it, which other decisions than the flywheel move too.
     of_modes
@@ -110,6 +113,7 @@ class Channel:
     of_loads: bool = False
     rises: bool = True
     of_wheel: Callable[[Asked, Answered], OfWheel] | None = None
+    of_run: Callable[[Response], NDArray[np.float64]] | None = None
     of_torque: bool = False
     of_modes: bool = False
     span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -20,15 +20,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class RunChannel(NumberChannel):
-    """The most of a number in run-up and shut-down, integrated in time.
+    """The most of a number in run-up and shut-down, integrated in time."""
 
-    Attributes
-    ----------
-    part
-        Of a linear response what it is the largest length of.
-    """
-
-    part: Callable[[Response], Array] = field(kw_only=True)
     needs: Needs = Needs.RUN
     minimised: bool = False
     is_checked: ClassVar[bool] = True
@@ -42,7 +35,7 @@ def _most(name: str, unit: str, number: Callable[[RunUp], float], part: Callable
         point = point_of(run, [loads.point for loads in evaluation.loads])
         return (max(map(number, runs_of(evaluation.engine, point, evaluation.fidelity, run))),)
 
-    return RunChannel(name, unit, values=values, part=part)
+    return RunChannel(name, unit, values=values, of_run=part)
 
 
 RUN_FORCE = _most("run-up force", "N", lambda run: run.worst_force, lambda response: response.force)
