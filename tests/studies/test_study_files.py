@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from cli import scenes
 from laufruhe.cli import app
 from laufruhe.errors import InputError
+from laufruhe.files.complaints import Refused
 from laufruhe.files.reader import load
-from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at
+from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at, keys_of
 from laufruhe.studies import Point, Scenes, run
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.swept import dataset, solved
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SPEED = "operating_points.1.mean_piston_speed"
@@ -292,3 +296,36 @@ def test_every_bad_expression_is_told_by_its_place(tmp_path: Path) -> None:
         "study.parts[1].picture.panels[1].curves[1].y = \"mean['givn'] / m\": 'givn' is no case here; "
         "did you mean 'given'?",
     ]
+
+
+def test_a_limit_has_the_name_that_results_show() -> None:
+    limits: list[dict[str, object]] = [
+        {"limit": "maximum mount force", "max": "1 kN", "orders": [0.5], "mounts": ["left"]},
+        {"limit": "balancer mass", "max": "4 kg"},
+        {"limit": "balancer mass", "max": "2 kg", "of": ["front"]},
+        {"limit": "counterweight mass", "max": "4 kg", "name": "webs"},
+    ]
+    tables = {"constraints": limits}
+    assert keys_of(tables, "constraints.maximum mount force of order 0.5 on left.max") == ("constraints", 0, "max")
+    assert keys_of(tables, "constraints.webs.max") == ("constraints", 3, "max")
+    assert keys_of(tables, "constraints.2.max") == ("constraints", 1, "max")
+    # two limits of one name are told apart by their numbers alone
+    with pytest.raises(Refused, match="is no quantity of this scene"):
+        keys_of(tables, "constraints.balancer mass.max")
+
+
+def test_forces_by_order_and_prices_of_limits_are_kept() -> None:
+    result = scenes.solved(scenes.TIGHT)
+    kept = solved(result.problem)
+    limit = result.limits[0]
+    assert kept["shadow_price"] == {limit.name: pytest.approx(limit.shadow_price, rel=1e-3)}
+    assert kept["limit_units"] == {"balancer mass": "kg"}
+    forces = result.final.loads[0].mount_forces
+    assert forces is not None
+    second = np.linalg.norm(forces.at(2.0)[:, 1:], axis=1)
+    assert np.mean(second) >= kept["order_force"]["2"] > 0.5 * np.mean(second)
+    assert kept["order_force_given"]["2"] > kept["order_force"]["2"]
+    data = dataset([Point(CaseTable(name="a", problem="a.toml"))], [kept], {}, {})
+    assert data["shadow_price"].sel(limit="balancer mass").item() == kept["shadow_price"]["balancer mass"]
+    assert data["price_unit"].values.tolist() == ["N per kg"]
+    assert 2.0 in data["order"].values

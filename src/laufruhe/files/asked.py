@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from laufruhe import units
 from laufruhe.errors import ModelError
@@ -300,6 +300,20 @@ def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
         raise Refused(f"{where}.min", table.min, "is more than the whole energy", "give a share under 1")
     largest, least = math.inf if high is None else high, -math.inf if low is None else low
     return Limit(table.name or measure.name, measure, largest, least, _band(table, measure, where))
+
+
+def limit_name(entry: Mapping[str, Any]) -> str | None:
+    """The name by which results show a limit of a file; None where it is no limit."""
+    try:
+        table = ConstraintTable.model_validate(entry)
+    except ValidationError:
+        return None
+    if table.name or table.limit not in MEASURES:
+        return table.name
+    channel, norm = MEASURES[table.limit]
+    at = next((getattr(table, key) for key in _PLACES if getattr(table, key)), None)
+    points, motions = _tuple(table.operating_points), _tuple(table.motions)
+    return Measure(channel, norm, _tuple(at), points, None, _tuple(table.orders), None, motions).name
 
 
 def _side(text: str | None, measure: Measure, where: str) -> float | None:

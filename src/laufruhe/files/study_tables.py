@@ -13,6 +13,7 @@ from pydantic import BaseModel, BeforeValidator, Field
 
 from laufruhe import units
 from laufruhe.files import fields
+from laufruhe.files.asked import limit_name
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.fields import Name, Table, refusal
 from laufruhe.files.problem_file import ProblemFile
@@ -95,7 +96,7 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
     """The keys and places that a path goes through; `Refused` where the scene has no such quantity."""
     here: Any = tables
     keys = []
-    parts = where.split(".")
+    parts = parts_of(where)
     for k, part in enumerate(parts):
         options = _options(here)
         if part not in options:
@@ -106,21 +107,34 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
     return tuple(keys)
 
 
+def parts_of(where: str) -> list[str]:
+    """The parts of a path; the name of a limit may have points of its own, as that of order 0.5."""
+    parts = where.split(".")
+    if parts[0] == "constraints" and parts[-1] in _SIDES and len(parts) > 3:
+        return [parts[0], ".".join(parts[1:-1]), parts[-1]]
+    return parts
+
+
 def _options(here: Any) -> dict[str, Any]:
     """Names of what a table or a list holds; a list's entries by their names, or counted from one."""
     if isinstance(here, dict):
         return {key: key for key in here}
     if isinstance(here, list):
-        names = [entry.get("name") if isinstance(entry, dict) else None for entry in here]
-        named = {name: k for k, name in enumerate(names) if isinstance(name, str)}
+        names = [_name_of(entry) if isinstance(entry, dict) else None for entry in here]
+        named = {name: k for k, name in enumerate(names) if isinstance(name, str) and names.count(name) == 1}
         return {**{str(k + 1): k for k in range(len(here))}, **named}
     return {}
+
+
+def _name_of(entry: dict[str, Any]) -> object:
+    """By which an entry of a list is spoken of: limits have one, told or not."""
+    return entry.get("name") or (limit_name(entry) if "limit" in entry else None)
 
 
 def field_at(where: str) -> fields.Number | None:
     """How the number at a path is read; None where text, a list or a choice stands there."""
     here: list[Any] = [ProblemFile]
-    for part in where.split("."):
+    for part in parts_of(where):
         here = [inner for annotation in here for inner in _inside(annotation, part)]
     return next((found for annotation in here for found in _numbers(annotation)), None)
 
@@ -161,7 +175,7 @@ class Axis:
     @property
     def name(self) -> str:
         """The end of the path, as a reader says it: a place goes with its list, a side with its limit."""
-        *before, last = self.quantity.replace("_", " ").split(".")
+        *before, last = parts_of(self.quantity.replace("_", " "))
         if before and last.isdigit():
             return f"{before[-1]} {last}"
         if before[:1] == ["constraints"]:
@@ -290,7 +304,7 @@ def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str
 
 def _is_limit(quantity: str) -> bool:
     """Whether a path is that of a side of a limit, whose dimension is told by its text alone."""
-    parts = quantity.split(".")
+    parts = parts_of(quantity)
     return parts[0] == "constraints" and parts[-1] in _SIDES
 
 

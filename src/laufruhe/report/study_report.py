@@ -120,7 +120,8 @@ def _flat(data: xr.Dataset) -> Any:
     for name, values in across.items():
         along = values.dims[1]
         own = [values.attrs.get("units", "")] * data.sizes[along]
-        named = data[f"{along}_unit"].values.tolist() if f"{along}_unit" in data.coords else own
+        units_of = values.attrs.get("unit_of", f"{along}_unit")
+        named = data[units_of].values.tolist() if units_of in data.coords else own
         for k, (of, unit) in enumerate(zip(data[along].values, named, strict=True)):
             rows[_headed(f"{name}: {of}", unit)] = values.values[:, k]
     return rows

@@ -16,6 +16,7 @@ from pydantic import Field
 from laufruhe.errors import SolverError
 from laufruhe.files.asked import QuantityName
 from laufruhe.files.study_tables import Axis, CaseTable, SweepTable, axis_of, changed, keys_of
+from laufruhe.present.measures import limits_of, main_load, mount_orders, shaking_orders
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.problem.problem import Problem
@@ -32,6 +33,7 @@ _WORDS = {
     "objective": "{} of the design as decided",
     "lower_bound": "{} that no design falls below",
 }
+HIGHEST_ORDER = 12.0
 _ON_MOUNTS = ("mean_given", "maximum_given", "mean", "maximum")
 
 
@@ -53,10 +55,12 @@ def solved(problem: Problem) -> Record:
 
     Its metric and the unit of that, status and proof ("as given" where nothing was open), the
     objective as given, as decided, and what no design falls below; mean and maximum force by
-    mount [N], means over the operating points by their weights; what was decided, by name.
+    mount [N], means over the operating points by their weights; what was decided, and forces by
+    order; how limits stand, and their shadow prices, by name.
     """
     shown, status, proof = decided(problem)
     objective, bound = shown.objective, shown.certificate.lower_bound if shown.certificate else math.nan
+    limits = limits_of(shown)
     designed = status not in (FAILED, "infeasible")
     nothing = dict.fromkeys(shown.initial.mount_names, (math.nan, math.nan))
     before, after = _on_mounts(problem, shown.initial), _on_mounts(problem, shown.final) if designed else nothing
@@ -74,7 +78,24 @@ def solved(problem: Problem) -> Record:
         "maximum": {name: most for name, (_, most) in after.items()},
         "decided": {decision.name: decision.value for decision in shown.decisions},
         "units": {decision.name: decision.unit for decision in shown.decisions},
+        "order_force_given": _by_order(shown.initial),
+        "order_force": _by_order(shown.final) if designed else {},
+        "limit_value": {limit.name: _finite(limit.value) for limit in limits},
+        "shadow_price": {limit.name: limit.shadow_price for limit in limits if shown.certificate},
+        "limit_units": {limit.name: limit.unit for limit in limits},
     }
+
+
+def _by_order(design: Evaluation) -> dict[str, float]:
+    """Amplitudes by order, largest of all operating points: of mounts their mean, without any the shaking force [N]."""
+    found: dict[str, float] = {}
+    for loads in design.loads if not design.resonance else ():
+        load = main_load(loads)
+        sizes = mount_orders(load).mean(axis=1) if loads.mount_forces is not None else shaking_orders(load)[0]
+        for order, size in zip(load.orders.tolist(), sizes.tolist(), strict=True):
+            if order <= HIGHEST_ORDER:
+                found[f"{order:g}"] = max(found.get(f"{order:g}", 0.0), size)
+    return found
 
 
 def _finite(value: float) -> float:
@@ -130,7 +151,31 @@ def dataset(
         "proof": ("point", [record["proof"] for record in records]),
     }
     values = {**found, "decided": (("point", "decision"), _table("decided", records, list(units)), in_unit)}
-    return xr.Dataset(values, {**coords, **extra}, {**about, "metric": metric})
+    more, named = _orders_and_limits(records, unit)
+    return xr.Dataset({**values, **more}, {**coords, **named, **extra}, {**about, "metric": metric})
+
+
+def _orders_and_limits(records: Sequence[Mapping[str, Any]], unit: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Forces by order that any scene has, and how limits stand with what they cost; each with its coordinates."""
+    told = {order for record in records for order, size in record["order_force_given"].items() if size}
+    told |= {order for record in records for order, size in record["order_force"].items() if size}
+    orders = sorted(told, key=float)
+    units = {name: of for record in records for name, of in record["limit_units"].items()}
+    given, decided = (_table(name, records, orders) for name in ("order_force_given", "order_force"))
+    found = {
+        "order_force_given": variable(("point", "order"), given, "amplitude by order, as given", "N"),
+        "order_force": variable(("point", "order"), decided, "amplitude by order, as decided", "N"),
+    }
+    coords: dict[str, Any] = {"order": [float(order) for order in orders]}
+    if not units:
+        return found, coords
+    value, price = (_table(name, records, list(units)) for name in ("limit_value", "shadow_price"))
+    words = "fall of the metric for a unit by which the limit is relaxed, in price_unit"
+    found["limit_value"] = (("point", "limit"), value, {"long_name": "what is limited, in limit_unit"})
+    found["shadow_price"] = (("point", "limit"), price, {"long_name": words, "unit_of": "price_unit"})
+    prices = [f"{unit or '1'} per {of}" if of else unit for of in units.values()]
+    return found, {**coords, "limit": list(units), "limit_unit": ("limit", list(units.values())),
+                   "price_unit": ("limit", prices)}  # fmt: skip
 
 
 def _table(name: str, records: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> NDArray[np.float64]:
