@@ -7,13 +7,17 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from cli import scenes
+from laufruhe import load
 from laufruhe.report.grid import escaped
 from laufruhe.report.markdown import as_markdown
 from laufruhe.report.screen import show
 from laufruhe.report.sections import tables_of
-from laufruhe.report.wording import explained, headline
-from laufruhe.solvers import Result
+from laufruhe.report.wording import explained, headline, why_star
+from laufruhe.solvers import Result, solve
+from problem_files import PROBLEMS
 
 
 def screen(result: Result) -> str:
@@ -90,3 +94,28 @@ def test_source_and_assumptions_are_told() -> None:
 
 def test_markdown_in_names_means_nothing() -> None:
     assert escaped("a|b\n*c* <d>") == r"a\|b \*c\* \<d\>"
+
+
+def test_why_a_star_wins_is_told_by_its_free_couples() -> None:
+    """Rocking couples of a five: what is minimised is the couple of orders 1 and 2, so order 4 is not named."""
+    result = solve(load(PROBLEMS / "inline-five-open.toml"))
+    assert why_star(result) == (
+        "Star 1 beats star 2 by 32 %. Its throws leave a smaller couple of order 1 (0.449 against 1.56). "
+        "It leaves a larger couple of order 2 (4.98 against 4.75)."
+    )
+    assert why_star(result) in " ".join(screen(result).split())
+    assert result.phasing is not None
+    alone = replace(result, phasing=replace(result.phasing, ranking=result.phasing.ranking[:1]))
+    assert why_star(alone) == ""
+    twin = replace(result.phasing.ranking[0], throws=tuple(-angle for angle in result.phasing.ranking[0].throws))
+    both = replace(result, phasing=replace(result.phasing, ranking=(result.phasing.ranking[0], twin)))
+    assert why_star(both) == "Star 2 has the same free forces and couples as star 1."
+
+
+def test_weights_are_in_grams_and_throws_have_their_balance_factor() -> None:
+    tables = {grid.title: grid for grid in tables_of(scenes.solved(scenes.PARTS))}
+    made = dict(zip(tables["Weights as decided"].head, tables["Weights as decided"].rows[0], strict=True))
+    assert float(made["g mm after"]) == pytest.approx(1e6 * float(made["kg m"]), rel=1e-3)
+    assert [row[-1] for row in tables["Balance factors"].rows] == ["100.0 %"]
+    tight = {grid.title: grid for grid in tables_of(scenes.solved(scenes.TIGHT))}
+    assert re.fullmatch(r"[\d.]+ kg m = [\d.]+ g mm", tight["Decisions"].rows[0][2])

@@ -24,6 +24,7 @@ from laufruhe.problem.evaluation import Evaluation, measured, over, samples_of
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
+from laufruhe.report.wording import why_star
 from laufruhe.solvers.ranking import RankedStar
 from laufruhe.solvers.result import Result, objective_of
 
@@ -264,7 +265,11 @@ def _phasing(result: Result) -> Record:
     points = [_of(p, "allowed deviation value lower_bound throws kkt_residual") for p in result.phasing.trade]
     return {
         "ranking": [{"rank": k, **_star(star)} for k, star in enumerate(result.phasing.ranking, 1)],
-        "phasing": {**_of(result.phasing, "designs looked_at method even_value"), "trade": points},
+        "phasing": {
+            **_of(result.phasing, "designs looked_at method even_value"),
+            "trade": points,
+            "why": why_star(result),
+        },
     }
 
 

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from laufruhe.report.grid import Grid
 from laufruhe.report.sections import tables_of
-from laufruhe.report.wording import accuracy, explained, fired, headline
+from laufruhe.report.wording import accuracy, explained, fired, headline, why_star
 from laufruhe.solvers.result import Result, Status
 
 PIPE_WIDTH = 110
@@ -29,7 +29,8 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
     console.print(Text(headline(result), style=_COLOURS[result.status]))
     if result.certificate is not None:
         console.print(Text(explained(result), style="dim"))
-    console.print(Text(fired(result)))
+    for sentence in filter(None, (fired(result), why_star(result))):
+        console.print(Text(sentence))
     for grid in tables_of(result):
         console.print()
         console.print(Text(grid.title, style="bold"))

@@ -6,9 +6,10 @@ import math
 
 from laufruhe.numerics.turns import as_turn, within
 from laufruhe.present.measures import breaks_a_limit, changed
-from laufruhe.present.numbers import figure, percent, trimmed
+from laufruhe.present.numbers import figure, number, percent, trimmed
 from laufruhe.problem.plausibility import together
 from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.solvers.ranking import RankedStar
 from laufruhe.solvers.result import Result, Status
 
 # A change that would be printed as 0.0 %.
@@ -57,6 +58,41 @@ def fired(result: Result) -> str:
     groups = [f"{', '.join(names[:-1])} and {names[-1]} fire at once" for names in together(engine)]
     text = "; ".join(groups)
     return f"{sentence} {text[:1].upper()}{text[1:]}." if text else sentence
+
+
+def why_star(result: Result) -> str:
+    """What tells the best star from the next one, in sentences; empty where no other was ranked."""
+    stars = result.phasing.ranking if result.phasing is not None else ()
+    k, rival = next(((k, star) for k, star in enumerate(stars, 1) if star.throws != stars[0].throws), (0, None))
+    if rival is None or not rival.value:
+        return ""
+    gain, told = 1.0 - stars[0].value / rival.value, _told_apart(result, stars[0], rival)
+    less = [text for ours, theirs, text in told if ours < theirs]
+    more = [text for ours, theirs, text in told if ours > theirs]
+    if not told:
+        return f"Star {k} has the same free forces and couples as star 1." if abs(gain) < UNFELT else ""
+    said = f"Star 1 beats star {k} by {trimmed(100.0 * gain, 3)} %." if gain >= UNFELT else f"Star {k} is as good."
+    said += f" Its throws leave a smaller {', '.join(less)}." if less and gain >= UNFELT else ""
+    said += (
+        f" {'It leaves' if less else 'Its throws leave'} a larger {', '.join(more)}." if more and gain >= UNFELT else ""
+    )
+    return said
+
+
+def _told_apart(result: Result, best: RankedStar, rival: RankedStar) -> list[tuple[float, float, str]]:
+    """Free force or couple of each order asked in which two stars differ, of both, and in words."""
+    asked = {order for measure in result.problem.measures for order in measure.orders or best.orders}
+    moved = {drive.rotor for decision in result.problem.unbalances for drive in decision.rotor_drives}
+    acting = {abs(rotor.shaft.ratio) for rotor in result.final.engine.rotors if rotor.name in moved}
+    found = []
+    for j, order in enumerate(best.orders):
+        pairs = (("force", best.forces[j], rival.forces[j]), ("couple", best.couples[j], rival.couples[j]))
+        for kind, ours, theirs in pairs if order in asked else ():
+            if abs(ours - theirs) > UNFELT * max(ours, theirs):
+                also = ", on which what was decided acts" if order in acting else ""
+                sizes = f"{number(ours, 3, 1.0)} against {number(theirs, 3, 1.0)}"
+                found.append((ours, theirs, f"{kind} of order {order} ({sizes}{also})"))
+    return found
 
 
 def _proven(certificate: Certificate | None) -> str:
