@@ -29,7 +29,7 @@ from laufruhe.machine import (
     SliderCrank,
     Webs,
 )
-from laufruhe.machine.running_gear import round_modulus
+from laufruhe.machine.running_gear import ring_area, round_modulus
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.crank_torque import crank_torque
@@ -273,6 +273,27 @@ def throw_clearance(engine: Engine) -> float:
             room = abs(bearing.x - part.x) - 0.5 * (_pin_size(part)[1] + _journal(bearing)[1])
             found.append(room - thickness)
     return min(found)
+
+
+def gear_mass(engine: Engine) -> float:
+    """Of all crank pins, webs, shanks and piston pins [kg] (Z2)."""
+    gear = gear_of(engine)
+    if gear.density is None:
+        raise ModelError("the mass of the running gear is asked for, and its density is not given")
+    pins = {(part.shaft, part.x, round(part.throw, 9)): part for part in engine.slider_cranks}
+    total = 0.0
+    for part in pins.values():
+        total += 0.0 if part.big_end is None else ring_area(part.big_end[0], 0.0) * part.big_end[1]
+    journal = min((b.diameter for b in engine.bearings if b.diameter is not None), default=0.0)
+    for part in pins.values() if gear.webs else ():
+        reach = part.crank_radius + 0.5 * (part.big_end[0] if part.big_end else 0.0) + 0.5 * journal
+        total += 2.0 * _part(engine, "webs", Webs).area * reach
+    for part in engine.slider_cranks:
+        if gear.rod is not None and not math.isinf(part.rod_length):
+            total += gear.rod.area * part.rod_length
+        if gear.piston_pin is not None:
+            total += ring_area(gear.piston_pin.diameter, gear.piston_pin.bore) * gear.piston_pin.length
+    return gear.density * total
 
 
 def _of_pins(engine: Engine, factor: Callable[[PistonPin], float]) -> Array:

@@ -47,7 +47,6 @@ from laufruhe.problem.channels.kinds import (
     NumberChannel,
     PlaceChannel,
     SizeChannel,
-    SizedChannel,
     of_what_moves,
 )
 from laufruhe.problem.channels.runs import OF_RUNS, RUN_FORCE, RUN_TRAVEL, RUN_TWIST
@@ -69,7 +68,6 @@ __all__ = [
     "NumberChannel",
     "PlaceChannel",
     "SizeChannel",
-    "SizedChannel",
 ]
 
 

@@ -97,6 +97,8 @@ class Channel:
         Of a linear run-up what it is the largest length of, if it is of that.
     of_torque
         Whether the torque of the crank is in it, which other decisions than the flywheel move too.
+    of_engine
+        The value as a function of an engine, if it is of its sizes alone and goes one way with each of them.
     of_modes
         Whether it is of natural frequencies of the crankshaft, which rise with stiffness and fall with inertia.
     span
@@ -114,6 +116,7 @@ class Channel:
     rises: bool = True
     of_wheel: Callable[[Asked, Answered], OfWheel] | None = None
     of_run: Callable[[Response], NDArray[np.float64]] | None = None
+    of_engine: Callable[[Engine], float] | None = None
     of_torque: bool = False
     of_modes: bool = False
     span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
@@ -177,6 +180,9 @@ class LoadChannel(Channel):
         Whether its places are added up, so that no norm but the mean over the cycle has a meaning.
     factors
         Of a twist of the crankshaft, what its places make of that of each section.
+    of_sizes
+        Factors of the sizes of an engine that it is a load inside the crankcase times, one for each place, or for each
+        of its components (Z1).
     """
 
     keys: tuple[str, ...] = ON_BLOCK
@@ -188,9 +194,17 @@ class LoadChannel(Channel):
     is_inside: bool = False
     adds_up: bool = False
     factors: Factors = unit_factors
+    of_sizes: Factor | None = None
     is_load: ClassVar[bool] = True
     feels_unbalances: ClassVar[bool] = True
     """Whether rotors load it, and the loads of each throw add up; else it is of cylinders and what they twist."""
+
+    def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64] | None:
+        """Its factors at every place and component; None where sizes move it by their masses alone."""
+        if self.of_sizes is None:
+            return None
+        found = self.of_sizes(engine, point)
+        return found if found.ndim > 1 else found[:, None]
 
     @property
     def feels_order(self) -> bool:
@@ -206,24 +220,6 @@ class LoadChannel(Channel):
         """Mounts move what they transmit, and nothing of what the block feels."""
         felt = set(kinds) - UNFELT
         return bool(felt if self.part is None and not self.is_inside else felt - OF_MOUNTS)
-
-
-@dataclass(frozen=True, eq=False)
-class SizedChannel(LoadChannel):
-    """A load inside the crankcase, times factors of the sizes of the running gear (Z1).
-
-    Attributes
-    ----------
-    of_sizes
-        These factors of an engine at an operating point, one for each place, or for each of its components.
-    """
-
-    of_sizes: Factor = field(kw_only=True)
-
-    def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64]:
-        """Of every place and component."""
-        found = self.of_sizes(engine, point)
-        return found if found.ndim > 1 else found[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +266,7 @@ class NumberChannel(Channel):
 
 @dataclass(frozen=True, eq=False)
 class SizeChannel(NumberChannel):
-    """A number of sizes alone, that goes one way with each of them."""
+    """A number of sizes alone."""
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """By sizes."""

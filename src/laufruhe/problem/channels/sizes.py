@@ -15,9 +15,9 @@ from laufruhe.problem.channels.kinds import (
     AT_CYLINDERS,
     AT_WEBS,
     IN_CYLINDERS,
+    LoadChannel,
     Needs,
     SizeChannel,
-    SizedChannel,
     of_what_moves,
 )
 from laufruhe.problem.loads import PointLoads
@@ -41,7 +41,7 @@ def _names_of_sides(engine: Engine) -> Sequence[str]:
 def sized(
     name: str, unit: str, keys: tuple[str, ...], needs: Needs, places: Callable[[Engine], Sequence[str]],
     load: Callable[[Engine, OperatingPoint, Fidelity], Spectrum], factor: strength.Factor,
-) -> SizedChannel:  # fmt: skip
+) -> LoadChannel:  # fmt: skip
     """A load of every place, times a factor of its sizes."""
 
     def signal(moving: Engine, at: PointLoads) -> Spectrum:
@@ -50,15 +50,23 @@ def sized(
         return load(moving, at.point, at.fidelity).each(lambda values: values * by)
 
     found = of_what_moves(name, signal)
-    return SizedChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True, of_sizes=factor)
+    return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True, of_sizes=factor)
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     return strength.journal_torques(engine, point, fidelity).each(lambda values: values[..., None])
 
 
-def _clearance(_: Asked, evaluation: Answered) -> Sequence[float]:
-    return (strength.throw_clearance(evaluation.engine),)
+def _number(
+    name: str, unit: str, needs: Needs, sides: tuple[str, ...], of_engine: Callable[[Engine], float]
+) -> SizeChannel:
+    def values(_: Asked, evaluation: Answered) -> Sequence[float]:
+        return (of_engine(evaluation.engine),)
+
+    minimised = sides == ("max",)
+    return SizeChannel(
+        name, unit, (), needs, sides=sides, minimised=minimised, values=values, of_engine=of_engine
+    )  # fmt: skip
 
 
 CRANK_PIN_STRESS = sized(
@@ -105,10 +113,9 @@ PIN_OVALITY = sized(
     "piston-pin ovality", "m", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
     piston_pin_forces, strength.ovality_factors,
 )  # fmt: skip
-THROW_CLEARANCE = SizeChannel(
-    "throw clearance", "m", (), Needs.BEARINGS, sides=("min",), minimised=False, values=_clearance
-)
+THROW_CLEARANCE = _number("throw clearance", "m", Needs.BEARINGS, ("min",), strength.throw_clearance)
+GEAR_MASS = _number("running-gear mass", "kg", Needs.NOTHING, ("max",), strength.gear_mass)
 OF_SIZES = (
     CRANK_PIN_STRESS, WEB_STRESS, JOURNAL_TORSION, JOURNAL_STRESS, MAIN_BEARING_PV, ROD_STRESS, ROD_BUCKLING,
-    BOLT_STRESS, PIN_PRESSURE, PIN_STRESS, PIN_DEFLECTION, PIN_OVALITY, THROW_CLEARANCE,
+    BOLT_STRESS, PIN_PRESSURE, PIN_STRESS, PIN_DEFLECTION, PIN_OVALITY, THROW_CLEARANCE, GEAR_MASS,
 )  # fmt: skip

@@ -1,0 +1,223 @@
+"""Measures as functions of sizes: loads affine in four masses, times factors of the sizes (Z1, Z12).
+
+The masses are those that running gear adds: to what reciprocates, to what turns with the rod, to the inertia of the
+rod, and to the throw. Loads are affine in them at a given length of the rod: the exact model is asked five times.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.machine import Engine
+from laufruhe.machine.running_gear import ROD_LENGTH, Size
+from laufruhe.numerics.norms import Grid
+from laufruhe.numerics.norms.norm import lengths
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.problem.decision import SizeDrive
+from laufruhe.problem.evaluation import Evaluation, evaluate, over
+from laufruhe.problem.measure import Measure, bends_of, load_rows
+from laufruhe.problem.problem import Problem
+
+Array = NDArray[np.float64]
+MASSES, MOST_KEPT = 4, 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Rows of a measure that have their factors together.
+
+    Attributes
+    ----------
+    affine
+        Of the masses, shape (4,); rows at the sizes that the problem starts from.
+    at
+        Of every operating point in it, its index, its places (all when None) and the rows of each.
+    given
+        Factors of these at the start, shape (places, 1 or d) each.
+    """
+
+    affine: AffineNorm
+    at: tuple[tuple[int, int | None, int], ...]
+    given: tuple[Array, ...]
+
+    def ratio(self, factors: Sequence[Array]) -> float | None:
+        """Factor of all rows over that at the start; None where they differ."""
+        found = [np.ones(1), *(new / old for new, old in zip(factors, self.given, strict=True))][bool(factors) :]
+        ratios = np.concatenate([each.ravel() for each in found])
+        return float(ratios[0]) if np.all(ratios == ratios[0]) else None
+
+    def scaled(self, factors: Sequence[Array]) -> AffineNorm:
+        """The norm with other factors."""
+        parts = zip(factors, self.given, self.at, strict=True)
+        by = np.concatenate([np.repeat(new / old, rows, axis=0) for new, old, (_, _, rows) in parts])
+        return replace(self.affine, constant=self.affine.constant * by, slope=self.affine.slope * by[..., None])
+
+    def value(self, factors: Sequence[Array], masses: Array) -> float:
+        """The norm."""
+        ratio = self.ratio(factors)
+        return self.scaled(factors).value(masses) if ratio is None else ratio * self.affine.value(masses)
+
+    def pruned(self, low: Array, high: Array) -> Piece:
+        """Of a largest length with one factor: without rows that are not the longest for any masses between two."""
+        own, reach = self.affine, 0.5 * (high - low)
+        size = lengths(own.rows(low + reach))
+        moved = np.sqrt(np.square(own.slope).sum(axis=1)) @ reach
+        kept = size + moved >= (size - moved).max()
+        affine = replace(own, constant=own.constant[kept], slope=own.slope[kept], grid=_plain(int(kept.sum())))
+        return replace(self, affine=affine, at=tuple((k, place, affine.grid.steps) for k, place, _ in self.at))
+
+
+def _plain(rows: int) -> Grid:
+    return Grid(np.full(rows, 1.0 / max(rows, 1)), rows)
+
+
+class SizeModel:
+    """A problem whose sizes are open.
+
+    Parameters
+    ----------
+    problem
+        That leaves nothing open but sizes, at an even speed of the crank.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.names = [drive.size for d in problem.decisions for drive in d.drives if isinstance(drive, SizeDrive)]
+        self.lower = np.array([d.lower for d in problem.decisions])
+        self.upper = np.array([d.upper for d in problem.decisions])
+        given = problem.engine.moving
+        self._given = given.sizes
+        self._engines, self._masses = dict[bytes, Engine](), dict[bytes, Array]()
+        # of its sizes alone: one slider-crank, no rotors
+        self._bare = replace(given, parts=given.parts[:1], rotors=())
+        self._pieces: dict[float, dict[Measure, tuple[Piece, ...]]] = {}
+
+    @property
+    def moves_rod(self) -> bool:
+        """Whether the length of the rod is open, in which nothing is affine."""
+        return ROD_LENGTH in self.names
+
+    def engine(self, x: Array) -> Engine:
+        """With sizes."""
+        key = x.tobytes()
+        if key not in self._engines:
+            if len(self._engines) > MOST_KEPT:
+                self._engines.clear()
+            self._engines[key] = self.problem.engine.resized(self._sizes(x))
+        return self._engines[key]
+
+    def _sizes(self, x: Array) -> dict[Size, float]:
+        return {**self._given, **dict(zip(self.names, x.tolist(), strict=True))}
+
+    def masses(self, x: Array) -> Array:
+        """That the running gear adds, shape (4,)."""
+        gear, key = self.problem.engine.gear, x.tobytes()
+        if gear is None or gear.density is None:
+            return np.zeros(MASSES)
+        if key not in self._masses:
+            if len(self._masses) > MOST_KEPT:
+                self._masses.clear()
+            found = self._bare.resized(self._sizes(x))
+            self._masses[key] = np.array([*(found.gear or gear).rod_masses(found.parts[0]), found.throw_unbalance])
+        return self._masses[key]
+
+    def factors(self, piece: Piece, measure: Measure, engine: Engine) -> list[Array]:
+        """Of the sizes of an engine, for the rows of a piece."""
+        return _factors(measure, engine, self.problem, piece.at)
+
+    def value(self, measure: Measure, x: Array) -> float:
+        """Of a design [SI]."""
+        engine = self.engine(x)
+        if measure.channel.of_engine is not None:
+            return measure.channel.of_engine(engine)
+        masses = self.masses(x)
+        pieces = self.pieces(measure, engine.slider_cranks[0].rod_length)
+        return max(piece.value(self.factors(piece, measure, engine), masses) for piece in pieces)
+
+    def pieces(self, measure: Measure, rod_length: float | None = None) -> tuple[Piece, ...]:
+        """A measure of loads at a length of the rod, that of the start unless told: the largest of these."""
+        length = self.problem.engine.slider_cranks[0].rod_length if rod_length is None else rod_length
+        known = self._pieces.setdefault(length, {})
+        if measure not in known:
+            known[measure] = self._cut_up(measure, length)
+        return known[measure]
+
+    @cached_property
+    def mass_box(self) -> tuple[Array, Array]:
+        """Least and most of the masses within the bounds: they go one way with each size."""
+        ends = zip(self.lower, self.upper, strict=True)
+        found = np.array([self.masses(np.array(each)) for each in itertools.product(*ends)])
+        return found.min(axis=0), found.max(axis=0)
+
+    @cached_property
+    def _evaluations(self) -> dict[float, list[Evaluation]]:
+        return {}
+
+    def _with_masses(self, length: float) -> list[Evaluation]:
+        """Loads without the masses of the running gear, and with one unit of each."""
+        if length not in self._evaluations:
+            given = self.problem.engine
+            sizes = given.moving.sizes
+            given = given if length == sizes[ROD_LENGTH] else given.resized({**sizes, ROD_LENGTH: length})
+            bare = given.moving.weighed(-1.0)
+            engines = []
+            for unit in (np.zeros(MASSES), *np.eye(MASSES)):
+                gear, parts, rotors = given.gear, bare.parts, bare.rotors
+                parts = tuple(
+                    replace(
+                        part, reciprocating_mass=part.reciprocating_mass + unit[0],
+                        rotating_mass=part.rotating_mass + unit[1],
+                        rod_inertia_deficit=part.rod_inertia_deficit + unit[2],
+                    )
+                    for part in parts
+                )  # fmt: skip
+                ways = dict(gear.throws) if gear else {}
+                rotors = tuple(replace(r, unbalance=r.unbalance + unit[3] * ways.get(r.name, 0.0)) for r in rotors)
+                engines.append(replace(given, slider_cranks=parts, rotors=rotors))
+            self._evaluations[length] = [evaluate(self.problem, engine) for engine in engines]
+        return self._evaluations[length]
+
+    def _cut_up(self, measure: Measure, length: float) -> tuple[Piece, ...]:
+        found, problem, channel = self._with_masses(length), self.problem, measure.load
+        base = problem.engine.cycle.base_order
+        steps = measure.norm.refinement * problem.fidelity.samples
+        signals: list[list[Spectrum]] = [over(base, each.signals(channel)) for each in found]
+        bends = bends_of(measure, signals[0], problem.engine)
+        rows = [load_rows(measure, problem.points, own, problem.engine, steps, bends) for own in signals]
+        slopes = [own.vectors - rows[0].vectors for own in rows[1:]]
+        whole = AffineNorm(rows[0].norm, rows[0].vectors, np.stack(slopes, axis=-1), rows[0].grid)
+        each = steps + len(bends[0])
+        points = [k for k, share in enumerate(measure.shares(problem.points)) if share > 0.0]
+        if not measure.norm.is_largest or len(whole.constant) % (each * len(points)):
+            every = tuple((k, None, each) for k in points)
+            return (Piece(whole, every, tuple(_factors(measure, found[0].engine, problem, every))),)
+        places = len(whole.constant) // (each * len(points))
+        pieces = []
+        for n, (k, place) in enumerate(itertools.product(points, range(places))):
+            own = slice(n * each, (n + 1) * each)
+            affine = replace(whole, constant=whole.constant[own], slope=whole.slope[own], grid=_plain(each))
+            at = ((k, place, each),)
+            piece = Piece(affine, at, tuple(_factors(measure, found[0].engine, problem, at)))
+            scalar = not piece.given or piece.given[0].size == 1
+            pieces.append(piece.pruned(*self.mass_box) if scalar else piece)
+        return tuple(pieces)
+
+
+def _factors(
+    measure: Measure, engine: Engine, problem: Problem, at: Sequence[tuple[int, int | None, int]]
+) -> list[Array]:  # fmt: skip
+    """Of the places that count, shape (places, 1 or d), at every operating point."""
+    counted, found = measure.places(measure.load.places(engine)), []
+    for k, place, _ in at:
+        factors = measure.load.factors_of(engine, problem.points[k])
+        if factors is None:
+            return []
+        found.append(factors[counted] if place is None else factors[counted][place : place + 1])
+    return found

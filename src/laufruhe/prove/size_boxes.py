@@ -1,0 +1,251 @@
+"""Bounds of what sizes can reach, on boxes of them (Z12).
+
+In a box every factor of a load is least at one corner, for it goes one way with each size; the masses lie between those
+of two corners, for so do they. A norm of rows that are affine in the masses is nowhere under <Z, V>, Z its subgradient
+at any masses: its least value over that interval bounds the norm. Sides of a box on which a limit is broken everywhere,
+or nothing is better than a design known, are cut off; what is left is halved.
+"""
+
+from __future__ import annotations
+
+import copy
+import heapq
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.load_models.sized_model import MASSES, Piece, SizeModel
+from laufruhe.machine import Engine
+from laufruhe.numerics.budget import passed
+from laufruhe.numerics.progress import tell
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.prove.subdivision import Divided
+
+Array = NDArray[np.float64]
+Ways: TypeAlias = Array
+
+MOST_BOXES = 3000
+# a limit counts as broken beyond so much of it; halvings of a side that is cut, rounds of that, and bounds of a load
+SLACK, HALVINGS, ROUNDS, MOST_TOUCHED = 1e-9, 10, 3, 200
+NEARLY = 0.9
+
+
+class _Bundle:
+    """Affine functions of the masses that a norm is nowhere under, as many as were asked for (P4)."""
+
+    def __init__(self, affine: AffineNorm) -> None:
+        self.affine = affine
+        self.constants, self.slopes = np.zeros(0), np.zeros((0, MASSES))
+
+    def touch(self, masses: Array) -> None:
+        """One more that the norm meets at these masses."""
+        z = self.affine.subgradient(masses)
+        self.constants = np.append(self.constants, float(np.vdot(z, self.affine.constant)))
+        self.slopes = np.vstack([self.slopes, self.affine.pulled(z)])
+
+    def least(self, low: Array, high: Array) -> float:
+        """Of masses between two."""
+        ends = np.where(self.slopes > 0.0, self.slopes * low, self.slopes * high).sum(axis=1)
+        return max(float((self.constants + ends).max(initial=0.0)), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Number:
+    """A measure, or less than nothing of it, as boxes see it.
+
+    Attributes
+    ----------
+    sense
+        1, or -1 where it is to be large.
+    ways
+        For each size whether its factors grow with it (1) or fall (-1).
+    pieces
+        Of a load, each with what bounds it.
+    """
+
+    measure: Measure
+    sense: float
+    ways: Ways
+    pieces: tuple[tuple[Piece, _Bundle], ...] = ()
+
+
+class SizeBoxes:
+    """What no design in a box goes under.
+
+    Raises
+    ------
+    ValueError
+        If the length of the rod is open, or a measure does not go one way with a size.
+    """
+
+    def __init__(self, model: SizeModel) -> None:
+        if model.moves_rod:
+            raise ValueError("loads are not affine where the length of the rod moves")
+        self.model, problem = model, model.problem
+        # for each size whether masses grow with it or fall
+        self._light = self._ways(lambda x: np.abs(self.model.masses(x)))
+        self.terms = [(term.weight, self._number(term.measure, 1.0)) for term in problem.objective]
+        self.limits: list[tuple[float, _Number, Limit]] = []
+        for limit in problem.limits:
+            for edge, sense in ((limit.maximum, 1.0), (limit.minimum, -1.0)):
+                if math.isfinite(edge):
+                    most = sense * edge + SLACK * abs(edge)
+                    self.limits.append((most, self._number(limit.measure, sense), limit))
+        self.touch(model.lower, model.upper)
+
+    def _number(self, measure: Measure, sense: float) -> _Number:
+        if measure.channel.of_engine is not None:
+            return _Number(measure, sense, self._ways(lambda x: np.array([sense * self.model.value(measure, x)])))
+        if not measure.norm.of_row_lengths or measure.norm.joins_points or sense < 0.0:
+            raise ValueError(f"{measure.name} is not bounded on boxes of sizes")
+        pieces = self.model.pieces(measure)
+
+        def factors(x: Array) -> Array:
+            engine = self.model.engine(x)
+            found = [each.ravel() for piece in pieces for each in self.model.factors(piece, measure, engine)]
+            return np.concatenate(found) if found else np.zeros(1)
+
+        return _Number(measure, sense, self._ways(factors), tuple((piece, _Bundle(piece.affine)) for piece in pieces))
+
+    def _ways(self, numbers: Callable[[Array], Array]) -> Ways:
+        """Of numbers that go one way with each size: which way each of them takes all of them, zero where none."""
+        lower, upper = self.model.lower, self.model.upper
+        ways = np.zeros(len(lower))
+        for start in (lower, upper):
+            for k in range(len(lower)):
+                ends = [np.where(np.arange(len(lower)) == k, edge, start) for edge in (lower, upper)]
+                change = numbers(ends[1]) - numbers(ends[0])
+                rises, falls = bool(np.any(change > 0.0)), bool(np.any(change < 0.0))
+                way = float(rises) - float(falls)
+                if (rises and falls) or way * ways[k] < 0.0:
+                    raise ValueError(f"a measure does not go one way with {self.model.problem.decisions[k].name}")
+                ways[k] = way or ways[k]
+        return ways
+
+    def keeping(self, limits: Sequence[Limit]) -> SizeBoxes:
+        """The same with some of the limits alone, and nothing wanted."""
+        other = copy.copy(self)
+        other.terms, other.limits = [], [each for each in self.limits if each[2] in limits]
+        return other
+
+    def masses(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Least and most of the masses on a box, shape (4,)."""
+        ends = (self.model.masses(corner(way * self._light, lower, upper)) for way in (1.0, -1.0))
+        light, heavy = ends
+        return np.minimum(light, heavy), np.maximum(light, heavy)
+
+    def touch(self, lower: Array, upper: Array) -> None:
+        """Bounds that loads meet at masses of a box."""
+        low, high = self.masses(lower, upper)
+        for number in (*(number for _, number in self.terms), *(number for _, number, _ in self.limits)):
+            for _, bundle in number.pieces:
+                for masses in (low, 0.5 * (low + high)) if len(bundle.constants) < MOST_TOUCHED else ():
+                    bundle.touch(masses)
+
+    def least(self, number: _Number, lower: Array, upper: Array, masses: tuple[Array, Array]) -> float:
+        """Of a measure on a box."""
+        at = corner(number.ways, lower, upper)
+        if not number.pieces:
+            return number.sense * self.model.value(number.measure, at)
+        engine = self.model.engine(at) if np.any(number.ways) else self.model.problem.engine
+        return max(self._piece(piece, bundle, number.measure, engine, masses) for piece, bundle in number.pieces)
+
+    def _piece(
+        self, piece: Piece, bundle: _Bundle, measure: Measure, engine: Engine, masses: tuple[Array, Array]
+    ) -> float:  # fmt: skip
+        factors = self.model.factors(piece, measure, engine)
+        ratio = piece.ratio(factors)
+        if ratio is not None:
+            return ratio * bundle.least(*masses)
+        own = _Bundle(piece.scaled(factors))
+        own.touch(0.5 * (masses[0] + masses[1]))
+        return own.least(*masses)
+
+    def objective(self, lower: Array, upper: Array) -> float:
+        """Least on a box."""
+        masses = self.masses(lower, upper)
+        return sum(weight * self.least(number, lower, upper, masses) for weight, number in self.terms)
+
+    def breaks(self, lower: Array, upper: Array, k: int | None = None, way: float = 0.0) -> bool:
+        """Whether a limit is broken all over a box; of those limits that go one way with size k, where that is told."""
+        masses = self.masses(lower, upper)
+        return any(
+            self.least(number, lower, upper, masses) > most
+            for most, number, _ in self.limits
+            if k is None or number.ways[k] == way
+        )
+
+    def cut(self, lower: Array, upper: Array, enough: float) -> tuple[Array, Array, float] | None:
+        """A box without sides that hold no better design, and its least objective; None where nothing is left."""
+        self.touch(lower, upper)
+        if self.breaks(lower, upper) or self.objective(lower, upper) >= enough:
+            return None
+        for _ in range(ROUNDS):
+            before = (upper - lower).sum()
+            for k in range(len(lower)):
+                lower, upper = self._shaved(lower, upper, k, enough)
+            if (upper - lower).sum() > 0.9 * before:
+                break
+        bound = self.objective(lower, upper)
+        return None if bound >= enough else (lower, upper, bound)
+
+    def _shaved(self, lower: Array, upper: Array, k: int, enough: float) -> tuple[Array, Array]:
+        """Without as much of the ends of one side as is shown to hold nothing."""
+        here = np.arange(len(lower)) == k
+
+        def low_empty(edge: float) -> bool:
+            return self.breaks(lower, np.where(here, edge, upper), k, -1.0)
+
+        first = _last_empty(low_empty, lower[k], upper[k])
+        lower = np.where(here, first, lower)
+
+        def high_empty(edge: float) -> bool:
+            part = np.where(here, edge, lower), upper
+            return self.objective(*part) >= enough or self.breaks(*part, k, 1.0)
+
+        return lower, np.where(here, _last_empty(high_empty, upper[k], lower[k]), upper)
+
+
+def _last_empty(empty: Callable[[float], bool], start: float, end: float) -> float:
+    """How far from its start a side is shown to be empty, by halving."""
+    done, far = start, end
+    for _ in range(HALVINGS if start != end else 0):
+        middle = 0.5 * (done + far)
+        if empty(middle):
+            done = middle
+        elif done == start and abs(middle - start) < 0.02 * abs(end - start):
+            break
+        else:
+            far = middle
+    return done
+
+
+def corner(ways: Ways, lower: Array, upper: Array) -> Array:
+    """Where numbers that go these ways are least."""
+    return np.where(ways >= 0.0, lower, upper)
+
+
+def divided_sizes(boxes: SizeBoxes, value: float, room: float, most: int = MOST_BOXES) -> Divided:
+    """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (Z12)."""
+    model = boxes.model
+    enough = value - NEARLY * room if value < math.inf else math.inf
+    first = boxes.cut(model.lower, model.upper, enough)
+    heap = [] if first is None else [(first[2], 0, first[0], first[1])]
+    seen = 1
+    while heap and heap[0][0] < enough and seen < most and not passed():
+        bound, _, lower, upper = heapq.heappop(heap)
+        tell("boxes of sizes", seen, value=value, bound=bound)
+        k = int(np.argmax((upper - lower) / np.maximum(model.upper - model.lower, 1e-300)))
+        middle, here = 0.5 * (lower[k] + upper[k]), np.arange(len(lower)) == k
+        for low, high in ((lower, np.where(here, middle, upper)), (np.where(here, middle, lower), upper)):
+            seen += 1
+            kept = boxes.cut(low, high, enough)
+            if kept is not None:
+                heapq.heappush(heap, (max(kept[2], bound), seen, kept[0], kept[1]))
+    places = tuple(0.5 * (low + high) for _, _, low, high in heapq.nsmallest(3, heap))
+    return Divided(min(heap[0][0] if heap else enough, enough), seen, places)

@@ -1,0 +1,150 @@
+"""Local programs over the shares of the bounds, 0 to 1: sequential quadratic programs from several starts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize, nnls
+
+from laufruhe.errors import ModelError
+from laufruhe.numerics.budget import passed
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Side
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.conclusion import KEPT, Design
+
+Array = NDArray[np.float64]
+
+# designs looked at for each start of the search; step of a slope, room that is none, and an objective that is far off
+LOOKS, STEP, HELD, FAR = 4, 1e-6, 1e-6, 1e3
+
+
+@dataclass(frozen=True, eq=False)
+class LocalProgram:
+    """Objective and room of every limit over the shares of the bounds, 0 to 1."""
+
+    problem: Problem
+    lower: Array
+    upper: Array
+
+    def values(self, shares: Array) -> list[float]:
+        """Decisions."""
+        return list(np.clip(self.lower + shares * (self.upper - self.lower), self.lower, self.upper).tolist())
+
+    def numbers(self, shares: Array) -> Array:
+        """The objective, then the least relative room inside each limit; an objective far off on a resonance."""
+        try:
+            evaluation = evaluate(self.problem, self.problem.design(self.values(shares)))
+            rooms = [-evaluation.standing(limit).excess for limit in self.problem.limits]
+            return np.array([objective_value(self.problem, evaluation), *rooms])
+        except ModelError:
+            return np.array([math.inf, *(-1.0 for _ in self.problem.limits)])
+
+    def slopes(self, shares: Array) -> Array:
+        """Of these numbers, by central differences inside the bounds, shape (1 + limits, n)."""
+        found = []
+        for k in range(len(shares)):
+            ends = [np.clip(shares + sign * STEP * np.eye(len(shares))[k], 0.0, 1.0) for sign in (-1.0, 1.0)]
+            low, high = (self.numbers(end) for end in ends)
+            found.append((high - low) / (ends[1][k] - ends[0][k]))
+        return np.ascontiguousarray(np.array(found).T)
+
+    def rank(self, shares: Array) -> tuple[float, float]:
+        """Designs within their limits by their objective, others by what they exceed these by."""
+        value, *rooms = self.numbers(shares)
+        return max(-min(rooms, default=0.0), KEPT), float(value)
+
+
+def looks(problem: Problem) -> list[Array]:
+    """Designs spread evenly over the bounds."""
+    rng, many = np.random.default_rng(problem.search.seed), LOOKS * problem.search.starts
+    # of each number one in every share of its bounds
+    columns = [(rng.permutation(many) + rng.random(many)) / many for _ in problem.decisions]
+    return list(np.array(columns).T)
+
+
+def searched(program: LocalProgram, places: list[Array], starts: int) -> Array:
+    """The best design of local programs from the best of some places."""
+    ranked = sorted(places, key=program.rank)
+    best = ranked[0]
+    for place in ranked[: max(1, min(starts, LOOKS))]:
+        if passed():
+            break
+        best = min(best, _local(program, place), key=program.rank)
+    return best
+
+
+def _local(program: LocalProgram, place: Array) -> Array:
+    """A local optimum by sequential quadratic programs, its slopes by differences."""
+    first = program.numbers(place)
+    unit = first[0] if math.isfinite(first[0]) and first[0] > 0.0 else 1.0
+    known: dict[bytes, Array] = {}
+
+    def numbers(x: Array) -> Array:
+        key = np.clip(x, 0.0, 1.0).tobytes()
+        if key not in known:
+            found = program.numbers(np.clip(x, 0.0, 1.0))
+            known[key] = np.append(min(found[0] / unit, FAR), found[1:])
+        return known[key]
+
+    def slopes(x: Array) -> Array:
+        found = program.slopes(np.clip(x, 0.0, 1.0))
+        found[0] /= unit
+        return np.nan_to_num(found, posinf=FAR, neginf=-FAR)
+
+    limits = len(program.problem.limits)
+    inside: Any = [{"type": "ineq", "fun": lambda x: numbers(x)[1:], "jac": lambda x: slopes(x)[1:]}] if limits else []
+    run: Any = minimize
+    found = run(
+        lambda x: numbers(x)[0], place, jac=lambda x: slopes(x)[0], method="SLSQP", bounds=[(0.0, 1.0)] * len(place),
+        constraints=inside, options={"maxiter": 60, "ftol": 1e-10},
+    )  # fmt: skip
+    return np.asarray(np.clip(found.x, 0.0, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Prices:
+    """Multipliers of a design.
+
+    Attributes
+    ----------
+    rest
+        How far slopes are from balance.
+    limits, slopes
+        As `Shown` has them.
+    """
+
+    rest: float
+    limits: Mapping[Side, float]
+    slopes: Mapping[str, Array]
+
+
+def priced(program: LocalProgram, design: Design, best: Array) -> Prices:
+    """Multipliers of the limits and bounds that hold a design."""
+    problem = program.problem
+    slopes = program.slopes(best)
+    rooms = program.numbers(best)[1:]
+    size = float(np.abs(slopes[0]).max()) or 1.0
+    held = [k for k, room in enumerate(rooms) if room <= HELD]
+    low, high = best <= HELD, best >= 1.0 - HELD
+    columns = [-slopes[1 + k] / (float(np.abs(slopes[1 + k]).max()) or 1.0) for k in held]
+    columns += [sign * np.eye(len(best))[k] for mask, sign in ((low, -1.0), (high, 1.0)) for k in np.flatnonzero(mask)]
+    scale = max(size, design.value)
+    shares, rest = nnls(np.column_stack(columns), -slopes[0] / scale) if columns else (np.zeros(0), size / scale)
+    prices: dict[Side, float] = {}
+    left = slopes[0].copy()
+    for k, share in zip(held, shares, strict=False):
+        limit = problem.limits[k]
+        steep = float(np.abs(slopes[1 + k]).max()) or 1.0
+        _, edge, side = limit.room(design.evaluation.standing(limit).value)
+        # rooms are relative to the edge of their limit
+        prices[limit, side] = float(share) * scale / (steep * (abs(edge) or 1.0))
+        left = left - float(share) * scale / steep * slopes[1 + k]
+    widths = program.upper - program.lower
+    by_name = {d.name: np.array([left[k] / widths[k]]) for k, d in enumerate(problem.decisions)}
+    return Prices(float(rest), prices, by_name)

@@ -1,0 +1,315 @@
+"""Sizes of the running gear as decisions: proven designs against a grid of plain formulas and a geometric program."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import cvxpy as cp
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import laufruhe
+from laufruhe.errors import InputError, ModelError
+from laufruhe.load_models.sized_model import SizeModel
+from laufruhe.physics.torque import crank_torque
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.prove.certificate import Proof
+from laufruhe.prove.size_boxes import SizeBoxes
+from laufruhe.solvers import Status
+from laufruhe.solvers.result import Result
+from problem_files import PROBLEMS, changed, loaded
+
+Array = NDArray[np.float64]
+STROKE, LENGTH, SPEED, DENSITY, PISTON, SPAN, JOURNAL = 0.08, 0.14, 400.0, 7850.0, 0.5, 0.12, 0.05
+TEXT = f"""
+title = "Single that turns fast"
+[engine]
+layout = "inline"
+cycle = "two-stroke"
+stroke = "{STROKE} m"
+rod_length = "{LENGTH} m"
+reciprocating_mass = "{PISTON} kg"
+rotating_mass = "0 kg"
+throws = [0]
+[engine.big_end]
+diameter = {{ between = ["25 mm", "60 mm"], start = "50 mm" }}
+width = {{ between = ["20 mm", "40 mm"], start = "35 mm" }}
+[[operating_points]]
+speed = "{SPEED} rad/s"
+[[main_bearings]]
+x = "{0.5 * SPAN} m"
+diameter = "{JOURNAL} m"
+width = "25 mm"
+[[main_bearings]]
+x = "{-0.5 * SPAN} m"
+diameter = "{JOURNAL} m"
+width = "25 mm"
+[running_gear]
+density = "{DENSITY} kg/m^3"
+webs = {{ width = "60 mm", thickness = {{ between = ["8 mm", "25 mm"], start = "20 mm" }} }}
+rod = {{ diameter = {{ between = ["8 mm", "25 mm"], start = "20 mm" }} }}
+[objective]
+minimise = "mean shaking force"
+[[constraints]]
+limit = "maximum crank-pin bending stress"
+max = "60 N/mm^2"
+[[constraints]]
+limit = "maximum crank-pin pressure"
+max = "5 N/mm^2"
+[[constraints]]
+limit = "maximum web stress"
+max = "50 N/mm^2"
+[[constraints]]
+limit = "maximum rod stress"
+max = "40 N/mm^2"
+[fidelity]
+samples = 360
+"""
+WEIGHT = '[[counterweights]]\nname = "w"\nopposite_throw = 1\nunbalance = { between = ["0 kg m", "0.05 kg m"] }\n'
+
+
+@pytest.fixture(scope="module")
+def solved() -> Result:
+    return laufruhe.solve(TEXT)
+
+
+def plain(pin: Array, width: Array, web: Array, rod: Array) -> tuple[Array, Array]:
+    """Mean shaking force and shares of the four limits of many designs, shape (designs,) and (4, designs)."""
+    steps, radius = 1440, 0.5 * STROKE
+    phi = np.arange(steps) * math.tau / steps
+    psi = np.arcsin(radius * np.sin(phi) / LENGTH)
+
+    def rate(values: Array) -> Array:
+        orders = np.fft.fftfreq(steps, 1.0 / steps)
+        return np.fft.ifft(1j * orders * SPEED * np.fft.fft(values)).real
+
+    piston = rate(rate(radius * np.cos(phi) + LENGTH * np.cos(psi)))
+    shank = DENSITY * math.pi / 4.0 * rod**2 * LENGTH
+    deficit = shank * LENGTH**2 / 12.0 - 2.0 * 0.5 * shank * (0.5 * LENGTH) ** 2
+    own, turning = PISTON + 0.5 * shank, 0.5 * shank
+    throw = DENSITY * math.pi / 4.0 * pin**2 * width * radius
+    throw += 2.0 * DENSITY * 0.060 * web * 0.5 * ((radius + 0.5 * pin) ** 2 - (0.5 * JOURNAL) ** 2)
+    up = -np.outer(own, piston) + np.outer(turning * radius + throw, SPEED**2 * np.cos(phi))
+    left = np.outer(turning * radius + throw, SPEED**2 * np.sin(phi))
+    along = -np.outer(own, piston)
+    across = -along * np.tan(psi) - np.outer(deficit, rate(rate(psi)) / (LENGTH * np.cos(psi)))
+    at_pin = np.hypot(along + np.outer(turning * radius, SPEED**2 * np.cos(phi)),
+                      across + np.outer(turning * radius, SPEED**2 * np.sin(phi)))  # fmt: skip
+    whole = np.hypot(along + np.outer(turning * radius + throw, SPEED**2 * np.cos(phi)),
+                     across + np.outer(turning * radius + throw, SPEED**2 * np.sin(phi))).max(axis=1)  # fmt: skip
+    lever = 0.5 * SPAN - 0.5 * (width + web)
+    shares = np.array([
+        whole * SPAN / 4.0 / (math.pi / 32.0 * pin**3) / 60e6,
+        at_pin.max(axis=1) / (pin * width) / 5e6,
+        0.5 * whole * (lever / (0.060 * web**2 / 6.0) + 1.0 / (0.060 * web)) / 50e6,
+        np.hypot(along, across).max(axis=1) / (math.pi / 4.0 * rod**2) / 40e6,
+    ])  # fmt: skip
+    return np.hypot(up, left).mean(axis=1), shares
+
+
+def test_no_design_of_a_grid_beats_the_bound(solved: Result) -> None:
+    """Of 20 000 designs by plain formulas none that is allowed is under it; the design found is what they say."""
+    assert solved.status is Status.OPTIMAL
+    assert solved.certificate.kind is Proof.GLOBAL
+    assert solved.certificate.kkt_residual < 1e-4
+    found = np.array([[d.value] for d in solved.decisions])
+    value, shares = plain(*found)
+    assert value[0] == pytest.approx(solved.objective.value, rel=1e-6)
+    assert 60e6 * shares[0, 0] == pytest.approx(solved.limits[0].value, rel=1e-4)
+    assert [limit.value / limit.limit for limit in solved.limits] == pytest.approx(shares[:, 0], rel=1e-4)
+    lower, upper = (np.array([getattr(d, end) for d in solved.decisions]) for end in ("lower", "upper"))
+    rng = np.random.default_rng(0)
+    even = np.array(np.meshgrid(*[np.linspace(a, b, 9) for a, b in zip(lower, upper, strict=True)])).reshape(4, -1)
+    near = np.clip(found * (1.0 + 0.05 * rng.standard_normal((4, 4000))), lower[:, None], upper[:, None])
+    best = math.inf
+    for designs in (even, near):
+        values, broken = plain(*designs)
+        kept = broken.max(axis=0) <= 1.0
+        assert kept.any()
+        best = min(best, float(values[kept].min()))
+    assert best >= solved.certificate.lower_bound
+    assert best == pytest.approx(solved.objective.value, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [0, 3])
+def test_a_price_is_what_a_relaxed_limit_gains(index: int, solved: Result) -> None:
+    limit = solved.limits[index]
+    assert limit.active
+    by = 5e-3 * limit.limit
+    relaxed = [replace(o, maximum=o.maximum + by) if k == index else o for k, o in enumerate(solved.problem.limits)]
+    other = laufruhe.solve(solved.problem.changed(limits=tuple(relaxed)))
+    gained = (solved.objective.value - other.objective.value) / by
+    assert gained == pytest.approx(limit.shadow_price, rel=0.05)
+
+
+def test_boxes_bound_what_is_in_them() -> None:
+    """Random boxes and designs in them: no objective under its bound, no allowed design in a box that is dropped."""
+    problem = laufruhe.load(TEXT)
+    model = SizeModel(problem)
+    boxes, rng = SizeBoxes(model), np.random.default_rng(2)
+    for _ in range(25):
+        low, high = np.sort(model.lower + rng.random((2, 4)) * (model.upper - model.lower), axis=0)
+        boxes.touch(low, high)
+        bound, dropped = boxes.objective(low, high), boxes.breaks(low, high)
+        cut = boxes.cut(low, high, math.inf)
+        for _ in range(6):
+            x = low + rng.random(4) * (high - low)
+            evaluation = evaluate(problem, problem.design(x.tolist()))
+            assert model.value(problem.objective[0].measure, x) == pytest.approx(
+                evaluation.value(problem.objective[0].measure), rel=1e-9
+            )
+            assert evaluation.value(problem.objective[0].measure) >= bound * (1.0 - 1e-9)
+            allowed = evaluation.excess(problem.limits) <= 0.0
+            assert not (allowed and dropped)
+            if allowed:
+                assert cut is not None
+                assert np.all(cut[0] <= x)
+                assert np.all(x <= cut[1])
+
+
+GP = """
+title = "Slow machine, so that masses weigh nothing against the gas"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+bore = "120 mm"
+stroke = "140 mm"
+rod_length = "250 mm"
+reciprocating_mass = "0.01 kg"
+firing_order = [1]
+big_end = { diameter = { between = ["40 mm", "120 mm"] }, width = "50 mm" }
+[[operating_points]]
+speed = "1 rpm"
+[gas]
+model = "seiliger"
+peak_pressure = "70 bar"
+imep = "8 bar"
+[[main_bearings]]
+name = "front"
+x = "100 mm"
+diameter = "70 mm"
+width = { between = ["20 mm", "80 mm"] }
+[[main_bearings]]
+name = "rear"
+x = "-100 mm"
+diameter = { between = ["30 mm", "120 mm"] }
+width = { between = ["20 mm", "80 mm"] }
+[running_gear]
+density = "7850 kg/m^3"
+elastic_modulus = "200 GPa"
+webs = { width = { between = ["40 mm", "120 mm"] }, thickness = "45 mm" }
+rod = { diameter = { between = ["10 mm", "60 mm"] } }
+[objective]
+minimise = "running-gear mass"
+[[constraints]]
+limit = "maximum crank-pin bending stress"
+max = "90 N/mm^2"
+[[constraints]]
+limit = "maximum web stress"
+max = "80 N/mm^2"
+[[constraints]]
+limit = "maximum journal torsion stress"
+max = "30 N/mm^2"
+[[constraints]]
+limit = "maximum main-bearing pressure"
+max = "12 N/mm^2"
+[[constraints]]
+limit = "maximum share of the buckling load"
+max = "1/15"
+[[constraints]]
+limit = "throw clearance"
+min = "1 mm"
+[fidelity]
+samples = 180
+"""
+
+
+@pytest.mark.slow
+def test_where_masses_weigh_nothing_it_is_a_geometric_program() -> None:
+    """A log-log convex program of cvxpy for the same sizes, loads taken once from the exact model."""
+    result = laufruhe.solve(GP)
+    assert result.certificate.kind is Proof.GLOBAL
+    engine, point = result.final.engine, result.problem.points[0]
+    fine = np.linspace(0.0, 4.0 * math.pi, 200001)
+    forces = {limit.name: limit.value for limit in result.limits}
+    # loads back from the stresses at the design: what is compared is the optimum over the sizes
+    pin, journal, web = engine.slider_cranks[0].big_end, engine.bearings[1], engine.gear.webs
+    load = forces["maximum crank-pin bending stress"] * math.pi / 32.0 * pin[0] ** 3 / 0.05
+    torque = forces["maximum journal torsion stress"] * math.pi / 16.0 * journal.diameter**3
+    assert torque == pytest.approx(np.abs(crank_torque(engine, point).values(fine)).max(), rel=1e-4)
+    d, w, b, s, f, r = (cp.Variable(pos=True) for _ in range(6))
+    lever = 0.1 - 0.5 * (pin[1] + web.thickness)
+    stiffness = math.pi**2 * 200e9 * math.pi / 64.0 / 0.25**2
+    density, area = 7850.0, math.pi / 4.0
+    mass = density * (area * d**2 * pin[1] + 2.0 * b * web.thickness * (0.07 + 0.5 * d + 0.035) + area * s**2 * 0.25)
+    limits = [
+        load * 0.05 / (math.pi / 32.0) * d**-3 <= 90e6,
+        0.5 * load * (lever / (web.thickness**2 / 6.0) + 1.0 / web.thickness) * b**-1 <= 80e6,
+        torque / (math.pi / 16.0) * r**-3 <= 30e6,
+        0.5 * load * r**-1 * w**-1 <= 12e6,
+        0.5 * load / 0.07 * f**-1 <= 12e6,
+        load / stiffness * s**-4 <= 1.0 / 15.0,
+        d >= 0.04, d <= 0.12, w >= 0.02, w <= 0.08, f >= 0.02, f <= 0.08, b >= 0.04, b <= 0.12, r <= 0.12,
+    ]  # fmt: skip
+    program = cp.Problem(cp.Minimize(mass), limits)
+    assert program.is_dgp()
+    program.solve(gp=True)
+    assert result.objective.value == pytest.approx(program.value, rel=3e-4)
+
+
+def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
+    text = changed(TEXT, 'max = "50 N/mm^2"', 'max = "0.5 N/mm^2"')
+    result = laufruhe.solve(loaded(tmp_path, text))
+    assert result.status is Status.INFEASIBLE
+    assert result.conflict == ("maximum web stress",)
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        (TEXT + WEIGHT, "no method decides unbalance and size together"),
+        (changed(TEXT, "throws = [0]", 'throws = [{ between = [0, 90] }]'), "no method decides|engine.throws"),
+        (changed(TEXT, '"0.5 kg"', '{ between = ["0.1 kg", "1 kg"] }'), "no method decides piston and size together"),
+        (TEXT + '[[counterweights]]\nname = "b"\nbalance_factor = 0.5\n', "counts masses that follow from sizes"),
+        (changed(TEXT, "samples = 360", 'crank_inertia = "1 kg m^2"'), "even crank speed|no method"),
+        (changed(TEXT, "throws = [0]", 'throws = [0]\n[engine.nothing]'), "nothing"),
+        (changed(TEXT, '[objective]', 'bolts = { diameter = { between = ["5 mm", "9 mm"] } }\n[objective]'),
+         "running_gear.bolts.diameter is open, and nothing that is asked depends on it"),
+        (changed(TEXT, '["25 mm", "60 mm"]', '["0 mm", "60 mm"]'), "must be more than 0 m"),
+        (changed(TEXT, '"0.14 m"', '{ between = ["30 mm", "200 mm"], start = "140 mm" }'),
+         "does not let the crank turn"),
+    ],
+)  # fmt: skip
+def test_what_is_not_decided_is_refused_in_a_line(text: str, rule: str, tmp_path: Path) -> None:
+    with pytest.raises((InputError, ModelError), match=rule) as refused:
+        laufruhe.solve(loaded(tmp_path, text))
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.slow
+def test_an_open_rod_is_a_local_optimum_and_says_so(solved: Result) -> None:
+    """More freedom is never worse; nothing is claimed of what else there may be."""
+    text = changed(TEXT, f'rod_length = "{LENGTH} m"',
+                   f'rod_length = {{ between = ["120 mm", "200 mm"], start = "{LENGTH} m" }}')  # fmt: skip
+    result = laufruhe.solve(text.replace("samples = 360", "samples = 180"))
+    assert result.certificate.kind is Proof.LOCAL
+    assert result.certificate.lower_bound == 0.0
+    assert result.objective.value <= solved.objective.value * (1.0 + 1e-4)
+    assert "nothing bounds the length of the rod" in result.certificate.method
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["worked-diesel-sizes", "worked-diesel-journals"])
+def test_ready_problems_are_proven_and_names_open_and_fix_them(name: str) -> None:
+    problem = laufruhe.load(PROBLEMS / f"{name}.toml")
+    result = laufruhe.solve(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+    fixed = problem
+    for decision in result.decisions:
+        fixed = fixed.fix(decision.name, f"{decision.value!r} m")
+    assert laufruhe.evaluate(fixed).objective.value == pytest.approx(result.objective.value, rel=1e-9)
+    assert len(fixed.decisions) == 0
