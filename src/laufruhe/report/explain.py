@@ -19,18 +19,18 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
     """
     pruned, whole = choice.numbers
     fewer = f", 1/{whole / pruned:.2g}" if 0 < pruned < whole else ""
-    met = "" if choice.error_estimate <= tolerance else "; the reference itself is no better, give a smoother gas trace"
+    met = "" if choice.error_estimate <= tolerance else "; even the reference is no better: give a smoother gas trace"
     lines = [
         f"{problem.title}",
-        f"error of the objective at most {choice.error_estimate:.1e} (asked {tolerance:g}{met})",
+        f"Error of the objective: at most {choice.error_estimate:.1e} (asked {tolerance:g}{met})",
         "",
-        "kept:",
+        "Computed:",
         *(f"  {text}" for text in choice.kept),
-        "left out:",
+        "Left out:",
         *(_line(part.what, part.why, part.share) for part in choice.left_out),
-        "saved:",
-        f"  {pruned} force components sampled in place of {whole}{fewer}",
-        f"  {milliseconds[0]:.3f} ms for another design in place of {milliseconds[1]:.3f} ms",
+        "Cost:",
+        f"  {pruned} of {whole} samples of force components{fewer}",
+        f"  another design is evaluated in {milliseconds[0]:.3f} ms, exactly in {milliseconds[1]:.3f} ms",
     ]
     return "\n".join(lines) + "\n"
 

@@ -13,18 +13,18 @@ from laufruhe.report.strict_json import strict
 from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade, is_local
 
 ALIKE = 1.3
-MOVED = " Throws leave their even steps here, and such optima are local: a regret may be below zero."
+MOVED = " Throws leave their even steps here, and such optima are local: regret may be negative."
 LOCAL = (
     " Mounts are decided here: every fidelity searches from the design as given alone, and finds an optimum nearby. "
-    "Choices about modes and time would change with the mounts, so they decide nothing. "
-    "A small regret may be below zero."
+    "Choices about modes and time would change with the mounts, so no design is decided with them. "
+    "A small regret may be negative."
 )
 HEAD = (
-    "fidelity", "error", "said to be at most", "another design", "gradient", "solve", "from nothing", "memory",
+    "fidelity", "error", "error estimate", "another design", "gradient", "solve", "first design", "memory",
     "regret",
 )  # fmt: skip
 INDEX = (
-    "problem", "for a number good to 0.1 %", "a design", "to decide within 0.1 %", "a solve", "error of two-order",
+    "problem", "value within 0.1 %", "per design", "decision within 0.1 %", "per solve", "error of two-order",
     "of no gas", "of auto 0.001", "regret of two-order", "of auto 0.001", "uneven speed",
 )  # fmt: skip
 
@@ -41,12 +41,13 @@ def as_page(found: Trade, picture: str | None, command: str) -> str:
         f"**Take** {advice(found)}",
         f"![Time against error of every fidelity; colour is regret]({picture})"
         if picture
-        else "No load enters what is asked, so every fidelity gives the same number.",
+        else "What is asked depends on no load, so every fidelity gives the same number.",
         piped(HEAD, [_cells(row) for row in found.rows]),
         *([] if found.whole else ["Stopped at the time limit: fidelities beyond the last row were not measured."]),
-        "*Another design*: objective with the scene prepared. *Gradient*: with its derivatives by all decisions. "
-        "*Solve*: optimum from nothing, at this fidelity's own angles. *From nothing*: engine to objective. "
-        "*Regret*: by how much the reference objective of the optimum found is above that of the best."
+        "*Another design*: objective of a further design of a prepared problem. *Gradient*: with its derivatives by "
+        "all decisions. *Solve*: optimum at this fidelity's own angles, with all preparation. *First design*: "
+        "objective with all preparation. "
+        "*Regret*: by how much the exact objective of the design found exceeds that of the best design."
         + (LOCAL if is_local(problem) else MOVED if problem.phasing and problem.phasing.continuous else ""),
         *_beyond(found),
         f"```sh\n{command}\n```",
@@ -77,9 +78,9 @@ def _beyond(found: Trade) -> list[str]:
 def advice(found: Trade) -> str:
     """The choices in words."""
     number, decided = choices(found)
-    text = f"`{number.name}` where a number good to 0.1 % is wanted ({_time(number.evaluation)} a design)"
+    text = f"`{number.name}` for values within 0.1 % ({_time(number.evaluation)} per design)"
     if decided is not None:
-        text += f"; `{decided.name}` to decide, its optimum is within 0.1 % of the best ({_time(decided.solve)})"
+        text += f"; `{decided.name}` for decisions within 0.1 % of the best ({_time(decided.solve)})"
     return text + "."
 
 
@@ -116,24 +117,24 @@ def index(trades: Sequence[Trade]) -> str:
         "",
         f"Which fidelity to take, measured on {len(trades)} ready problems. In short:",
         "",
-        "- `auto` is the safe choice: it says how wrong it can be, and is not more wrong than that. Where nothing but "
-        "modes or sag is asked, no load needs to be computed.",
+        "- `auto` is the safe choice: it states a bound of its error and keeps it. Problems that ask only for "
+        "modes or sag need no loads.",
         f"- {_cost(trades, TWO_ORDER, 'The two-order formulas of textbooks cost')} "
-        "Engines whose second order cancels are left with what these formulas leave out.",
-        f"- {_cost(trades, NO_GAS, 'Leaving gas out costs')} It decides how the roll moment is balanced.",
-        f"- {_cost(trades, RIGID, 'Taking elastic mounts for rigid costs')} A few modes are no way out: "
-        "all that the scene excites take the same time.",
-        "- More than 720 steps a cycle serve peaks and proofs, not means.",
-        "- Regret may be far below the error, for an optimum is flat, and far above it: what a shaft is wrongly made "
-        "to balance stays. Read both columns.",
+        "Where the second order of an engine cancels, all that remains is what these formulas leave out.",
+        f"- {_cost(trades, NO_GAS, 'Leaving gas out costs')} Gas determines how the roll moment is balanced.",
+        f"- {_cost(trades, RIGID, 'Taking elastic mounts for rigid costs')} Keeping a few "
+        "modes saves nothing: all that are excited take the same time.",
+        "- More than 720 steps in a cycle improve peaks and proofs, not means.",
+        "- Regret may be far below the error, because an optimum is flat, or far above it, because a shaft that "
+        "balances the wrong load leaves the right one. Read both columns.",
         "",
         piped(INDEX, [_index_row(found) for found in trades], (0, 1, 3)),
         "",
-        "A dash: the problem has no such part, leaves nothing open, has an optimum of zero, or asks of mounts what no "
-        "load enters. Where mounts are open, or throws one by one, optima are local: a regret there says as much of "
-        "the search as of the fidelity, and may be below zero.",
+        "A dash: the problem has no such part, leaves nothing open, has an optimum of zero, or asks for a property of "
+        "the mounts that depends on no load. With open mounts or single open throws, optima are local: regret then "
+        "depends on the search as well as on the fidelity, and may be negative.",
         "",
-        "*Uneven speed*: what a flywheel that leaves 2 % of unevenness changes of the objective.",
+        "*Uneven speed*: change of the objective with a flywheel that leaves 2 % of irregularity.",
     ]
     return "\n".join(lines) + "\n"
 

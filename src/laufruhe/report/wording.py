@@ -23,7 +23,7 @@ def headline(result: Result) -> str:
         return f"{result.message[:1].upper()}{result.message[1:]}." if result.message else "No design was found."
     if o is None:
         return "The design as given, evaluated; nothing was to be minimised."
-    name = o.name[:1].upper() + o.name[1:]
+    name = f"RMS{o.name[3:]}" if o.name.startswith("rms ") else o.name[:1].upper() + o.name[1:]
     if not changed(result):
         return f"{name} of the design as given: {figure(o.value, o.unit)}."
     if abs(o.value - o.initial) <= UNFELT * max(abs(o.value), abs(o.initial)):
@@ -115,7 +115,7 @@ def explained(result: Result) -> str:
     """The certificate in two sentences."""
     c, o = result.certificate, result.objective
     if result.status is Status.INFEASIBLE and result.problem.phasing is not None:
-        return "Every star and firing order allowed was ruled out; what they conflict with is named above."
+        return "Every star and firing order allowed was ruled out; the limits that rule them out are named above."
     if result.status is Status.INFEASIBLE:
         return (
             "The cone solver proved that the limits cannot be met together. "
@@ -126,8 +126,8 @@ def explained(result: Result) -> str:
     if c.kind is Proof.LOCAL:
         return (
             f"The best of the local optima found ({c.method}), with {figure(o.value, o.unit, 6)}. "
-            f"Taken anew, {_conditions(c.kkt_residual)}; "
-            f"that nothing better exists is proven only down to {figure(c.lower_bound, o.unit, 6)}."
+            f"For this design {_conditions(c.kkt_residual)}. "
+            f"No design is below {figure(c.lower_bound, o.unit, 6)}; designs between the two values are not ruled out."
         )
     origin = "was not taken from the solver but computed from the exact model"
     if "SCIP" in c.method:

@@ -154,8 +154,8 @@ def _shown(problem: Problem, asked: OneWayProblem, found: Divided, x: Array) -> 
         prices[limit, "at most"] = price
         left = left + price * slope
     slopes = {d.name: np.array([left[k] / widths[k]]) for k, d in enumerate(problem.decisions)}
-    how = "both sides of it" if found.complete else "not all of them"
-    method = f"numbers that go one way, on {found.boxes} boxes of the flywheel, {how} shown"
+    unfinished = "" if found.complete else ", some of them not finished"
+    method = f"monotone quantities, bounded on {found.boxes} boxes of the flywheel's numbers{unfinished}"
     return Shown(found.bound, Reach.WHOLE, float(rest), method, prices, slopes)
 
 

@@ -130,7 +130,7 @@ def _by_each_order(
     bound = min([least, *(design.bound for design in every)]) if complete else 0.0
     count = sum(map(len, orders.values()))
     of_stars = f" of {len(stars)} stars" if len(stars) > 1 else ""
-    method = f"{len(told)} of {count} firing order(s){of_stars}, {len(sets)} set(s) of shafts looked at"
+    method = f"{len(told)} of {count} firing order(s){of_stars}, {len(sets)} set(s) of shafts examined"
     if len(every) < len(designs) and complete:
         method += f", {len(designs) - len(every)} of these by one order of the torque alone"
     proof = best.result.certificate

@@ -29,7 +29,11 @@ def tables(result: Result) -> list[Grid]:
     return [
         Grid("Under tolerance", head, rows, note=_checked(found)),
         Grid(
-            "Tolerances", told, own, 2, note="Costs: shadow price times tolerance, what none of it would save at first."
+            "Tolerances",
+            told,
+            own,
+            2,
+            note="Costs: shadow price times tolerance, an estimate of what removing the tolerance would save.",
         ),
     ]
 
