@@ -40,7 +40,7 @@ from laufruhe.present.measures import changed
 from laufruhe.solvers.result import Result
 
 # both views side by side, of one page, and between them [inch]
-WIDE, HIGH, ACROSS, NARROW = 8.0, 4.4, 0.8, 1.4
+WIDE, HIGH, ACROSS, NARROW = 8.0, 4.4, 0.8, 2.2
 ROOM = 1.1
 """Around what is seen, as a share of it."""
 Array = NDArray[np.float64]
@@ -108,7 +108,7 @@ def views(scene: Scene) -> Page:
     """Empty panels for both views, in one scale, as large as fit on a page."""
     ahead, beside = (np.array(points) for points in reaches(scene))
     sizes = np.array([ROOM * np.ptp(points, axis=0) for points in (ahead, beside)])
-    scale = min(WIDE / sizes[:, 0].sum(), HIGH / sizes[:, 1].max())
+    scale = min((WIDE - NARROW) / sizes[1, 0], WIDE / sizes[:, 0].sum(), HIGH / sizes[:, 1].max())
     high = float(scale * sizes[:, 1].max())
     drawn = page(1, 2, (0.5 * WIDE, high), across=ACROSS)
     inches, left = drawn.figure.get_figwidth(), 0.0
@@ -117,8 +117,8 @@ def views(scene: Scene) -> Page:
         axes.set_position((left / inches, 0.0, wide / inches, 1.0))
         left += wide + ACROSS
         _framed(axes, points, (wide / scale, high / scale), backwards=is_side, down=is_side and scene.is_flat)
-        for axis, room in ((axes.xaxis, wide), (axes.yaxis, high)):
-            round_ticks(axis, min(max(int(room / 0.6), 2), 7))
+        for axis, steps in ((axes.xaxis, wide / 0.8), (axes.yaxis, high / 0.5)):
+            round_ticks(axis, min(max(int(steps), 2), 7))
     return drawn
 
 
@@ -276,7 +276,5 @@ def _crank_look(scene: Scene) -> dict[str, Any]:
 
 
 def _weight_look(scene: Scene, rotor: Rotor) -> dict[str, Any]:
-    look = (
-        {"facecolor": AFTER, "edgecolor": AFTER} if scene.is_decided(rotor) else {"facecolor": GREY, "edgecolor": INK}
-    )
-    return {**look, "alpha": 0.6, "linewidth": 0.8}
+    # weights behind each other are told apart by their edges
+    return {"facecolor": (AFTER if scene.is_decided(rotor) else GREY, 0.55), "edgecolor": INK, "linewidth": 0.8}
