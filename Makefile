@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test test-fast test-long attack matrix faults bench pictures docs lint format clean distclean
+.PHONY: help solve study test test-fast test-long attack matrix faults bench speed pictures docs lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
@@ -21,6 +21,7 @@ help:
 	@echo "make format     put the source into the project's style"
 	@echo "make faults     100,000 damaged files, which writes results/faults/; half an hour and more"
 	@echo "make bench      benchmarks, which write results/benchmarks/; an hour and more"
+	@echo "make speed      what users wait for, timed; SPEED=--benchmark-compare against the last run"
 	@echo "make pictures   the pictures of README.md again, under docs/pictures/"
 	@echo "make docs       the documentation site, docs/_build/index.html"
 	@echo "make clean      remove caches; make distclean removes $(VENV) as well"
@@ -67,6 +68,9 @@ matrix: $(STAMP)
 # Scripts that write under results/benchmarks/.
 bench: $(STAMP)
 	@set -e; for script in tests/benchmarks/bench_*.py; do echo "$$script"; $(BIN)/python "$$script"; done
+
+speed: $(STAMP)
+	$(BIN)/python -m pytest tests/benchmarks/speed.py -o addopts="" -p no:xdist --import-mode=importlib --benchmark-autosave --benchmark-storage=.benchmarks $(SPEED)
 
 # A hundred thousand damaged files through the commands; writes results/faults/README.md.
 faults: export OMP_NUM_THREADS = 1

@@ -29,6 +29,8 @@ from laufruhe.solvers.unbalances import beyond_mounts, solve_sharply
 
 __all__ = ["METHODS", "Result", "Status", "solve", "state"]
 
+LIBRARIES = ("casadi", "clarabel", "cvxpy", "pyscipopt")
+"""Packages that are imported where something open needs them, named as their modules."""
 CUT_SHORT = "stopped at the time limit"
 
 
@@ -223,6 +225,11 @@ def solve(problem: Problem, listener: Listener | None = None, time_limit: float 
     with limited(time_limit), listening(listener):
         try:
             found = _decided(problem)
+        except ModuleNotFoundError as error:
+            if error.name not in LIBRARIES:
+                raise
+            why = f"what is open needs {error.name}, which is not installed; pip install {error.name}"
+            raise SolverError(why) from None
         except SolverError:
             if not passed():
                 raise

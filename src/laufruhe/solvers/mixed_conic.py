@@ -110,6 +110,8 @@ def _weighed(problem: StarProblem, rows: _Rows, unit: float) -> tuple[Any, list[
 
 
 def _answer(program: Any, steps: Any, built: Any, unit: float, choosing: bool, time_limit: float) -> ProgramFound:
+    if cp.SCIP not in cp.installed_solvers():
+        raise ModuleNotFoundError("SCIP is not installed", name="pyscipopt")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         seconds = min(time_limit, max(left(), 1.0))

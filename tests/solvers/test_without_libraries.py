@@ -1,0 +1,31 @@
+"""CasADi and SCIP are loaded where something open needs them, and what needs them says so where they are missing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from problem_files import PROBLEMS
+
+SCRIPT = """
+import sys
+sys.modules |= {"casadi": None, "pyscipopt": None}
+import laufruhe
+from laufruhe.errors import SolverError
+print(laufruhe.solve(sys.argv[1]).status)
+try:
+    laufruhe.solve(sys.argv[2])
+except SolverError as error:
+    print(error)
+"""
+
+
+@pytest.mark.slow
+def test_without_casadi_counterweights_are_decided_and_uneven_throws_say_what_they_need() -> None:
+    paths = [str(PROBLEMS / f"{name}.toml") for name in ("tractor-single", "inline-nine-uneven")]
+    found = subprocess.run([sys.executable, "-c", SCRIPT, *paths], check=True, capture_output=True, text=True)
+    assert found.stdout.splitlines() == [
+        "optimal", "what is open needs casadi, which is not installed; pip install casadi",
+    ]  # fmt: skip

@@ -1,0 +1,59 @@
+"""What a release says of itself agrees everywhere, and a wheel carries all that its user needs."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import laufruhe
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+CITATION = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+RECIPE = (ROOT / "packaging" / "conda" / "recipe.yaml").read_text(encoding="utf-8")
+# names of the same libraries on conda-forge
+CONDA = {"cvxpy-base": "cvxpy", "matplotlib-base": "matplotlib", "netcdf4": "netCDF4"}
+
+
+def test_one_version_everywhere() -> None:
+    version = PROJECT["version"]
+    assert laufruhe.__version__ == version
+    assert re.search(r"^version: (.*)$", CITATION, re.MULTILINE)[1] == version  # type: ignore[index]
+    assert re.search(r'^  version: "(.*)"$', RECIPE, re.MULTILINE)[1] == version  # type: ignore[index]
+    assert f"\n## [{version}] - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_recipe_needs_what_the_package_needs() -> None:
+    run = RECIPE.partition("  run:\n")[2].partition("\n\n")[0]
+    found = {CONDA.get(name, name) + bound for name, bound in re.findall(r"- ([\w-]+) (>=[\d.]+)", run)}
+    assert found == {*PROJECT["dependencies"], f"python{PROJECT['requires-python']}"}
+
+
+@pytest.mark.slow
+def test_a_wheel_carries_its_data(tmp_path: Path) -> None:
+    """Schemas, engines, the page of reports, every ready problem with what it refers to; and it works from there."""
+    build = f"import hatchling.build as h; print(h.build_wheel({str(tmp_path)!r}))"
+    subprocess.run([sys.executable, "-c", build], cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        archive.extractall(tmp_path / "installed")
+    own = {"files/engines.toml", "files/laufruhe.schema.json", "files/laufruhe-study.schema.json", "report/page.html",
+           "py.typed"}  # fmt: skip
+    ready = {f"problems/{path.name}" for path in (ROOT / "problems").iterdir() if path.is_file()}
+    assert {f"laufruhe/{name}" for name in own | ready} <= names
+    assert any(name.endswith("licenses/LICENSE") for name in names)
+    say = "import laufruhe.cli.begin as b; print(b.__file__); print(b.listed())"
+    env = {**os.environ, "PYTHONPATH": str(tmp_path / "installed")}
+    told = subprocess.run(
+        [sys.executable, "-c", say], cwd=tmp_path, env=env, check=True, capture_output=True, text=True
+    )
+    assert str(tmp_path) in told.stdout
+    assert "tractor-four-lanchester" in told.stdout
