@@ -1,4 +1,4 @@
-"""What users wait for, timed by pytest-benchmark: `make speed`; `SPEED=--benchmark-compare` sets it against the last run.
+"""What users wait for, timed by pytest-benchmark: `make speed`; `SPEED=--benchmark-compare` adds the last run.
 
 Nothing here is collected with the tests: how long something takes belongs to a machine.
 """
