@@ -1,0 +1,13 @@
+"""
+A locomotive's wheels
+=====================
+
+Weights in the driving wheels of a two-cylinder locomotive, for the least hammer blow on the rails while the engine
+neither surges nor sways more than allowed.
+"""
+
+import laufruhe
+from laufruhe.plots import figure
+
+result = laufruhe.solve("../../problems/locomotive-two-cylinder.toml")
+bearings = figure(result, "bearings")

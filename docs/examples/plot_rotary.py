@@ -1,0 +1,15 @@
+"""
+A rotary engine
+===============
+
+Two rotors on eccentrics: end weights of least mass that leave no force and no couple, and the volume of the chambers.
+"""
+
+import laufruhe
+from laufruhe.plots import figure
+
+result = laufruhe.solve("../../problems/rotary-two.toml")
+engine = figure(result, "engine")
+
+# %%
+chambers = figure(result, "chambers")
