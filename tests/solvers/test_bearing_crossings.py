@@ -86,3 +86,33 @@ def test_mechanisms_whose_rods_are_not_modelled_are_refused_by_name() -> None:
             "main_bearings": [{"x": "80 mm"}, {"x": "-80 mm"}]}  # fmt: skip
     with pytest.raises(ModelError, match="loads of its rod are not modelled"):
         laufruhe.solve(problem_of(told, "mean main-bearing force"))
+
+
+def _shaft(x: Any) -> list[dict[str, Any]]:
+    return [{"name": "against", "ratio": -1, "position": ["60 mm", "-90 mm"], "unbalances": [
+        {"name": "weight", "x": x, "unbalance": {"between": ["0 kg m", "0.08 kg m"]}, "angle": {"between": [0, 360]}}
+    ]}]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_places_of_balancer_shafts_beside_bearings() -> None:
+    """Bearings feel no place of a shaft that they do not carry: the optimum of both is the best of a row of places."""
+    told = {
+        "objective": {"terms": [{"quantity": "mean mount force"},
+                                {"quantity": "mean main-bearing force", "weight": 0.1}]},
+        "counterweights": WEBS[:2], "tolerance": 1e-3, "gas": None,
+    }  # fmt: skip
+    open_place = {"between": ["-200 mm", "200 mm"]}
+    found = laufruhe.solve(problem_of({**told, "balancer_shafts": _shaft(open_place)}, ""))
+    assert found.certificate.kind is Proof.GLOBAL
+    row = [
+        laufruhe.solve(problem_of({**told, "balancer_shafts": _shaft(f"{x} mm")}, "")) for x in range(-200, 201, 100)
+    ]
+    least = min(result.objective.value for result in row)
+    assert found.objective.value <= least * (1.0 + 1e-3)
+    assert found.certificate.lower_bound <= least
+    assert least <= 1.05 * found.objective.value
+    # of a weight on the crank itself bearings feel the place
+    moved = [{**WEBS[0], "x": open_place, "mass": "1 kg"}, *WEBS[1:]]
+    with pytest.raises(ModelError, match=r"no method decides .* place"):
+        laufruhe.solve(problem_of({**told, "counterweights": moved}, ""))

@@ -164,3 +164,35 @@ def test_a_disc_is_sized_for_irregularity_and_stress() -> None:
     none = laufruhe.solve(problem_of({**own, "discs": [pulley, narrow]}, constraints=limits))
     assert none.status is Status.INFEASIBLE
     assert "degree of irregularity" in none.conflict
+
+
+@pytest.mark.slow
+def test_a_damper_beside_counterweights(damper: tuple[Problem, Result]) -> None:
+    """Neither feels the other: the sum of both optima, and of both bounds; limits stay with what they are of."""
+    webs = [
+        {"name": f"web {k}", "opposite_throw": k, "radius": "60 mm", "mass": {"between": ["0 kg", "2 kg"]}}
+        for k in (1, 5)
+    ]
+    couple = {"quantity": "rms rocking couple", "weight": 1e5}
+    kept = {"limit": "counterweight mass", "max": "1 kg"}
+    alone = laufruhe.solve(
+        load_tables({**tables_without_torsion(), "counterweights": webs, "constraints": [kept],
+                     "objective": {"terms": [couple]}}, Path("webs.toml"))
+    )  # fmt: skip
+    both = problem_of(
+        counterweights=webs, constraints=[kept], objective={"terms": [couple, {"quantity": "rms shaft stress"}]}
+    )
+    result = laufruhe.solve(both)
+    assert result.objective.value == pytest.approx(alone.objective.value + damper[1].objective.value, rel=1e-6)
+    assert result.certificate.kind is Proof.GLOBAL
+    bounds = alone.certificate.lower_bound + damper[1].certificate.lower_bound
+    assert result.certificate.lower_bound == pytest.approx(bounds, rel=1e-6)
+    assert {decision.name for decision in result.decisions} >= {"web 1.mass", "torsion.damper.damping"}
+    assert result.objective.value == pytest.approx(objective_value(both, result.final), rel=1e-7)
+    with pytest.raises(ModelError, match="torsion is open and nothing of it is minimised"):
+        laufruhe.solve(problem_of(counterweights=webs, objective={"terms": [couple]},
+                                  constraints=[{"limit": "rms shaft stress", "max": "20 N/mm^2"}]))  # fmt: skip
+
+
+def tables_without_torsion() -> dict[str, Any]:
+    return {key: value for key, value in {**tables_of(READY), **QUICK}.items() if key != "torsion"}

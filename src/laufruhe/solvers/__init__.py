@@ -17,7 +17,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
-from laufruhe.solvers.apart import solve_apart
+from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.assembly import solve_assembly
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.in_order import solve_in_order
@@ -134,20 +134,16 @@ def _apart(problem: Problem) -> Result:
     return solve_apart(problem, _decided)
 
 
-def _is_apart(problem: Problem) -> bool:
-    """Whether a flywheel is open, and nothing open beside it moves what is asked of it."""
-    others = kinds_of(problem) - {Kind.FLYWHEEL}
-    wheel = [measure for measure in problem.measures if measure.channel.is_flywheel]
-    return Kind.FLYWHEEL in kinds_of(problem) and not any(measure.channel.is_moved_by(others) for measure in wheel)
-
-
 def _asks_flywheel(problem: Problem) -> bool:
     return all(measure.channel.is_flywheel for measure in problem.measures)
 
 
-def _asks_block(problem: Problem) -> bool:
-    """Whether nothing is asked of loads inside the crankcase, and of the mounts nothing that depends on loads."""
-    return _asks_loads(problem) and _nothing_inside(problem)
+def _asks_places(problem: Problem) -> bool:
+    """Whether no bearing that is asked about carries a shaft whose unbalances have open places."""
+    carried = {bearing.shaft.name for bearing in problem.engine.bearings}
+    moved = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
+    loads = any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moved)
+    return _asks_loads(problem) and _adds_points(problem) and not (loads and any(map(_is_inside, problem.measures)))
 
 
 def _adds_points(problem: Problem) -> bool:
@@ -190,12 +186,12 @@ METHODS: tuple[Method, ...] = (
            lambda problem: solve_within(problem, solve_sharply)),
     Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_sharply)),
-    Method("cones over boxes of places", frozenset({_U, _P}), _asks_block, Reach.WHOLE, _places),
+    Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _smooth),
-    Method("flywheel and the rest apart", frozenset(Kind) - {_S}, _is_apart,
+    Method("flywheel, crankshaft and the rest apart", frozenset(Kind) - {_S}, is_apart,
            Reach.ASIDE, _apart),
     Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _nothing_inside, Reach.ASIDE,
            _stars_on_mounts),

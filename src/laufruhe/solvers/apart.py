@@ -1,4 +1,7 @@
-"""A flywheel decided beside all else: at an even speed neither feels the other, so sums of their optima are optimal."""
+"""Flywheel, crankshaft and all else decided apart: at an even speed none feels the others.
+
+So sums of their optima are optimal, and sums of their bounds are bounds.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
+from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate, Proof
@@ -14,26 +19,58 @@ from laufruhe.solvers.conclusion import none_within
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 
 Solve = Callable[[Problem], Result]
+Kinds = frozenset[Kind]
 # the weakest of two counts
 _STRENGTH = (Proof.NONE, Proof.LOCAL, Proof.WITHIN_GAP, Proof.GLOBAL)
+_ALONE = (Kind.FLYWHEEL, Kind.TORSION)
+
+
+def _groups(problem: Problem) -> list[Kinds]:
+    """Kinds of what is open that belong together, what moves everything else the last of them."""
+    kinds = {decision.kind for decision in problem.decisions}
+    alone = [frozenset({kind}) for kind in _ALONE if kind in kinds]
+    return [*alone, frozenset(kinds - set(_ALONE))]
+
+
+def is_apart(problem: Problem) -> bool:
+    """Whether a flywheel or the crankshaft is open beside other numbers, and nothing asked is moved by two of them."""
+    groups = [group for group in _groups(problem) if group]
+    return len(groups) > 1 and all(len(_movers(measure, groups)) <= 1 for measure in problem.measures)
+
+
+def _movers(measure: Measure, groups: list[Kinds]) -> list[Kinds]:
+    return [group for group in groups if group and measure.channel.is_moved_by(group)]
 
 
 def solve_apart(problem: Problem, solve: Solve) -> Result:
-    """The flywheel and the rest, each by its own method.
+    """Each group by its own method.
 
     Raises
     ------
     ModelError
-        If nothing of the flywheel is minimised.
+        If nothing is minimised of one.
     """
-    wheel, rest = _part(problem, True), _part(problem, False)
-    if not wheel.objective:
-        raise ModelError("flywheel is open and nothing of it is minimised; add a term such as flywheel inertia")
-    found = [solve(part) for part in (wheel, rest) if part.decisions or part.objective or part.limits]
+    groups = _groups(problem)
+    parts = [_part(problem, groups, group) for group in groups]
+    for part in parts:
+        if part.decisions and not part.objective:
+            what = part.decisions[0].name.split(".")[0]
+            raise ModelError(f"{what} is open and nothing of it is minimised; add a term of it, or fix it")
+    by_group = {
+        group: solve(part)
+        for group, part in zip(groups, parts, strict=True)
+        if part.decisions or part.objective or part.limits
+    }
+    found = list(by_group.values())
     for result in found:
         if result.status is Status.INFEASIBLE:
             return none_within(problem, evaluate_start(problem), result.conflict, result.timing)
-    engine = replace(found[-1].final.engine, flywheel=found[0].final.engine.flywheel)
+    engine = by_group[groups[-1]].final.engine if groups[-1] in by_group else problem.engine
+    for group, result in by_group.items():
+        if Kind.FLYWHEEL in group:
+            engine = replace(engine, flywheel=result.final.engine.flywheel)
+        if Kind.TORSION in group:
+            engine = replace(engine, torsion=result.final.engine.torsion)
     limits = {
         limit: shown for result in found for limit, shown in zip(result.problem.limits, result.limits, strict=True)
     }
@@ -54,13 +91,16 @@ def solve_apart(problem: Problem, solve: Solve) -> Result:
     )
 
 
-def _part(problem: Problem, is_wheel: bool) -> Problem:
-    """What is open, wanted and forbidden of the flywheel, or of all else."""
-    own = problem.flywheel_decisions
+def _part(problem: Problem, groups: list[Kinds], group: Kinds) -> Problem:
+    """What is open, wanted and forbidden of one group; what none moves belongs to the last."""
+
+    def is_own(measure: Measure) -> bool:
+        return (_movers(measure, groups) or [groups[-1]])[0] == group
+
     return problem.changed(
-        decisions=tuple(d for d in problem.decisions if (d in own) is is_wheel),
-        objective=tuple(term for term in problem.objective if term.measure.channel.is_flywheel is is_wheel),
-        limits=tuple(limit for limit in problem.limits if limit.measure.channel.is_flywheel is is_wheel),
+        decisions=tuple(d for d in problem.decisions if d.kind in group),
+        objective=tuple(term for term in problem.objective if is_own(term.measure)),
+        limits=tuple(limit for limit in problem.limits if is_own(limit.measure)),
     )
 
 
