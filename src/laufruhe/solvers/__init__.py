@@ -308,7 +308,8 @@ def _decided(problem: Problem) -> Result:
     if method is None:
         asked = ", ".join(dict.fromkeys(measure.name for measure in problem.measures))
         raise ModelError(f"no method decides {_named(kinds)} together for {asked}; fix one of them, or ask for less")
-    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and Kind.STAR not in kinds else ()
+    # what is decided apart is asked once more, each part by itself
+    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F} else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})
     return method.solve(problem)

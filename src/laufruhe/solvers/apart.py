@@ -51,16 +51,7 @@ def solve_apart(problem: Problem, solve: Solve) -> Result:
         If nothing is minimised of one.
     """
     groups = _groups(problem)
-    parts = [_part(problem, groups, group) for group in groups]
-    for part in parts:
-        if part.decisions and not part.objective:
-            what = part.decisions[0].name.split(".")[0]
-            raise ModelError(f"{what} is open and nothing of it is minimised; add a term of it, or fix it")
-    by_group = {
-        group: solve(part)
-        for group, part in zip(groups, parts, strict=True)
-        if part.decisions or part.objective or part.limits
-    }
+    by_group = {group: solve(part) for group, part in _parts(problem, groups).items()}
     found = list(by_group.values())
     for result in found:
         if result.status is Status.INFEASIBLE:
@@ -89,6 +80,16 @@ def solve_apart(problem: Problem, solve: Solve) -> Result:
         error_estimate=max(r.error_estimate for r in found),
         timing={key: took for r in found for key, took in r.timing.items()},
     )
+
+
+def _parts(problem: Problem, groups: list[Kinds]) -> dict[Kinds, Problem]:
+    """Problems of the groups that have any."""
+    parts = {group: _part(problem, groups, group) for group in groups}
+    for part in parts.values():
+        if part.decisions and not part.objective:
+            what = part.decisions[0].name.split(".")[0]
+            raise ModelError(f"{what} is open and nothing of it is minimised; add a term of it, or fix it")
+    return {group: part for group, part in parts.items() if part.decisions or part.objective or part.limits}
 
 
 def _part(problem: Problem, groups: list[Kinds], group: Kinds) -> Problem:
