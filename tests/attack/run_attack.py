@@ -53,13 +53,13 @@ def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
             vary = VARIATIONS[variation]
             return tried(Verdict(name, seed), lambda: vary(table, rng, Path(folder)))
         verdict = try_problem(family, seed, table, rng, Path(folder), effort)
-        if verdict.wrong and "gas" in table and SAMPLES < FINER:
+        if verdict.wrong and SAMPLES < FINER:
             return finer(family, seed, Path(folder), effort)
         return verdict
 
 
 def finer(family: str, seed: int, folder: Path, effort: int) -> Verdict:
-    """The same by a plain model that knows more of the bends of gas torque, in a process of its own."""
+    """The same by a plain model that knows more of peaks and of the bends of gas torque, in a process of its own."""
     log = folder / "finer.jsonl"
     told = ["run", family, "--from", str(seed), "--number", "1", "--log", str(log), "--effort", str(effort)]
     subprocess.run(

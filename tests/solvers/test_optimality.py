@@ -308,3 +308,17 @@ def test_bounds_far_from_the_answer(magnitude: float) -> None:
     assert result.certificate is not None
     assert result.objective.value >= result.certificate.lower_bound * (1.0 - 1e-9)
     assert result.objective.value <= result.objective.initial * (1.0 + 1e-6)
+
+
+def test_a_limit_that_nothing_open_acts_on_changes_nothing() -> None:
+    """Over its edge by a rounding it is kept, and takes no part in the bound."""
+    roll = Measure(channels.ROLL_MOMENT, NORMS["peak to peak"], orders=(4.0, 6.0))
+    free = solve(four())
+    whole = free.final.value(roll)
+    for over in (3e-6, -3e-6):
+        found = solve(four(limits=(Limit("roll", roll, maximum=whole * (1.0 - over)),)))
+        assert found.status is Status.OPTIMAL
+        assert found.objective.value == pytest.approx(free.objective.value, rel=1e-6)
+        assert found.certificate.lower_bound <= found.objective.value * (1.0 + 1e-9)
+    broken = solve(four(limits=(Limit("roll", roll, maximum=whole * (1.0 - 1e-3)),)))
+    assert (broken.status, broken.conflict) == (Status.INFEASIBLE, ("roll",))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -21,7 +22,7 @@ from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.decision import Decision, Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Measure, Rows, bends_of, load_rows, mass_rows
+from laufruhe.problem.measure import Limit, Measure, Rows, bends_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -225,6 +226,12 @@ class AffineModel:
         terms = tuple((term.weight, norm(term.measure)) for term in problem.objective)
         limits = tuple((limit.maximum, norm(limit.measure)) for limit in problem.load_limits)
         return AffineProblem(terms, limits, self.domains, samples)
+
+    def with_limits(self, limits: Sequence[Limit]) -> AffineModel:
+        """The same model under some of its limits."""
+        other = copy(self)
+        other.problem = replace(self.problem, limits=tuple(limits))
+        return other
 
     def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
         """Per operating point the wrench of the bare design, and of one unit of every column."""

@@ -60,24 +60,27 @@ class FiringModel(StarModel):
         self.problem = normalised(phasing.realise(phasing.fired(slots, geometry)))
         self._slots, self._fired = slots, evaluate(self.problem)
 
-    def _rows(self, samples: int) -> StarProblem:
+    def _rows(self, samples: int, averaged: bool) -> StarProblem:
         """Rows of every firing order at `samples` steps over the cycle."""
-        stars, problem = super()._rows(samples), self.problem
+        stars, problem = super()._rows(samples, averaged), self.problem
         by_star = np.array(slot_steps(self.phasing.cycle, range(self.space.throws)))
         terms, limits = (iter([_by_slot(norm, by_star) for _, norm in each]) for each in (stars.terms, stars.limits))
         return StarProblem(
-            tuple((term.weight, self._norm(term.measure, samples, terms)) for term in problem.objective),
-            tuple((limit.maximum, self._norm(limit.measure, samples, limits)) for limit in problem.load_limits),
+            tuple((term.weight, self._norm(term.measure, samples, averaged, terms)) for term in problem.objective),
+            tuple(
+                (limit.maximum, self._norm(limit.measure, samples, averaged, limits)) for limit in problem.load_limits
+            ),
             self.domains,
             samples,
         )
 
-    def _norm(self, measure: Measure, samples: int, of_stars: Iterator[StarNorm]) -> StarNorm:
+    def _norm(self, measure: Measure, samples: int, averaged: bool, of_stars: Iterator[StarNorm]) -> StarNorm:
         """Rows of a measure: of its star, and what the slot of every cylinder adds."""
         if not measure.feels_order:
             return next(of_stars)
         signals = [signal.over(self.base) for signal in self._fired.signals(measure.load)]
-        whole = load_rows(measure, self.problem.points, signals, self.problem.engine, samples)
+        steps = samples if averaged and measure.norm.averages else None
+        whole = load_rows(measure, self.problem.points, _averaged(signals, steps), self.problem.engine, samples)
         bends, count = bends_of(measure, signals, self.problem.engine), self.space.throws
         moves = np.zeros((count, count, *whole.vectors.shape))
         for k in range(1, count):
@@ -85,7 +88,7 @@ class FiringModel(StarModel):
             for slot in range(count):
                 later = [signal.later(Fraction(slot, count), slot * signal.period / count) for signal in first]
                 moves[k, slot] = load_rows(
-                    measure, self.problem.points, later, self.problem.engine, samples, bends
+                    measure, self.problem.points, _averaged(later, steps), self.problem.engine, samples, bends
                 ).vectors
             moves[k] -= moves[k, self._slots[k]].copy()
         if measure.load.feels_unbalances:
@@ -119,6 +122,11 @@ def _among(names: Sequence[str], own: Sequence[str], values: NDArray[Any]) -> ND
     out = np.zeros((len(values), len(names), values.shape[-1]), dtype=values.dtype)
     out[:, [names.index(name) for name in own]] = values
     return out
+
+
+def _averaged(signals: Sequence[Spectrum], steps: int | None) -> Sequence[Spectrum]:
+    """About every one of so many angles; as they are where none are given."""
+    return signals if steps is None else [signal.averaged(signal.period / steps) for signal in signals]
 
 
 def _by_slot(norm: StarNorm, steps: NDArray[np.int64]) -> StarNorm:

@@ -130,7 +130,7 @@ class StarModel:
         for model in self.models:
             model.base, model.lead = self.base, self._whole
         self.domains = self._whole.domains
-        self._cache: dict[int, StarProblem] = {}
+        self._cache: dict[tuple[int, bool], StarProblem] = {}
 
     @property
     def models(self) -> list[AffineModel]:
@@ -147,15 +147,16 @@ class StarModel:
         candidate = Candidate(throws, None, *self.geometry, without_gas=True)
         return AffineModel(normalised(self.phasing.realise(candidate)), keep_all=True)
 
-    def at(self, samples: int) -> StarProblem:
-        """Rows of every star at `samples` steps over the period of the loads."""
-        if samples not in self._cache:
-            self._cache[samples] = self._rows(samples).compressed
-        return self._cache[samples]
+    def at(self, samples: int, averaged: bool = False) -> StarProblem:
+        """Rows of every star at `samples` steps over the period of the loads; those of means averaged (P7)."""
+        key = samples, averaged
+        if key not in self._cache:
+            self._cache[key] = self._rows(samples, averaged).compressed
+        return self._cache[key]
 
-    def _rows(self, samples: int) -> StarProblem:
-        whole, still = self._whole.at(samples), self._still.at(samples)
-        moved = {key: model.at(samples) for key, model in self._moved.items()}
+    def _rows(self, samples: int, averaged: bool) -> StarProblem:
+        whole, still = self._whole.at(samples, averaged), self._still.at(samples, averaged)
+        moved = {key: model.at(samples, averaged) for key, model in self._moved.items()}
         return StarProblem(
             self._norms(whole.terms, still.terms, {key: a.terms for key, a in moved.items()}),
             self._norms(whole.limits, still.limits, {key: a.limits for key, a in moved.items()}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
 MOST_ROWS = 60_000
+# angles at which a limit is read that nothing open acts on
+FINE = 5760
 NEGLIGIBLE = 1e-6
 
 
@@ -60,23 +63,24 @@ def solve_unbalances(problem: Problem, sharply: bool = False) -> Result:
     # most designs are given with what is open at zero, and that one is known
     initial = evaluate(problem) if any(problem.start) else model.bare
     modelled = time.perf_counter()
-    optimum, samples = _refine(problem, model, nothing_of(problem))
+    idle, hopeless = _idle(problem, model)
+    if hopeless:
+        return none_within(problem, initial, hopeless, {"model": modelled - started})
+    model = model.with_limits([limit for limit in problem.limits if limit not in idle])
+    optimum, samples = _refine(model.problem, model, nothing_of(problem))
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
-        conflict = conflict_of(tightened(model.at(samples), 0.0), [limit.name for limit in problem.load_limits])
+        conflict = conflict_of(tightened(model.at(samples), 0.0), [limit.name for limit in model.problem.load_limits])
         return none_within(problem, initial, conflict, timing)
     if sharply:
         optimum = sharpened(model, optimum)
-    hopeless = _hopeless(problem, optimum)
-    if hopeless:
-        return none_within(problem, initial, hopeless, timing)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     design = judged(problem, values, cycle_samples)
     initial = replace(initial, samples=cycle_samples)
     timing["evaluate"] = time.perf_counter() - solved
-    return concluded(design, initial, _shown(problem.load_limits, optimum, design.value), timing)
+    return concluded(design, initial, _shown(model.problem.load_limits, idle, optimum, design.value), timing)
 
 
 def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optimum | None, int]:
@@ -97,8 +101,6 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
             samples *= 2
             continue
         best = found
-        if _hopeless(problem, best):
-            break
         rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
         if (best.gap <= problem.tolerance and best.excess <= FEASIBLE) or rows > MOST_ROWS:
             break
@@ -152,12 +154,22 @@ def tightened(affine: AffineProblem, margin: float) -> AffineProblem:
     return replace(affine, limits=tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits))
 
 
-def _hopeless(problem: Problem, optimum: Optimum) -> tuple[str, ...]:
-    """A limit that is broken and that nothing open acts on; none where there is no such."""
-    for limit, (maximum, norm) in zip(problem.load_limits, optimum.judge.limits, strict=True):
-        if not norm.slope.any() and norm.value(optimum.x) > maximum * (1.0 + KEPT):
-            return (limit.name,)
-    return ()
+def _idle(problem: Problem, model: AffineModel) -> tuple[list[Limit], tuple[str, ...]]:
+    """Limits that nothing open acts on, and the first of them that is broken.
+
+    They are judged like any design, and are in no program: there a rounding would have a price without end.
+    """
+    still = [limit for limit in problem.load_limits if not model.norm(limit.measure, model.full_samples).slope.any()]
+    # a whole number of times as fine
+    samples = model.full_samples * max(2, math.ceil(FINE / model.full_samples))
+    idle = [(limit, _given(model.norm(limit.measure, samples))) for limit in still]
+    broken = [limit.name for limit, value in idle if value > limit.maximum * (1.0 + KEPT)]
+    return still, tuple(broken[:1])
+
+
+def _given(norm: AffineNorm) -> float:
+    """Without anything that is open."""
+    return norm.value(np.zeros(norm.slope.shape[-1]))
 
 
 def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
@@ -232,7 +244,7 @@ def _triangle(slope: Array) -> Array:
     return triangle / (float(np.abs(triangle).max()) or 1.0)
 
 
-def _shown(limits: Sequence[Limit], optimum: Optimum, value: float) -> Shown:
+def _shown(limits: Sequence[Limit], idle: Sequence[Limit], optimum: Optimum, value: float) -> Shown:
     bound, prices = optimum.bound, optimum.bound.multipliers.shadow_prices(optimum.problem)
     unit = value if value > optimum.nothing else optimum.nothing / ROUNDING
     return Shown(
@@ -240,7 +252,8 @@ def _shown(limits: Sequence[Limit], optimum: Optimum, value: float) -> Shown:
         reach=Reach.WHOLE,
         kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
         method=f"second-order cones at {optimum.samples} angles{optimum.then}, dual bound at {optimum.problem.samples}",
-        prices={(limit, "at most"): price for limit, price in zip(limits, prices, strict=True)},
+        prices=dict.fromkeys([(limit, "at most") for limit in idle], 0.0)
+        | {(limit, "at most"): price for limit, price in zip(limits, prices, strict=True)},
         slopes={domain.decision.name: bound.gradient[domain.columns] for domain in optimum.problem.domains},
     )
 
