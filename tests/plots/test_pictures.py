@@ -14,14 +14,15 @@ from matplotlib.figure import Figure
 
 from cli import scenes
 from lanes import first_fast
+from laufruhe.files.reader import load
 from laufruhe.plots import draw
 from laufruhe.plots.results import bars, cycle, engine, polar, spectrum
 from laufruhe.plots.style import AFTER, BEFORE, DPI, fitted
 from laufruhe.present.measures import mount_orders
 from laufruhe.problem.evaluation import measured, samples_of
-from laufruhe.solvers import Result
+from laufruhe.solvers import Result, state
 from picture_faults import drawn_texts, overlaps
-from problem_files import written
+from problem_files import PROBLEMS, written
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -76,6 +77,21 @@ def test_polar_diagrams_are_the_samples() -> None:
             assert len(path) >= 720
             assert np.array_equal(path, samples[:: len(samples) // len(path)])
             assert np.array_equal(np.asarray(lines[label])[-1], samples[0])
+
+
+def test_the_ring_stands_where_the_first_cylinder_fires() -> None:
+    """Of a V engine that is not where the crank angle is zero (C5)."""
+    result = state(load(PROBLEMS / "vee-two-90.toml"))
+    cycle, first = result.final.engine.cycle.angle, result.final.engine.cylinders[0]
+    assert first.firing_angle > 0.1
+    figure = polar.figure(result)
+    for m, axes in enumerate(figure.axes):
+        ring = next(line for line in axes.lines if line.get_markersize() == 7)
+        samples = samples_of(result.final, 0)[:, m, 1:]
+        nearest = samples[round(first.firing_angle / cycle * len(samples))]
+        assert np.linalg.norm(np.ravel(ring.get_xydata()) - nearest) < 0.02 * np.abs(samples).max()
+    assert "cylinder 1 fires" in texts(figure)
+    assert "dead centre" not in texts(engine.figure(result))
 
 
 def test_polar_diagrams_share_one_scale() -> None:

@@ -240,7 +240,7 @@ def _spots(scene: Scene) -> Iterator[tuple[float, complex, float]]:
     for part in scene.engine.slider_cranks:
         for pose in (Pose.of(part, phi) for phi in np.linspace(0.0, math.tau / abs(part.shaft.ratio), 13)):
             spots = [*(place for body in pose.bodies for place in body.points)] or [pose.piston]
-            yield from ((part.x, place, 0.0 if pose.bodies else 0.4 * bore) for place in spots)
+            yield from ((part.x, place, 0.0 if pose.bodies else 0.6 * bore) for place in spots)
             yield part.x, pose.pin, 0.15 * bore
     for rotor in scene.weights:
         yield rotor.x, complex(rotor.shaft.z, rotor.shaft.y), half_disc(abs(rotor.unbalance))

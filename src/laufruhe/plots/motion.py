@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from laufruhe.plots.machine_parts import MM, Pose, at, bore_of
 from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
-from laufruhe.plots.style import Series, headed, point_name, series_of, styled
+from laufruhe.plots.style import VERMILION, Page, Series, entry_of_dots, headed, point_name, series_of, styled
 from laufruhe.present.measures import Array, hardest_point, has_loads
 from laufruhe.present.numbers import figure as words
 from laufruhe.problem.curves import forces_of
@@ -19,14 +21,16 @@ from laufruhe.solvers.result import Result
 FRAMES = 48
 """Over the working cycle."""
 SECONDS = 4.0
-DPI = 80
+DPI, COLOURS = 80, 96
 # of the height of the picture, for the largest force
 REACH = 0.35
+LIT = math.radians(70.0)
+"""How long a firing is shown [rad]."""
 
 
 @styled()
 def animate(result: Result, path: Path) -> None:
-    """One working cycle; arrows are the shaking force at the crank, and the force on each mount."""
+    """One working cycle; arrows are the shaking force at the crank, and the force on each mount; dots are firings."""
     from PIL import Image
 
     scene = Scene.of(result)
@@ -37,18 +41,37 @@ def animate(result: Result, path: Path) -> None:
     for step in range(FRAMES):
         drawn, phi = views(scene), result.final.engine.cycle.angle * step / FRAMES
         draw_views(drawn, scene, phi)
+        _firings(drawn, scene, phi)
         for one, forces in zip(series, loads, strict=False):
             _arrows(drawn.panels[0], scene, forces[step], largest, one.colour)
-        shown = f"{math.degrees(phi):.1f}° after {scene.engine.slider_cranks[0].name} fires"
+        told = f"{math.degrees(phi):.1f}° of crank angle"
         scale = f"; longest arrow {words(largest, 'N', 3)}" if largest else ""
-        at = f", at {point_name(result, k)}" if loads else ""
-        legend = [*legend_of(scene), *(one.entry(": forces") for one in series[: len(loads)])]
-        headed(drawn, result, f"The engine turning{at}", f"{shown}{scale}.", legend)
+        where = f", at {point_name(result, k)}" if loads else ""
+        fires = entry_of_dots("fires", color=VERMILION, markersize=7.0)
+        legend = [*legend_of(scene), fires, *(one.entry(": forces") for one in series[: len(loads)])]
+        headed(drawn, result, f"The engine turning{where}", f"{told}{scale}.", legend)
         drawn.figure.set_dpi(DPI)
         drawn.figure.canvas.draw()
         pixels = np.asarray(drawn.figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
-        frames.append(Image.fromarray(pixels).convert("RGB").quantize(64, dither=Image.Dither.NONE))
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=int(1e3 * SECONDS / FRAMES), loop=0)
+        frames.append(Image.fromarray(pixels).convert("RGB"))
+    # one set of colours for all, or they would flicker
+    some = np.concatenate([np.asarray(frame) for frame in frames[:: max(FRAMES // 4, 1)]])
+    colours = Image.fromarray(some).quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    shown = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
+    shown[0].save(path, save_all=True, append_images=shown[1:], duration=int(1e3 * SECONDS / FRAMES), loop=0)
+
+
+def _firings(drawn: Page, scene: Scene, phi: float) -> None:
+    """A dot over every piston that fired a little while ago."""
+    bore, cycle = bore_of(scene.engine), scene.engine.cycle.angle
+    for part in scene.engine.cylinders:
+        pose = Pose.of(part, phi)
+        if (phi - part.firing_angle + 1e-9) % cycle > LIT or pose.bodies:
+            continue
+        place = pose.piston + 0.4 * bore * cmath.exp(1j * part.bank)
+        beside = (MM * part.x, MM * (place.imag if scene.is_flat else place.real))
+        for axes, (x, y) in zip(drawn.panels, (at(place), beside), strict=True):
+            axes.plot(x, y, "o", color=VERMILION, markersize=7.0, zorder=9.5)
 
 
 def _loads(one: Series, k: int) -> Array:
@@ -65,5 +88,5 @@ def _arrows(axes: Axes, scene: Scene, forces: Array, largest: float, colour: str
     scale = REACH * (high - low) / largest
     places = [(0.0, 0.0), *((1e3 * mount.position[1], 1e3 * mount.position[2]) for mount in scene.engine.mounts)]
     for (y, z), (_, across, up) in zip(places, forces, strict=False):
-        look: Any = {"color": colour, "width": 0.006, "scale": 1.0, "zorder": 8}
+        look: Any = {"color": colour, "units": "inches", "width": 0.03, "scale": 1.0, "zorder": 10.0}
         axes.quiver(y, z, scale * across, scale * up, angles="xy", scale_units="xy", **look)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from matplotlib.figure import Figure
 
 from laufruhe.plots.machine_parts import THICKNESS
@@ -17,11 +19,13 @@ def applies(result: Result) -> bool:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """End and side view of the design at the firing dead centre of cylinder 1."""
+    """End and side view of the design at a crank angle of zero."""
     scene = Scene.of(result)
     drawn = views(scene)
     draw_views(drawn, scene)
     weights = f" Weights as half discs of steel, {1e3 * THICKNESS:g} mm thick, of the same unbalance."
-    first = scene.engine.slider_cranks[0].name
-    lines = f"To scale, at the firing dead centre of {first}.{weights if scene.weights else ''}"
+    cycle = scene.engine.cycle.angle
+    fires = [part.name for part in scene.engine.cylinders if abs(math.remainder(part.firing_angle, cycle)) < 1e-9]
+    centre = f", the firing dead centre of {' and '.join(fires)}" if fires else ""
+    lines = f"To scale, at a crank angle of 0°{centre}.{weights if scene.weights else ''}"
     return headed(drawn, result, "The engine", lines, legend_of(scene))

@@ -76,11 +76,13 @@ def figure(result: Result) -> Figure:
     drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.36)
     cycle = result.problem.engine.cycle
     quarters = (len(paths[0]) - 1) // (4 * cycle.turns)
+    first = result.final.engine.cylinders[0]
+    fired = round((first.firing_angle % cycle.angle) / cycle.angle * (len(paths[0]) - 1))
     factor, unit = in_thousands(frame.size, "N")
     for m, (axes, mount) in enumerate(zip(drawn.panels, mounts, strict=True)):
         for path, one, width in zip(paths, series, (2.4, 1.5)[-len(series) :], strict=True):
             if frame.along is None:
-                _path(axes, factor * path[:, m], one, quarters, width)
+                _path(axes, factor * path[:, m], one, quarters, fired, width)
             else:
                 angles = np.linspace(0.0, math.degrees(cycle.angle), len(path))
                 axes.plot(angles, factor * path[:, m, frame.along], color=one.colour, linewidth=width, label=one.name)
@@ -89,7 +91,7 @@ def figure(result: Result) -> Figure:
     _label(drawn, columns, frame, unit)
     lines = f"Force on each mount at {point_name(result, k)}, seen from the front.{_told(frame)}"
     title = "Mount forces over one working cycle"
-    return headed(drawn, result, title, lines, _legend(series, frame), _left_out(paths, frame))
+    return headed(drawn, result, title, lines, _legend(series, frame, first.name), _left_out(paths, frame))
 
 
 def _closed(samples: Array) -> Array:
@@ -99,13 +101,13 @@ def _closed(samples: Array) -> Array:
     return np.concatenate([samples[::step], samples[:1]])
 
 
-def _path(axes: Axes, path: Array, one: Series, quarters: int, width: float) -> None:
+def _path(axes: Axes, path: Array, one: Series, quarters: int, fired: int, width: float) -> None:
     axes.plot(path[:, 1], path[:, 2], color=one.colour, linewidth=width, label=one.name, solid_joinstyle="round")
     if quarters:
         dots = path[:-1:quarters]
         axes.plot(dots[:, 1], dots[:, 2], "o", color=one.colour, markersize=3.6, markeredgewidth=0)
         ring: Any = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": one.colour, "markeredgewidth": 1.3}
-        axes.plot(*dots[0, 1:], "o", **ring)
+        axes.plot(*path[fired, 1:], "o", **ring)
 
 
 def _frame(axes: Axes, frame: Frame, factor: float, turns: int) -> None:
@@ -162,10 +164,10 @@ def _left_out(paths: list[Array], frame: Frame) -> str:
     return forces + (f"The first {MOST_PANELS} of {count} mounts. " if count > MOST_PANELS else "")
 
 
-def _legend(series: list[Series], frame: Frame) -> list[Artist]:
+def _legend(series: list[Series], frame: Frame, first: str) -> list[Artist]:
     lines = [one.entry(linewidth=width) for one, width in zip(series, (2.4, 1.5)[-len(series) :], strict=True)]
     if frame.along is not None:
         return lines
     dot = entry_of_dots("every 90° of the crank", color=INK, markersize=3.6)
-    ring = entry_of_dots("cylinder 1 fires", color=INK, markersize=7, markerfacecolor="none")
+    ring = entry_of_dots(f"{first} fires", color=INK, markersize=7, markerfacecolor="none")
     return [*lines, dot, ring]
