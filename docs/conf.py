@@ -11,12 +11,22 @@ author = "Laufruhe developers"
 version = release = version_of("laufruhe")
 from drawn import scraper  # noqa: E402
 
-extensions = ["mathml", "myst_nb", "schema_keys", "sphinx_copybutton", "sphinx_gallery.gen_gallery"]
+extensions = [
+    "mathml",
+    "myst_nb",
+    "schema_keys",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
+]
 exclude_patterns = ["_build", "extensions", "examples", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5"]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
 myst_heading_anchors = 3
 # links to files beside docs/ are for readers of the repository
 suppress_warnings = ["myst.xref_missing", "config.cache"]
+
+autodoc_typehints = "none"
 
 # notebooks are run as the site is built; one that fails stops it
 nb_execution_mode = "cache"
@@ -52,7 +62,8 @@ def for_readers_aloud(app, page, template, context, doctree):
     """Headings of the navigation say their level; blocks that scroll can be reached by keys."""
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
-    context["body"] = context.get("body", "").replace("<pre>", '<pre tabindex="0">')
+    body = context.get("body", "").replace("<pre>", '<pre tabindex="0">')
+    context["body"] = body.replace('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper')
 
 
 def setup(app):
