@@ -21,6 +21,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
+from laufruhe.machine.crank_names import CRANKS
 
 # SI; squares and products of what lies between stay finite, and off zero.
 SMALLEST, LARGEST = 1e-40, 1e12
@@ -160,10 +161,11 @@ class Number:
 
 @dataclass(frozen=True)
 class OrOpen:
-    """A pydantic field that reads a list of the type `inner`, or the word "open" in its place."""
+    """A pydantic field that reads a list of the type `inner`, or in its place the word "open" or the name of a list."""
 
     inner: Any
     example: str
+    named: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(self.inner))
@@ -171,13 +173,17 @@ class OrOpen:
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return {"anyOf": [handler(schema), {"const": "open"}]}
+        return {"anyOf": [handler(schema), {"enum": ["open", *dict(self.named)]} if self.named else {"const": "open"}]}
 
     def _read(self, given: Any, inner: Callable[[Any], Any]) -> Any:
         if isinstance(given, str):
             if given == "open":
                 return given
-            raise refusal(f'is neither a list nor "open"; write for example {self.example} or "open"')
+            if given in dict(self.named):
+                return inner(list(dict(self.named)[given]))
+            names = ", ".join(f'"{name}"' for name, _ in self.named)
+            told = f', "open" or a name: {names}' if names else ' or "open"'
+            raise refusal(f'is neither a list nor "open"; write for example {self.example}{told}')
         return inner(given)
 
 
@@ -268,7 +274,9 @@ OpenDamping: TypeAlias = Annotated[float | Open, Number("N s/m", least=0.0, open
 Side: TypeAlias = Annotated[
     str, BeforeValidator(_side), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
 ]
-Throws: TypeAlias = Annotated[list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]")]
+Throws: TypeAlias = Annotated[
+    list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]", tuple(CRANKS.items()))
+]
 Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\t\n]+$")]
 CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 Pair: TypeAlias = Annotated[list[T], Field(min_length=2, max_length=2)]

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +27,7 @@ from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
-_LEFT_OUT, _NOTHING, _FEW = 1e-4, 1e-10, 24
-"""Share of the moving parts' root mean square that the orders left out may hold, of the first few next to nothing;
-bounds are lowered by it."""
+_NOTHING, _FEW = 1e-10, 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +73,8 @@ class WaveNorm:
 class ThrowWaves:
     """Norms of a problem as waves of its throws.
 
+    Waves of time have the orders `times`, those of the angles `orders`: the same ones where throws turn.
+
     Parameters
     ----------
     problem
@@ -84,6 +85,12 @@ class ThrowWaves:
         Throw that every rotor turns with; rotors left out stand still.
     """
 
+    share_left_out: ClassVar[float] = 1e-4
+    """Of the moving parts' root mean square, that the orders left out may hold, of the first few next to nothing;
+    bounds are lowered by it."""
+    followed: ClassVar[float] = 3e-3
+    """Of the heaviest order, that one is followed along an arc; others count as their size."""
+
     def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
         self.problem, self.layout = problem, layout
         engine = problem.engine
@@ -92,7 +99,7 @@ class ThrowWaves:
         self.parts = _moving(engine, layout, rides)
         self._alone = [evaluate(problem, part.engine) for part in self.parts]
         self.rest = AffineModel(replace(problem, engine=replace(engine, slider_cranks=(), rotors=still)), keep_all=True)
-        self.orders = self._kept()
+        self.times = self.orders = self._kept()
         self.numbers = np.array([float(order) for order in self.orders])
         self._turning = [as_order(abs(rotor.shaft.ratio)) for rotor in still]
         self.base = common_base([order for order in (*self.orders, *self._turning, Fraction(1)) if order])
@@ -125,7 +132,7 @@ class ThrowWaves:
                     squares[order] = squares.get(order, 0.0) + float(sizes[j])
             ordered = sorted(squares)
             tail = np.cumsum([squares[order] for order in ordered[::-1]])[::-1]
-            shares = [_NOTHING if k < _FEW else _LEFT_OUT for k in range(len(ordered))]
+            shares = [_NOTHING if k < _FEW else self.share_left_out for k in range(len(ordered))]
             told = zip(ordered, tail, shares, strict=True)
             kept |= {order for order, rest, share in told if rest > share**2 * tail[0]}
         return tuple(sorted(kept))
@@ -136,9 +143,9 @@ class ThrowWaves:
 
     def _left_out(self, measure: Measure, k: int) -> float:
         """Of one part."""
-        total = 0.0
+        total, kept = 0.0, np.array([float(order) for order in self.times])
         for signal in self._signals(measure, k):
-            sizes = np.linalg.norm(signal.coefficients[~orders_equal(signal.orders, self.numbers)], axis=-1)
+            sizes = np.linalg.norm(signal.coefficients[~orders_equal(signal.orders, kept)], axis=-1)
             if measure.norm.is_euclidean or measure.norm.averages:
                 # neither is more than the root mean square, at the place where that is largest
                 total = max(total, float(np.sqrt(np.square(sizes).sum(axis=0)).max(initial=0.0)))
@@ -172,9 +179,18 @@ class ThrowWaves:
 
     def _waves(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> NDArray[np.complex128]:
         """Rows of every order of a part: the real part as it is, and turned by a quarter of its wave."""
-        places = [round(order / self.base) for order in self.orders]
-        own = [np.array([signal.at(order) for order in self.numbers]) for signal in signals]
-        nowhere, found = [np.zeros(0)] * len(signals), []
+        return self.rows_of(measure, [self.coefficients(signal) for signal in signals], samples)
+
+    def coefficients(self, signal: Spectrum) -> NDArray[np.complex128]:
+        """Of the orders that are kept, shape (orders, places, d)."""
+        return np.array([signal.at(float(order)) for order in self.times])
+
+    def rows_of(
+        self, measure: Measure, own: Sequence[NDArray[np.complex128]], samples: int
+    ) -> NDArray[np.complex128]:  # fmt: skip
+        """Rows of every order of coefficients at the operating points, shape (orders, k, d)."""
+        places = [round(order / self.base) for order in self.times]
+        nowhere, found = [np.zeros(0)] * len(own), []
         for h, j in enumerate(places):
             rows = []
             for turn in (1.0, -1.0j):
@@ -195,7 +211,7 @@ class ThrowWaves:
 
     def samples(self, measure: Measure, wanted: int) -> int:
         """Steps at which squares are exact, or as many as wanted."""
-        turning = (*self.orders, *self._turning)
+        turning = (*self.times, *self._turning)
         highest = max((order for order in turning if measure.counted([float(order)])[0]), default=Fraction(1))
         return 2 * int(highest / self.base) + 2 if measure.norm.is_euclidean else wanted
 

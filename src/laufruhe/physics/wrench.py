@@ -17,3 +17,14 @@ def plane_wrench(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> NDArray
     """Wrench of a force in the plane at x through a shaft's axis, shape (6, ...) of forces (...) (C2)."""
     roll = shaft.y * vertical - shaft.z * lateral
     return np.array([lateral - lateral, lateral, vertical, roll, -x * vertical, x * lateral])
+
+
+def turning_parts(lateral: Any, vertical: Any) -> tuple[Any, Any]:
+    """Parts F e^{i h phi} and B e^{-i h phi} of z + i y, that turn with the crank and against it (C4).
+
+    Parameters
+    ----------
+    lateral, vertical
+        Coefficients of one order (C8).
+    """
+    return 0.5 * (vertical + 1j * lateral), 0.5 * np.conj(vertical - 1j * lateral)

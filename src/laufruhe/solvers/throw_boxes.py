@@ -31,8 +31,6 @@ Array = NDArray[np.float64]
 _ROUNDS, _WORTH = 6, 0.8
 # of a side, that a cut keeps from its ends; a side that is cut no more [rad]
 _EDGE, NARROWEST = 0.1, 1e-9
-# of the heaviest order, that one is followed along an arc
-_FOLLOWED = 3e-3
 # multipliers that are tried on other boxes
 _KNOWN = 8
 
@@ -116,7 +114,7 @@ class ThrowPrograms:
         for norm in (norm for _, norm in (*self._terms, *self._limits)):
             own = np.sqrt(np.square(np.abs(norm.waves)).sum(axis=(0, 2, 3)))
             sizes += own / (float(own.max()) or 1.0)
-        return int(np.flatnonzero(sizes > _FOLLOWED * sizes.max()).max(initial=0)) + 1
+        return int(np.flatnonzero(sizes > self.waves.followed * sizes.max()).max(initial=0)) + 1
 
     def program(self, window: FiringWindow) -> Program:
         """Of one order of firing."""

@@ -59,12 +59,15 @@ class Searched:
         How many were looked at.
     told
         Limits that no throws keep together, where none is allowed.
+    what
+        Was divided.
     """
 
     bound: float
     best: StarDesign | None
     boxes: int
     told: tuple[str, ...]
+    what: str = "boxes of throws"
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +170,17 @@ def search_throws(
     if not windows:
         return None if best is not None else Searched(math.inf, None, 0, ())
     try:
-        search = _Search(problem, phasing, windows, improve, best)
+        search = ThrowSearch(problem, phasing, windows, improve, best)
+    except ModelError:
+        return None
+    return found_by(search, problem, best, floor, "boxes of throws")
+
+
+def found_by(
+    search: ThrowSearch, problem: Problem, best: StarDesign | None, floor: float, what: str
+) -> Searched | None:  # fmt: skip
+    """What dividing boxes told; None where they say nothing."""
+    try:
         for stage, _, _ in search.roots:
             # what is too much to hold shows at once
             _ = stage.programs
@@ -177,15 +190,20 @@ def search_throws(
     most = len(search.roots) + (MOST_BOXES if problem.search.boxes is None else problem.search.boxes)
     found, bound, boxes = divided(
         search, _Part(floor), _Best(best), nothing_of(problem), problem.tolerance + search.cost, most,
-        "boxes of throws",
+        what,
     )  # fmt: skip
-    return Searched(min(bound, search.cut(found.value)), found.design, boxes, search.conflict)
+    return Searched(min(bound, search.cut(found.value)), found.design, boxes, search.conflict, what)
 
 
 def _suits(problem: Problem, phasing: Phasing) -> bool:
     """Whether banks and pins are given, and waves know what is asked."""
     if any(pair is not None and pair[0] < pair[1] for pair in (phasing.bank, phasing.split)):
         return False
+    return knows(problem)
+
+
+def knows(problem: Problem) -> bool:
+    """Whether waves know what is asked."""
     if problem.feels_gas and any(r.shaft.ratio != round(r.shaft.ratio) for r in problem.engine.rotors):
         return False
     return bool(problem.objective) and all(_is_known(problem, term.measure) for term in problem.objective)
@@ -196,7 +214,7 @@ def _is_known(problem: Problem, measure: Measure) -> bool:
     return not (problem.feels_gas and measure.feels_gas and measure.norm.refinement > 1)
 
 
-class _Search:
+class ThrowSearch:
     """Windows and boxes of the throws of a problem."""
 
     is_shared = False
@@ -212,10 +230,10 @@ class _Search:
         free = all(decision.set.lower <= 0.0 for decision in problem.unbalances)
         for built in phasing.shafts.largest if free else phasing.shafts.allowed:
             left_out = phasing.without(built)
-            make, loss = self._programs(windows, left_out)
-            value = best.value if best is not None and best.value > 0.0 else math.inf
-            stage = _Stage(make, FEWEST_SAMPLES, lambda samples: self._steps_cost(best, samples), value, loss)
-            self.roots += [(stage, window, left_out) for window in windows]
+            for make, loss, own in self._programs(windows, left_out):
+                value = best.value if best is not None and best.value > 0.0 else math.inf
+                stage = _Stage(make, FEWEST_SAMPLES, lambda samples: self._steps_cost(best, samples), value, loss)
+                self.roots += [(stage, window, left_out) for window in own]
 
     @property
     def cost(self) -> float:
@@ -238,8 +256,8 @@ class _Search:
 
     def _programs(
         self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]
-    ) -> tuple[Callable[[int], ThrowPrograms], float]:
-        """Programs of boxes at so many steps over the period, and what their orders leave out of the objective."""
+    ) -> Iterator[tuple[Callable[[int], ThrowPrograms], float, Sequence[FiringWindow]]]:
+        """Programs at so many steps over the period, what their orders leave out of the objective, their windows."""
         phasing, layout = self._phasing, self._phasing.layout(*self._phasing.least_geometry)
         for k, window in enumerate(windows):
             candidate = replace(self.candidate(window, amid(window)), left_out=left_out)
@@ -250,13 +268,19 @@ class _Search:
                 if k + 1 < min(len(windows), _MOST_REALISED):
                     continue
                 raise
-            limits = tuple(limit for limit in realised.load_limits if _is_known(realised, limit.measure))
             rides = rides_of(phasing, candidate)
-            riders = Riders(replace(realised, limits=limits), rides, candidate.throws)
+            riders = Riders(self.known(realised), rides, candidate.throws)
             waves = ThrowWaves(riders.problem, layout, rides)
             loss = sum(term.weight * waves.left_out(term.measure) for term in realised.objective)
-            return partial(ThrowPrograms, waves, riders, firing_of(phasing)), loss
+            yield partial(ThrowPrograms, waves, riders, firing_of(phasing)), loss, windows
+            return
         raise ModelError("no crank fires")
+
+    @staticmethod
+    def known(problem: Problem) -> Problem:
+        """With the limits that waves know."""
+        limits = tuple(limit for limit in problem.load_limits if _is_known(problem, limit.measure))
+        return replace(problem, limits=limits)
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
         """A design with these throws, and with a firing order that they keep."""

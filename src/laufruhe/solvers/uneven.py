@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.uneven_bound import steady_bound, uneven_bound
+from laufruhe.solvers.angle_search import search_angle
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, no_star, with_star
 from laufruhe.solvers.mount_starts import columns_of, unbalances_of
 from laufruhe.solvers.nonlinear import solve_nonlinear
@@ -80,12 +82,13 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         if found and len(steps) > 1:
             trade.append(_trade_point(problem, phasing, allowed, found[0]))
     floor, source = _bound(problem, phasing, phasing.intervals)
-    searched = search_throws(
-        problem, phasing, found[0] if found else None, floor,
-        lambda candidate: local_optimum(phasing, candidate, phasing.intervals),
-    )  # fmt: skip
+    improve = partial(_near, phasing)
+    first = found[0] if found else None
+    searched = search_angle(problem, phasing, first, floor, improve)
+    if searched is None:
+        searched = search_throws(problem, phasing, first, floor, improve)
     if searched is not None:
-        floor, source = max(floor, searched.bound), f"{searched.boxes} boxes of throws"
+        floor, source = max(floor, searched.bound), f"{searched.boxes} {searched.what}"
         if searched.best is not None and searched.best not in found:
             found = [searched.best, *found]
             trade = [*trade[:-1], _trade_point(problem, phasing, phasing.intervals, found[0])] if trade else []
@@ -95,6 +98,11 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         return _none(problem, phasing, searched)
     trade = [replace(point, lower_bound=max(point.lower_bound, min(floor, point.value))) for point in trade]
     return _result(problem, phasing, even, found, tuple(trade), floor, source)
+
+
+def _near(phasing: Phasing, candidate: Candidate) -> StarDesign | None:
+    """The local optimum that a crank from a box leads to."""
+    return local_optimum(phasing, candidate, phasing.intervals)
 
 
 def _narrowed(phasing: Phasing, share: float) -> Intervals:

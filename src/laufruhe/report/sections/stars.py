@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.present.measures import objective_unit, ranking_of
 from laufruhe.present.numbers import DASH, number, percent, trimmed
 from laufruhe.report.grid import Grid
@@ -50,7 +51,8 @@ def _stars(result: Result, phasing: PhasingResult) -> Grid:
 def _angles(star: RankedStar) -> str:
     text = " ".join(_degrees(angle, 5) for angle in star.throws)
     named = (("bank", star.bank_angle), ("split", star.split_pin))
-    extra = ", ".join(f"{name} {_degrees(value)}" for name, value in named if value)
+    told = [name_of_crank(star.throws), *(f"{name} {_degrees(value)}" for name, value in named if value)]
+    extra = ", ".join(filter(None, told))
     return text + (f" ({extra})" if extra else "")
 
 

@@ -1,0 +1,35 @@
+"""Cranks that have a name of their own among riders and drivers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+CRANKS: Mapping[str, tuple[float, ...]] = {
+    "parallel-360": (0.0, 0.0),
+    "parallel-180": (0.0, 180.0),
+    "parallel-270": (0.0, 90.0),
+    "even-three": (0.0, 240.0, 120.0),
+    "t-plane": (0.0, 270.0, 180.0),
+    "flat-plane": (0.0, 180.0, 180.0, 0.0),
+    "cross-plane": (0.0, 90.0, 270.0, 180.0),
+    "even-six": (0.0, 240.0, 120.0, 120.0, 240.0, 0.0),
+}
+"""Angles of the throws [deg], from the front; such that a 270 degree twin fires 270 degrees after cylinder 1."""
+_SAME = math.radians(1e-6)
+
+
+def name_of_crank(throws: Sequence[float]) -> str:
+    """Name of a crank with these throws [rad], however it is turned, mirrored or seen; empty where it has none."""
+    for name, degrees in CRANKS.items():
+        named = [math.radians(angle) for angle in degrees]
+        images = [[sign * angle for angle in own] for sign in (1.0, -1.0) for own in (named, named[::-1])]
+        if len(named) == len(throws) and any(_turned(throws, image) for image in images):
+            return name
+    return ""
+
+
+def _turned(throws: Sequence[float], other: Sequence[float]) -> bool:
+    """Whether one crank is the other, turned."""
+    ahead = throws[0] - other[0]
+    return all(abs(math.remainder(a - b - ahead, math.tau)) < _SAME for a, b in zip(throws, other, strict=True))

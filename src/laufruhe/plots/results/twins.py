@@ -1,0 +1,112 @@
+"""A twin as its rider knows it: when it fires, and what turns forward and backward of its first and second order."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from laufruhe.machine.crank_names import name_of_crank
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.physics.wrench import turning_parts
+from laufruhe.plots.style import entry, headed, page, point_name, styled
+from laufruhe.plots.words import FAINT, INK, SMALL
+from laufruhe.present.measures import hardest_point, has_loads
+from laufruhe.present.numbers import figure as told
+from laufruhe.solvers.result import Result
+
+ORDERS = {1: "primary", 2: "secondary"}
+FORWARD, BACKWARD = "#0072b2", "#d55e00"
+TURN = np.linspace(0.0, math.tau, 361)
+SIZE = 2.7
+
+
+def applies(result: Result) -> bool:
+    """Whether two cylinders fire, and the loads are known."""
+    return len(result.final.engine.cylinders) == 2 and has_loads(result)
+
+
+@styled()
+def figure(result: Result) -> Figure:
+    """Firings over the cycle; force and couple of each order, its two circles and the path that they draw together."""
+    engine, k = result.final.engine, hardest_point(result)
+    point = result.problem.points[k]
+    wrench = shaking_loads(engine, point, result.problem.fidelity)
+    drawn = page(2, 3, (SIZE, SIZE), gap=0.75, lead=0.35)
+    _firings(drawn.panels[0], result)
+    parts = {
+        (kind, order): turning_parts(wrench.at(order)[columns[0]], wrench.at(order)[columns[1]])
+        for kind, columns in (("force", (1, 2)), ("couple", (4, 5)))
+        for order in ORDERS
+    }
+    _bars(drawn.panels[3], parts)
+    for row, kind in enumerate(("force", "couple")):
+        largest = max(abs(f) + abs(b) for (own, _), (f, b) in parts.items() if own == kind)
+        for column, (order, name) in enumerate(ORDERS.items()):
+            axes = drawn.panels[3 * row + 1 + column]
+            _circles(axes, *parts[kind, order], largest, "N" if kind == "force" else "N m")
+            axes.set_title(f"{name} {kind}", loc="left", size=9)
+    legend = [
+        entry("turns with the crank", color=FORWARD, linewidth=1.4),
+        entry("turns against it", color=BACKWARD, linewidth=1.4, linestyle=(0, (4, 1.6))),
+        entry("both together", color=INK, linewidth=2.0),
+    ]
+    crank = name_of_crank([part.throw for part in engine.slider_cranks])
+    lines = f"At {point_name(result, k)}, seen from the front{f'; crank {crank}' if crank else ''}."
+    return headed(drawn, result, "Firings, and what turns forward and backward", lines, legend)
+
+
+def _firings(axes: Axes, result: Result) -> None:
+    """Cylinders where they fire over the cycle, and the angles between."""
+    engine = result.final.engine
+    whole = math.degrees(engine.cycle.angle)
+    fired = sorted((math.degrees(part.firing_angle) % whole, part.name.split()[-1]) for part in engine.cylinders)
+    for (angle, number), (following, _) in zip(fired, [*fired[1:], (fired[0][0] + whole, "")], strict=True):
+        axes.plot([angle, angle], [0.0, 1.0], color=INK, linewidth=5.0, solid_capstyle="butt")
+        axes.text(angle, 1.1, number, ha="center", size=SMALL)
+        middle = 0.5 * (angle + following)
+        axes.text(middle % whole, 0.5, f"{following - angle:.5g}°", ha="center", va="center", size=SMALL, color=FAINT)
+    axes.set(xlim=(-0.06 * whole, 1.06 * whole), ylim=(0.0, 1.6), xlabel="crank angle [deg]", yticks=[])
+    axes.set_xticks(np.linspace(0.0, whole, 5))
+    axes.set_title("firings", loc="left", size=9)
+
+
+def _circles(axes: Axes, forward: complex, backward: complex, largest: float, unit: str) -> None:
+    size, factor, name = (largest or 1.0), 1.0, unit
+    if size >= 2e3:
+        factor, name = 1e-3, f"k{unit}"
+    ahead, against = forward * np.exp(1j * TURN), backward * np.exp(-1j * TURN)
+    looks: list[tuple[Any, dict[str, Any]]] = [
+        (ahead, {"color": FORWARD, "linewidth": 1.2}),
+        (against, {"color": BACKWARD, "linewidth": 1.2, "linestyle": (0, (4, 1.6))}),
+        (ahead + against, {"color": INK, "linewidth": 2.0}),
+    ]
+    for path, look in looks:
+        axes.plot(factor * path.imag, factor * path.real, **look)
+    axes.plot(factor * (forward + backward).imag, factor * (forward + backward).real, "o", color=INK, markersize=5)
+    reach = 1.1 * factor * size
+    across, up = ("about y", "about z") if unit == "N m" else ("lateral", "vertical")
+    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel=f"{across} [{name}]")
+    axes.set_ylabel(f"{up} [{name}]")
+    axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
+    axes.axvline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
+
+
+def _bars(axes: Axes, parts: dict[tuple[str, int], tuple[complex, complex]]) -> None:
+    """Sizes of both parts, of forces and of couples, each over the largest of its kind."""
+    names = []
+    for row, ((kind, order), pair) in enumerate(parts.items()):
+        most = max(abs(own) for (other, _), both in parts.items() if other == kind for own in both) or 1.0
+        for j, (own, colour) in enumerate(zip(pair, (FORWARD, BACKWARD), strict=True)):
+            at = -row - 0.36 * j
+            axes.barh(at, abs(own) / most, 0.32, color=colour)
+            size = told(abs(own), "N" if kind == "force" else "N m", 3, scale=most)
+            axes.text(abs(own) / most + 0.03, at, size, va="center", size=SMALL)
+        names.append(f"{ORDERS[order]}\n{kind}")
+    axes.set_yticks([-row - 0.18 for row in range(len(parts))], names)
+    axes.set(xlim=(0.0, 1.75), xticks=[])
+    axes.grid(visible=False)
+    axes.set_title("forward and backward part", loc="left", size=9)
