@@ -21,7 +21,7 @@ from laufruhe.solvers.result import Result
 ORDERS = {1: "primary", 2: "secondary"}
 FORWARD, BACKWARD = "#0072b2", "#d55e00"
 TURN = np.linspace(0.0, math.tau, 361)
-SIZE = 2.7
+SIZE = 1.9
 
 
 def applies(result: Result) -> bool:
@@ -35,7 +35,7 @@ def figure(result: Result) -> Figure:
     engine, k = result.final.engine, hardest_point(result)
     point = result.problem.points[k]
     wrench = shaking_loads(engine, point, result.problem.fidelity)
-    drawn = page(2, 3, (SIZE, SIZE), gap=0.75, lead=0.35)
+    drawn = page(2, 3, (SIZE, SIZE), gap=0.7, lead=0.3, across=0.72)
     _firings(drawn.panels[0], result)
     parts = {
         (kind, order): turning_parts(wrench.at(order)[columns[0]], wrench.at(order)[columns[1]])
