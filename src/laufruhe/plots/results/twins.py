@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from laufruhe.machine import Engine
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.wrench import turning_parts
@@ -19,6 +21,9 @@ from laufruhe.present.numbers import figure as told
 from laufruhe.solvers.result import Result
 
 ORDERS = {1: "primary", 2: "secondary"}
+KINDS = {"force": ((1, 2), "N"), "couple": ((4, 5), "N m")}
+"""Lateral and vertical columns of the wrench, and unit."""
+Parts: TypeAlias = dict[tuple[str, int], tuple[complex, complex]]
 FORWARD, BACKWARD = "#0072b2", "#d55e00"
 TURN = np.linspace(0.0, math.tau, 361)
 SIZE = 1.9
@@ -33,21 +38,16 @@ def applies(result: Result) -> bool:
 def figure(result: Result) -> Figure:
     """Firings over the cycle; force and couple of each order, its two circles and the path that they draw together."""
     engine, k = result.final.engine, hardest_point(result)
-    point = result.problem.points[k]
-    wrench = shaking_loads(engine, point, result.problem.fidelity)
     drawn = page(2, 3, (SIZE, SIZE), gap=0.7, lead=0.3, across=0.72)
     _firings(drawn.panels[0], result)
-    parts = {
-        (kind, order): turning_parts(wrench.at(order)[columns[0]], wrench.at(order)[columns[1]])
-        for kind, columns in (("force", (1, 2)), ("couple", (4, 5)))
-        for order in ORDERS
-    }
-    _bars(drawn.panels[3], parts)
-    for row, kind in enumerate(("force", "couple")):
-        largest = max(abs(f) + abs(b) for (own, _), (f, b) in parts.items() if own == kind)
+    parts, given = _parts(result, engine, k), _parts(result, result.initial.engine, k)
+    # what is a rounding of the design as given is nothing
+    largest = {kind: max(_sizes(parts, kind) + _sizes(given, kind)) for kind in KINDS}
+    _bars(drawn.panels[3], parts, largest)
+    for row, kind in enumerate(KINDS):
         for column, (order, name) in enumerate(ORDERS.items()):
             axes = drawn.panels[3 * row + 1 + column]
-            _circles(axes, *parts[kind, order], largest, "N" if kind == "force" else "N m")
+            _circles(axes, *parts[kind, order], largest[kind], KINDS[kind][1])
             axes.set_title(f"{name} {kind}", loc="left", size=9)
     legend = [
         entry("turns with the crank", color=FORWARD, linewidth=1.4),
@@ -57,6 +57,21 @@ def figure(result: Result) -> Figure:
     crank = name_of_crank([part.throw for part in engine.slider_cranks])
     lines = f"At {point_name(result, k)}, seen from the front{f'; crank {crank}' if crank else ''}."
     return headed(drawn, result, "Firings, and what turns forward and backward", lines, legend)
+
+
+def _parts(result: Result, engine: Engine, k: int) -> Parts:
+    """Forward and backward part of force and couple of every order."""
+    wrench = shaking_loads(engine, result.problem.points[k], result.problem.fidelity)
+    return {
+        (kind, order): turning_parts(*wrench.at(order)[list(columns)])
+        for kind, (columns, _) in KINDS.items()
+        for order in ORDERS
+    }
+
+
+def _sizes(parts: Parts, kind: str) -> list[float]:
+    """Largest of a force or couple in every order."""
+    return [abs(forward) + abs(backward) for (own, _), (forward, backward) in parts.items() if own == kind]
 
 
 def _firings(axes: Axes, result: Result) -> None:
@@ -95,15 +110,15 @@ def _circles(axes: Axes, forward: complex, backward: complex, largest: float, un
     axes.axvline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
 
 
-def _bars(axes: Axes, parts: dict[tuple[str, int], tuple[complex, complex]]) -> None:
+def _bars(axes: Axes, parts: Parts, largest: Mapping[str, float]) -> None:
     """Sizes of both parts, of forces and of couples, each over the largest of its kind."""
     names = []
     for row, ((kind, order), pair) in enumerate(parts.items()):
-        most = max(abs(own) for (other, _), both in parts.items() if other == kind for own in both) or 1.0
+        most = largest[kind] or 1.0
         for j, (own, colour) in enumerate(zip(pair, (FORWARD, BACKWARD), strict=True)):
             at = -row - 0.36 * j
             axes.barh(at, abs(own) / most, 0.32, color=colour)
-            size = told(abs(own), "N" if kind == "force" else "N m", 3, scale=most)
+            size = told(abs(own), KINDS[kind][1], 3, scale=most)
             axes.text(abs(own) / most + 0.03, at, size, va="center", size=SMALL)
         names.append(f"{ORDERS[order]}\n{kind}")
     axes.set_yticks([-row - 0.18 for row in range(len(parts))], names)
