@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Chamber, Chambers, Cycle, PressureTrace, Pump, SliderCrank, Steam
-from laufruhe.numerics.roots import rising_root
 from laufruhe.physics.cylinder_volume import JUMP_WIDTH, dead_centres, swept_volume
 from laufruhe.physics.pressure_trace import trace_pressure
 
 FloatArray = NDArray[np.float64]
+
+_HALVINGS = 53
 
 
 def chambers_thrust(gas: Chambers, part: SliderCrank, angles: FloatArray) -> FloatArray:
@@ -68,19 +69,16 @@ def _breaks(chamber: Chamber, part: SliderCrank) -> list[float]:
     smallest, largest = _ends(chamber, part)
     if isinstance(chamber.diagram, PressureTrace):
         return [smallest + angle for angle in chamber.diagram.angles]
-    ends = {True: (smallest, largest), False: (smallest + math.tau, largest)}
-
-    def meets(place: float, out: bool) -> float:
-        begin, end = ends[out]
-
-        def beyond(share: float) -> float:
-            angle = np.array([begin + share * (end - begin)])
-            return float(chamber_travel(chamber, part, angle)[0]) - place
-
-        return begin + rising_root(beyond, 0.0, 1.0) * (end - begin)
-
-    turning = [meets(place, out) for place, out in chamber.diagram.turning_points if 0.0 < place < 1.0]
-    return [smallest, largest, *turning]
+    inner = [(place, is_out) for place, is_out in chamber.diagram.turning_points if 0.0 < place < 1.0]
+    places, way = np.array([place for place, _ in inner]), np.array([is_out for _, is_out in inner], dtype=bool)
+    # on either way from where the chamber is smallest, forwards or backwards, so that travel rises
+    begin = np.where(way, smallest, smallest + math.tau)
+    low, high = np.zeros(len(inner)), np.ones(len(inner))
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        beyond = chamber_travel(chamber, part, begin + middle * (largest - begin)) > places
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return [smallest, largest, *(begin + low * (largest - begin)).tolist()]
 
 
 def _steam(diagram: Steam, travel: FloatArray, out: NDArray[np.bool_], _: FloatArray) -> FloatArray:

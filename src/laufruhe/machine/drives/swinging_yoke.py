@@ -9,7 +9,7 @@ from typing import Any
 
 from laufruhe.errors import KeyedError
 from laufruhe.machine.drives.base import DriveKind, Sizes
-from laufruhe.machine.layouts.base import Key, rod_of
+from laufruhe.machine.layouts.base import Key
 from laufruhe.machine.layouts.build import Mechanism
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
@@ -66,6 +66,8 @@ class SwingingYokeDrive(DriveKind):
             raise KeyedError("return_ratio", rule, f"{ratio:g}")
         share = math.cos(math.pi / (1.0 + ratio)) if ratio is not None else 0.5 * sizes.stroke / length
         if share >= 1.0:
+            if ratio is not None:
+                raise KeyedError("return_ratio", "leaves the pivot on the crank circle; give less", f"{ratio:g}")
             rule = "is too short, no crank inside its swing makes this stroke; make it longer"
             raise KeyedError("lever_length", rule, f"{1e3 * length:g} mm")
         return float(pivot * share)
@@ -81,8 +83,7 @@ class SwingingYokeDrive(DriveKind):
             "lever_weight": own["lever_weight"] or 0.0, "lever_weight_radius": own["lever_weight_radius"] or 0.0,
         }  # fmt: skip
         if own["lever"] is not None:
-            lever = rod_of("lever", own["lever"], length, "pivot")
-            names = {"lever_mass": lever.mass, "lever_centre": lever.centre_of_gravity, "lever_inertia": lever.inertia}
-            told |= names
+            names = {"mass": "lever_mass", "centre_of_gravity": "lever_centre", "inertia": "lever_inertia"}
+            told |= {name: own["lever"][key] for key, name in names.items()}
         shared = {part.name: getattr(plain, part.name) for part in fields(plain)}
         return Yoke(**shared | {"offset": 0.0}, own=told)
