@@ -121,6 +121,26 @@ def _radial(rng: Generator) -> Document:
     return {"layout": "radial", "cylinders": int(rng.choice([3, 5])), "knuckle_radius": "42 mm"}
 
 
+def _yoke(rng: Generator) -> Document:
+    lever = {"mass": "0.4 kg", "centre_of_gravity": "50 mm", "inertia": "4e-4 kg m^2"}
+    drive = {"drive": "swinging-yoke", "pivot_distance": "110 mm", "return_ratio": float(rng.choice([1.3, 1.9]))}
+    return {**_line(rng), **drive, "lever": lever}
+
+
+def _steam(rng: Generator) -> Document:
+    return {**_line(rng), "cycle": "two-stroke", "drive": str(rng.choice(["slider-crank", "klein", "scotch-yoke"]))}
+
+
+def _chambers(rng: Generator) -> Document:
+    """Both sides of a piston, and a pump on the rod of the first cylinder."""
+    steam = {"admission": "9 bar", "cut_off": float(rng.uniform(0.2, 0.6)), "back_pressure": "1.2 bar"}
+    steam |= {"release": 0.93, "compression": 0.15, "lead": 0.01, "clearance": 0.06}
+    sides = [{"end": "head", "bore": "80 mm"}, {"end": "crank", "bore": "80 mm", "rod": "18 mm"}]
+    pump = {"name": "pump", "cylinders": [1], "end": "head", "bore": "50 mm"}
+    of_pump = {"pump": {"suction": "0.7 bar", "delivery": "6 bar"}}
+    return {"model": "chambers", "chambers": [*({**side, "steam": steam} for side in sides), {**pump, **of_pump}]}
+
+
 LAYOUTS: Mapping[str, Callable[[Generator], Document]] = {
     "inline": _line,
     "offset": lambda rng: {**_line(rng), "offset": "6 mm"},
@@ -132,6 +152,8 @@ LAYOUTS: Mapping[str, Callable[[Generator], Document]] = {
     "opposed-piston": _opposed,
     "radial": _radial,
     "parts": _parts,
+    "swinging yoke": _yoke,
+    "steam": _steam,
 }
 
 
@@ -248,6 +270,9 @@ DECISIONS: Mapping[str, LeaveOpen] = {
     "firing order": _order_open,
     "bank angle": _angle_open("bank_angle", 50.0, 125.0),
     "split pin angle": _angle_open("split_pin_angle", 0.0, 65.0),
+    "lever weight": _engine(
+        lever_weight=Open("lever weight", 0.0, 2.0, "kg"), lever_weight_radius="60 mm", drive="swinging-yoke"
+    ),
     "reciprocating mass": _engine(reciprocating_mass=Open("reciprocating mass", 0.3, 1.5, "kg")),
     "flywheel inertia": _wheel(inertia=Open("flywheel.inertia", 0.2, 3.0, "kg m^2")),
     "flywheel rim": _wheel(
@@ -301,6 +326,10 @@ def document_of(cell: Cell) -> Document:
     _add_mounts(document, cell, rng)
     if rng.random() < 0.35:
         document["gas"] = {"model": "seiliger", "peak_pressure": "60 bar", "imep": "7 bar"}
+    if cell.layout == "steam":
+        document["gas"] = _chambers(rng)
+    if document["engine"].get("drive") in ("swinging-yoke", "scotch-yoke"):
+        del document["engine"]["rod_ratio"]
     document["fidelity"] = {"samples": 120}
     document["search"] = {"starts": 2, "boxes": 100}
     if cell.decision == "optional shaft":
@@ -308,7 +337,7 @@ def document_of(cell: Cell) -> Document:
     DECISIONS[cell.decision](document, rng)
     if cell.decision in OF_MOUNTS and cell.decision != "stiffness" and rng.random() < 0.3:
         DECISIONS["shaft and phase"](document, rng)
-    if "main-bearing" in cell.measure or "friction" in cell.measure:
+    if any(name in cell.measure for name in ("main-bearing", "friction", "hammer")):
         places = (226, 126, 26, -74, -174)
         document["main_bearings"] = [
             {"x": f"{x} mm", "diameter": "70 mm", "width": "30 mm", "friction": 0.01} for x in places
