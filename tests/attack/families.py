@@ -332,6 +332,50 @@ def with_gas(rng: Generator) -> Table:
     return table
 
 
+def yoke(rng: Generator) -> Table:
+    """Rams in line, with levers that weigh something."""
+    found = {**mechanism(rng, plain=True), **spaced(rng), "throws": throws(rng, int(rng.integers(1, 4)))}
+    del found["rod_length"]
+    pivot = rng.uniform(0.08, 0.2)
+    lever = {"mass": q(rng.uniform(0.1, 1.0), "kg"), "centre_of_gravity": q(rng.uniform(0.0, 0.9) * pivot, "m")}
+    told: Table = {
+        "layout": "inline", "drive": "swinging-yoke", **found, "pivot_distance": q(pivot, "m"),
+        "return_ratio": float(round(rng.uniform(1.1, 2.4), 3)),
+        "lever": {**lever, "inertia": q(rng.uniform(0.0, 4e-3), "kg m^2")},
+    }  # fmt: skip
+    if rng.random() < 0.5:
+        told |= {"lever_weight": q(rng.uniform(0.1, 1.0), "kg"), "lever_weight_radius": q(rng.uniform(0.03, 0.1), "m")}
+    return told
+
+
+def chamber(rng: Generator, count: int) -> Table:
+    """Steam or a pump at either end of some cylinders."""
+    bore = rng.uniform(0.05, 0.12)
+    told: Table = {"end": str(rng.choice(["head", "crank"])), "bore": q(bore, "m")}
+    if rng.random() < 0.5:
+        told["rod"] = q(rng.uniform(0.1, 0.4) * bore, "m")
+    if rng.random() < 0.3:
+        told["cylinders"] = [int(rng.integers(1, count + 1))]
+    if rng.random() < 0.25:
+        return {**told, "pump": {"suction": q(rng.uniform(0.5, 0.9), "bar"), "delivery": q(rng.uniform(2, 9), "bar")}}
+    cut_off, lead = rng.uniform(0.1, 0.7), rng.uniform(0.0, 0.05)
+    steam = {
+        "admission": q(rng.uniform(5, 12), "bar"), "back_pressure": q(rng.uniform(0.3, 2.0), "bar"),
+        "cut_off": float(round(cut_off, 3)), "release": float(round(rng.uniform(cut_off, 1.0), 3)),
+        "compression": float(round(rng.uniform(lead, 0.3), 3)), "lead": float(round(lead, 3)),
+        "clearance": float(round(rng.uniform(0.03, 0.2), 3)),
+    }  # fmt: skip
+    return {**told, "steam": steam}
+
+
+def with_chambers(rng: Generator) -> Table:
+    """Engines in line or lists of parts with chambers in place of cylinders of one side."""
+    table = of_unbalances(lambda own: {**inline(own), "cycle": "two-stroke"})(rng)
+    count = len(table["engine"]["throws"])
+    chambers = [{"name": f"k{k}", **chamber(rng, count)} for k in range(int(rng.integers(1, 4)))]
+    return {**table, "gas": {"model": "chambers", "chambers": chambers}}
+
+
 def star_of(engine: Table, count: int) -> Table:
     found = {k: v for k, v in engine.items() if k not in ("throws", "offset", "bank_stagger", "split_pin_angle")}
     return {**found, "throws": "open", "firing_order": "open", "cylinders": count}
@@ -561,6 +605,8 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "parts": of_unbalances(parts),
     "points": of_unbalances(inline, 5),
     "gas": with_gas,
+    "yokes": of_unbalances(yoke),
+    "chambers": with_chambers,
     "stars": stars,
     "open-vees": vees,
     "elastic-few": few_stiffnesses(1, 2),

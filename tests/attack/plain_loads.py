@@ -45,8 +45,22 @@ class Knuckle:
 
 
 @dataclass(frozen=True)
+class Lever:
+    """A slotted lever about a pivot beside the crank, that drives a ram."""
+
+    pivot: float
+    length: float
+    height: float
+    mass: float
+    centre: float
+    inertia: float
+    weight: float
+    weight_radius: float
+
+
+@dataclass(frozen=True)
 class Mechanism:
-    """A piston on a rod on a crank."""
+    """A piston on a rod on a crank, or a ram on a lever."""
 
     x: float
     throw: float
@@ -60,6 +74,7 @@ class Mechanism:
     ratio: float = 1.0
     centre: complex = 0j
     knuckle: Knuckle | None = None
+    lever: Lever | None = None
     bore: float = 0.0
     fires: float | None = None
     """Crank angle of its firing; None for one without gas of its own."""
@@ -99,19 +114,36 @@ def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
     """Wrench at unit speed, shape (samples, 6)."""
     phi, out = angles(turns), np.zeros((SAMPLES, 6))
     base = rod_end(m, phi)
-    _, end, swing = piston(base, m.rod, m.bank, m.offset)
     energy = np.zeros(SAMPLES)
-    for mass, place in ((m.piston_mass, end + m.centre), (m.pin_mass, base + m.centre)):
+    if m.lever is None:
+        _, end, swing = piston(base, m.rod, m.bank, m.offset)
+        masses, deficit = [(m.piston_mass, end)], m.deficit
+    else:
+        masses, swing = lever_masses(m, m.lever, base)
+        deficit = m.lever.inertia
+    for mass, place in ((mass, place + m.centre) for mass, place in (*masses, (m.pin_mass, base))):
         velocity = slope(place, turns)
         force = -mass * slope(velocity, turns)
         energy += 0.5 * mass * np.abs(velocity) ** 2
         out += force_at(m.x, place, force)
-    if m.deficit:
+    if deficit:
         rate = slope(swing, turns).real
-        energy += 0.5 * m.deficit * rate**2
-        out[:, 3] += m.deficit * slope(rate, turns).real
+        energy += 0.5 * deficit * rate**2
+        out[:, 3] += deficit * slope(rate, turns).real
     out[:, 3] -= slope(energy, turns).real
     return out
+
+
+def lever_masses(m: Mechanism, own: Lever, base: np.ndarray) -> tuple[list[tuple[float, np.ndarray]], np.ndarray]:
+    """Ram, lever and its weight with their places, and the angle of the lever, of a crank pin at `base`."""
+    axis = np.exp(1j * m.bank)
+    angle = np.unwrap(np.angle(base / axis + 1j * own.pivot))
+    along, pivot = np.exp(1j * angle), -1j * own.pivot
+    ram = own.length * np.cos(angle) + 1j * own.height
+    places = [
+        (m.piston_mass, ram), (own.mass, pivot + own.centre * along), (own.weight, pivot - own.weight_radius * along)
+    ]  # fmt: skip
+    return [(mass, axis * place) for mass, place in places], angle
 
 
 def force_at(x: float, place: np.ndarray | complex, force: np.ndarray) -> np.ndarray:
@@ -182,6 +214,37 @@ def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
     return np.fft.rfft(-area * over * rise)[: SAMPLES // 2 + 1] / FINE
 
 
+def chamber_pressure(told: dict[str, Any], x: np.ndarray, grows: np.ndarray) -> np.ndarray:
+    """Absolute pressure over the part of the stroke from where a chamber is smallest."""
+    if "pump" in told:
+        return np.where(grows, number(told["pump"]["suction"]), number(told["pump"]["delivery"]))
+    steam = told["steam"]
+    high, low = number(steam["admission"]), number(steam["back_pressure"])
+    cut, release, close, lead, c = (
+        steam[key] for key in ("cut_off", "release", "compression", "lead", "clearance")
+    )  # fmt: skip
+    out = high * np.minimum(1.0, (cut + c) / (np.minimum(x, release) + c))
+    out = out + (low - out) * np.maximum(x - release, 0.0) / max(1.0 - release, 1e-300)
+    back = low * np.maximum(1.0, (close + c) / (np.maximum(x, lead) + c))
+    back = back + (high - back) * np.maximum(lead - x, 0.0) / max(lead, 1e-300)
+    return np.where(grows, out, back)
+
+
+def chambers_torque(gas: dict[str, Any], k: int, m: Mechanism) -> np.ndarray:
+    """Coefficients of the roll moment of all chambers of cylinder k, its own crank angle counted from zero."""
+    s = travel(m, angles(1, FINE))
+    rise = slope(s.astype(complex), 1).real
+    x = (s.max() - s) / np.ptp(s)
+    force = np.zeros(FINE)
+    for told in gas["chambers"]:
+        if k + 1 in told.get("cylinders", [k + 1]):
+            head = told["end"] == "head"
+            area = 0.25 * math.pi * (number(told["bore"]) ** 2 - number(told.get("rod", 0.0)) ** 2)
+            over = chamber_pressure(told, x if head else 1.0 - x, (rise < 0.0) == head) - ATMOSPHERE
+            force -= area * over * (1.0 if head else -1.0)
+    return np.fft.rfft(force * rise)[: SAMPLES // 2 + 1] / FINE
+
+
 # --- an engine of a problem file
 
 
@@ -208,6 +271,8 @@ def machine(engine: dict[str, Any], order: list[int] | None = None) -> Machine:
 
 def _common(engine: dict[str, Any], part: dict[str, Any] | None = None) -> dict[str, Any]:
     told = {**engine, **(part or {})}
+    if told.get("drive") == "swinging-yoke":
+        return _yoke(told)
     offset, deficit = number(told.get("offset", 0.0)), number(told.get("rod_inertia_deficit", 0.0))
     rod = number(told["rod_length"])
     stroke = number(told["stroke"])
@@ -221,6 +286,20 @@ def _common(engine: dict[str, Any], part: dict[str, Any] | None = None) -> dict[
     return {
         "radius": radius, "rod": rod, "piston_mass": number(told["reciprocating_mass"]), "deficit": deficit,
         "offset": offset, "bore": number(told.get("bore", 0.0)),
+    }  # fmt: skip
+
+
+def _yoke(told: dict[str, Any]) -> dict[str, Any]:
+    """The quick stroke takes 1 / (1 + ratio) of a turn, between the two places where crank and lever are square."""
+    pivot, stroke = number(told["pivot_distance"]), number(told["stroke"])
+    radius = pivot * math.cos(math.pi / (1.0 + told["return_ratio"]))
+    length = 0.5 * stroke * pivot / radius
+    lever = told.get("lever", {})
+    mass, centre, inertia = (number(lever.get(key, 0.0)) for key in ("mass", "centre_of_gravity", "inertia"))
+    weight, at = number(told.get("lever_weight", 0.0)), number(told.get("lever_weight_radius", 0.0))
+    return {
+        "radius": radius, "rod": 0.0, "piston_mass": number(told["reciprocating_mass"]),
+        "lever": Lever(pivot, length, length - pivot, mass, centre, inertia, weight, at),
     }  # fmt: skip
 
 
@@ -372,6 +451,10 @@ def gas_spectrum(gas: dict[str, Any], found: Machine) -> np.ndarray:
     """Roll moment of all cylinders, each at its firing angle."""
     told, orders = json.dumps(gas, sort_keys=True), np.arange(SAMPLES // 2 + 1)[:, None] / found.turns
     total = np.zeros((SAMPLES // 2 + 1, 6), complex)
+    if gas["model"] == "chambers":
+        for k, m in enumerate(found.mechanisms):
+            total[:, 3] += chambers_torque(gas, k, m) * np.exp(1j * orders[:, 0] * (m.throw - m.bank))
+        return total
     for m in found.mechanisms:
         if m.fires is not None:
             one = _gas_spectrum(told, _with(m, throw=0.0, bank=0.0, x=0.0, pin_mass=0.0, fires=None), found.turns)
