@@ -113,7 +113,15 @@ def opened(
     except ModelError as error:
         raise (error.__cause__ if isinstance(error.__cause__, Refused) else error) from None
     _check_speed(problem, phasing)
+    _check_inside(problem, engine)
     return problem
+
+
+def _check_inside(problem: Problem, engine: EngineTable) -> None:
+    """Rows of geared cranks are told apart by what the block feels of them."""
+    if engine.kind.fires_evenly and problem.feels_order:
+        rule = f"is open in layout '{engine.layout}', and something is asked of what happens inside the crankcase"
+        raise Refused("engine.throws", None, rule, "fix the throws, or ask for loads on the block")
 
 
 def _check_speed(problem: Problem, phasing: Phasing) -> None:
@@ -213,6 +221,10 @@ def _check_sizes(shaft: BalancerShaftTable, where: str) -> None:
 def _check(phasing: Phasing, engine: EngineTable) -> None:
     """What no solver needs to be asked: keys that do not go together."""
     kind, count = engine.kind, phasing.cylinders
+    if kind.fires_evenly and phasing.continuous:
+        where = "engine.throws" if phasing.throw_bounds is not None else "phasing.intervals"
+        rule = f"lets throws leave the even steps, and those of layout '{engine.layout}' do not"
+        raise Refused(where, None, rule, 'write throws = "open", without intervals')
     for key in kind.keys:
         if key.remedy and engine.own(key.name) is None:
             raise Refused(f"engine.{key.name}", None, "is missing", key.remedy)

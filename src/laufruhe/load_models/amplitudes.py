@@ -127,8 +127,10 @@ def _is_amplitude(term: Term) -> bool:
 
 
 def _one_throw(engine: Engine, layout: Layout) -> Engine | None:
-    """The engine with its first throw alone; None where cylinders stand beside their throw, or it in the middle."""
+    """The engine with its first throw alone; None where cylinders stand beside it, or more than its own are on it."""
     places, pins = layout.throw_positions, layout.pins
+    if len(engine.slider_cranks) != len(pins):
+        return None
     if places[0] == 0.0 or any(x != places[pin] for x, pin in zip(layout.positions, pins, strict=True)):
         return None
     own = tuple(part for part, pin in zip(engine.slider_cranks, pins, strict=True) if pin == 0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 from laufruhe.errors import ModelError
@@ -143,5 +143,19 @@ def least_room(part: SliderCrank, other: SliderCrank) -> float:
     if math.isinf(reach):
         return math.inf
     ahead = math.remainder(part.firing_angle - other.firing_angle, math.tau)
-    angles = (math.tau * k / STEPS for k in range(STEPS))
-    return apart - reach + min(float(part.travel(math, at) + other.travel(math, at + ahead)) for at in angles)
+    sizes = (part.crank_radius, part.rod_ratio, part.offset_ratio, other.crank_radius, other.rod_ratio)
+    return apart - reach + _least_travel(*sizes, other.offset_ratio, round(ahead, 9))
+
+
+@lru_cache(maxsize=256)
+def _least_travel(
+    radius: float, ratio: float, offset: float, far_radius: float, far_ratio: float, far_offset: float, ahead: float
+) -> float:
+    """Least way of two pistons towards their cranks, together [m]."""
+    return float(
+        min(
+            radius * kinematics.travel(math, at, ratio, offset)
+            + far_radius * kinematics.travel(math, at + ahead, far_ratio, far_offset)
+            for at in (math.tau * k / STEPS for k in range(STEPS))
+        )
+    )

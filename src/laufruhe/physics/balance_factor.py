@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.machine import CRANKSHAFT, Engine, Role, SliderCrank
+from laufruhe.machine import Engine, Role, Shaft, SliderCrank
 from laufruhe.numerics.turns import as_turn, cis, within
 
 _ROUNDING = 1e-9
@@ -30,19 +30,24 @@ class BalanceFactor:
 
 
 def balance_factors(engine: Engine) -> tuple[BalanceFactor, ...]:
-    """Balance factors of throws that have a counterweight; each weight counts for the nearest throws (L9).
+    """Balance factors of throws that have a counterweight; each weight counts for the nearest throws of its shaft (L9).
 
     kappa = (-Re sum U e^{-i theta} - m_rot r) / (m_rec r), with the unbalances U [kg m] of the counterweights of a
     throw at theta, its rotating mass m_rot [kg] and reciprocating mass m_rec [kg] at the crank radius r [m].
     """
-    throws = _throws([part for part in engine.slider_cranks if part.shaft == CRANKSHAFT])
+    shafts = dict.fromkeys(part.shaft for part in engine.slider_cranks)
+    return tuple(found for shaft in shafts for found in _on_shaft(engine, shaft))
+
+
+def _on_shaft(engine: Engine, shaft: Shaft) -> list[BalanceFactor]:
+    """Of the throws of one shaft."""
+    throws = _throws([part for part in engine.slider_cranks if part.shaft == shaft])
     places = np.array([throw[0].x for throw in throws])
     opposite, counted = np.zeros(len(throws)), np.zeros(len(throws), dtype=bool)
-    if not throws:
-        return ()
-    weights = [rotor for rotor in engine.rotors if rotor.role is Role.COUNTERWEIGHT and rotor.shaft == CRANKSHAFT]
-    masses = [rotor for rotor in engine.rotors if rotor.role is Role.THROW]
-    masses += [pin for pin in engine.pins if pin.shaft == CRANKSHAFT]
+    own = [rotor for rotor in engine.rotors if rotor.shaft == shaft]
+    weights = [rotor for rotor in own if rotor.role is Role.COUNTERWEIGHT]
+    masses = [rotor for rotor in own if rotor.role is Role.THROW]
+    masses += [pin for pin in engine.pins if pin.shaft == shaft]
     for rotor in (*weights, *masses):
         distance = np.abs(places - rotor.x)
         near = np.flatnonzero(distance <= distance.min() + _ROUNDING)
@@ -55,7 +60,7 @@ def balance_factors(engine: Engine) -> tuple[BalanceFactor, ...]:
         whole = sum(part.reciprocating_mass * part.crank_radius for part in throw)
         if counted[k] and whole > 0.0:
             found.append(BalanceFactor(tuple(part.name for part in throw), float(opposite[k] / whole)))
-    return tuple(found)
+    return found
 
 
 def _throws(parts: Sequence[SliderCrank]) -> list[list[SliderCrank]]:

@@ -42,7 +42,7 @@ def equal_designs(found: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     affine = [decision for decision in problem.decisions if decision.is_affine]
     kinds = {decision.kind for decision in affine}
     moved = [bound for bound in (*problem.limits, limit) if bound.measure.channel.is_moved_by(kinds)]
-    problem = problem.changed(phasing=None, objective=(), limits=tuple(moved))
+    problem = replace(problem, phasing=None, objective=(), limits=tuple(moved))
     numbers = any(bound.measure.channel.is_number for bound in moved)
     if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or numbers or passed():
         return ()

@@ -6,6 +6,7 @@ Cylinders are counted from the front (C3).
 from laufruhe.machine.layouts.base import Asked, Key, LayoutKind, rod_of
 from laufruhe.machine.layouts.boxer import Boxer, boxer
 from laufruhe.machine.layouts.build import Mechanism, Throw, build, even_throws, firing_angles, throw_rotors
+from laufruhe.machine.layouts.delta import Delta
 from laufruhe.machine.layouts.inline import Inline, inline
 from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_pistons
 from laufruhe.machine.layouts.parts import Parts
@@ -21,6 +22,7 @@ LAYOUTS: dict[str, LayoutKind] = {
         Vee(),
         Boxer(),
         OpposedPiston(),
+        Delta(),
         Radial(),
         Rotary(),
         Parts(),

@@ -101,6 +101,8 @@ class LayoutKind(ABC):
         Cylinders that share a throw.
     is_free
         Whether every slider-crank is listed, and nothing is placed.
+    fires_evenly
+        Whether open throws stand on the steps of even firing alone, and are told apart by loads on the block.
     needs_rod
         Whether a drive without a connecting rod means nothing here.
     has_pistons
@@ -113,6 +115,7 @@ class LayoutKind(ABC):
     openable: ClassVar[tuple[str, ...]] = ()
     cylinders_per_throw: ClassVar[int] = 1
     is_free: ClassVar[bool] = False
+    fires_evenly: ClassVar[bool] = False
     needs_rod: ClassVar[bool] = False
     has_pistons: ClassVar[bool] = True
 

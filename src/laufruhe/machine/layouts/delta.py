@@ -1,0 +1,173 @@
+"""Rows of three cylinders in a triangle, two pistons in each, on three cranks geared to each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from laufruhe import units
+from laufruhe.errors import KeyedError, ModelError
+from laufruhe.machine.engine import Cycle
+from laufruhe.machine.layouts.base import SPACING, Asked, Key, LayoutKind
+from laufruhe.machine.layouts.build import Throw
+from laufruhe.machine.layouts.places import Layout, stations
+from laufruhe.machine.rotor import CRANKSHAFT, Shaft
+from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.numerics.turns import Turn, angle_of, as_turn, cis, within
+
+
+@dataclass(frozen=True)
+class Triangle:
+    """Three cranks at the corners of a triangle with one corner below, and when their pistons are at dead centre.
+
+    Bank k lies between corner k and the next one, counted with the clock from below as seen from the front; its first
+    piston works on corner k.
+
+    Attributes
+    ----------
+    side
+        Distance of two cranks [m].
+    ratios
+        Of the cranks, 1 or -1; the first is the crankshaft.
+    leads
+        Crank angle by which the first piston of every bank comes to its dead centre first, as parts of a turn.
+    """
+
+    side: float
+    ratios: tuple[int, int, int]
+    leads: tuple[Turn, Turn, Turn]
+
+    @property
+    def shafts(self) -> tuple[Shaft, Shaft, Shaft]:
+        """The crankshaft below, then the left and the right one."""
+        half, height = 0.5 * self.side, math.sqrt(0.75) * self.side
+        _, left, right = self.ratios
+        return (
+            CRANKSHAFT,
+            Shaft("left crankshaft", float(left), half, height),
+            Shaft("right crankshaft", float(right), -half, height),
+        )
+
+    @staticmethod
+    def axis(corner: int, bank: int) -> Turn:
+        """Angle of the cylinder axis of a bank as a crank at one of its ends sees it (C5), as a part of a turn."""
+        away = Fraction(1, 12) - Fraction(bank, 3)
+        return away if corner == bank else away + Fraction(1, 2)
+
+    def centre(self, corner: int, bank: int) -> Turn:
+        """Crank angle of a piston's dead centre, the lower throw being upright, as a part of a turn."""
+        at: Turn = self.axis(0, 0)
+        for k in range(bank):
+            # over to the other piston of bank k, then to the next bank on that crank
+            at = at + self.leads[k] + self.ratios[(k + 1) % 3] * (self.axis(k + 1, k + 1) - self.axis(k + 1, k))
+        return at if corner == bank else at + self.leads[bank]
+
+
+def closing_lead(ratios: tuple[int, int, int], first: Turn, second: Turn) -> Turn:
+    """Lead of the third bank that the other two leave, for the angles round the triangle close (K18)."""
+    half = Fraction(1, 2)
+    return within(-Fraction(sum(ratios), 6) - first - second + half, 1) - half
+
+
+def equal_lead(ratios: tuple[int, int, int]) -> Turn:
+    """The least lead that all three banks may share: 20 degrees with one crank reversed, 60 with none (K18)."""
+    return -Fraction(sum(ratios), 18)
+
+
+# by the crank that is reversed; the crankshaft turns forward, so where it is that one the others turn back
+_RATIOS = ((1, 1, 1), (1, -1, -1), (1, -1, 1), (1, 1, -1))
+
+
+class Delta(LayoutKind):
+    """Two-stroke rows of three cylinders in a triangle."""
+
+    name = "delta"
+    keys = (
+        SPACING,
+        Key("crank_distance", "positive length", "Distance of the two cranks of opposed pistons."),
+        Key("reversed_crank", "cylinder", "Crank of a triangle against the other two: 1 below, 2 left, 3 right."),
+        Key("crank_leads", "angles", "Angles by which the first pistons of the first two banks of a triangle lead."),
+    )
+    openable = ("throws",)
+    cylinders_per_throw = 3
+    fires_evenly = True
+
+    def place(self, asked: Asked) -> Layout:
+        """Rows, by the throws of the lower crank; banks by when their first pistons are at dead centre."""
+        rows, rest = divmod(asked.cylinders, 3)
+        if rest:
+            raise KeyedError("cylinders", "is no multiple of the 3 of a row; give one that is", str(asked.cylinders))
+        triangle, places = self._triangle(asked), stations(rows, asked.spacing)
+        turns = [angle_of(within(triangle.centre(bank, bank), 1)) for bank in range(3)]
+        return Layout(
+            "delta",
+            places * 3,
+            tuple(turn for turn in turns for _ in places),
+            tuple(range(rows)) * 3,
+            (0.0,) * asked.cylinders,
+            places,
+        )
+
+    def _triangle(self, asked: Asked) -> Triangle:
+        if asked.own["crank_distance"] is None:
+            raise KeyedError("crank_distance", "is missing; add the distance between two cranks")
+        if asked.cycle is not Cycle.TWO_STROKE:
+            rule = 'has ports in a triangle of cranks, which work every turn; write "two-stroke"'
+            raise KeyedError("cycle", rule, str(asked.cycle))
+        if asked.mechanism.offset:
+            rule = "means nothing for pistons on one axis; leave it out"
+            raise KeyedError("offset", rule, units.shown(asked.mechanism.offset, "m"))
+        reversed_one = asked.own["reversed_crank"] or 0
+        if reversed_one > 3:
+            raise KeyedError("reversed_crank", "is no crank of a triangle; give 1, 2 or 3", str(reversed_one))
+        ratios = _RATIOS[reversed_one]
+        given = asked.own["crank_leads"]
+        if given is not None and len(given) != 2:
+            raise KeyedError("crank_leads", f"has {len(given)} angles; give those of two banks, the third follows")
+        first, second = map(as_turn, given) if given is not None else (equal_lead(ratios),) * 2
+        return Triangle(asked.own["crank_distance"], ratios, (first, second, closing_lead(ratios, first, second)))
+
+    def parts(
+        self, asked: Asked, layout: Layout, throws: Sequence[float]
+    ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
+        """First the pistons of the banks' first corners, then those of their second ones; throws of all cranks."""
+        triangle, mechanism = self._triangle(asked), asked.mechanism
+        found: list[SliderCrank] = []
+        cranks: list[Throw] = []
+        for turned in (0, 1):
+            for bank in range(3):
+                corner = (bank + turned) % 3
+                for row, x in enumerate(layout.throw_positions):
+                    found.append(_piston(triangle, corner, bank, x, throws[row], asked, len(found) + 1))
+        for shaft in triangle.shafts:
+            for x in layout.throw_positions:
+                own = tuple(k for k, part in enumerate(found) if part.shaft == shaft and part.x == x)
+                angle = found[own[0]].throw
+                unbalance = mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angle))
+                cranks.append(Throw(x, angle, own, unbalance, shaft))
+        _check_order(asked.firing_order, found[: asked.cylinders])
+        return tuple(found), tuple(cranks)
+
+
+def _check_order(order: Sequence[int] | None, firsts: Sequence[SliderCrank]) -> None:
+    """Every cylinder fires at its dead centre of every turn, so the throws say in which order."""
+    if order is None:
+        return
+    turns = [within(as_turn(firsts[k - 1].firing_angle) - as_turn(firsts[order[0] - 1].firing_angle), 1) for k in order]
+    if turns != sorted(turns):
+        told = sorted(range(len(firsts)), key=lambda k: firsts[k].firing_angle)
+        raise ModelError(f"these throws fire in the order {[k + 1 for k in told]}, not {list(order)}")
+
+
+def _piston(
+    triangle: Triangle, corner: int, bank: int, x: float, throw: float, asked: Asked, number: int
+) -> SliderCrank:
+    """One piston, its row turned by the throw of the lower crank."""
+    shaft = triangle.shafts[corner]
+    centre = within(triangle.centre(corner, bank) - as_turn(throw), 1)
+    axis = triangle.axis(corner, bank)
+    angle = within(axis - triangle.ratios[corner] * centre, 1)
+    angles = (angle_of(angle), angle_of(within(axis, 1)), angle_of(centre))
+    return asked.mechanism.cylinder(number, x, *angles, shaft=shaft)
