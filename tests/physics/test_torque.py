@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 import laufruhe
 from laufruhe.errors import ModelError
+from laufruhe.fidelity.error_bounds import Scale, reference
 from laufruhe.machine import Arms, Engine, Rim
 from laufruhe.machine.flywheel import GRAVITY
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
@@ -24,7 +25,7 @@ from laufruhe.physics.torque import least_inertia, torque_facts, torque_parts, w
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.plots.results.torque import applies, figure
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import MEASURES, Measure
+from laufruhe.problem.measure import MEASURES, Measure, Term
 from problem_files import PROBLEMS
 
 
@@ -258,3 +259,26 @@ def test_the_diagram_is_drawn_where_it_is_asked(tmp_path: Path) -> None:
         assert applies(result) is drawn
         if drawn:
             figure(result).savefig(tmp_path / "torque.png")
+
+
+def test_two_orders_reach_the_torque() -> None:
+    """Of plain pistons it is the roll moment's (T1), and nears the exact one as rods grow; bounds of errors show it."""
+    problem = laufruhe.load(PROBLEMS / "tractor-four-bearings.toml")
+    still, short = replace(problem.points[0], gas=None), Fidelity("two-order")
+    engine = replace(problem.engine, rotors=(), mounts=(), block=None)
+    errors = []
+    for length in (0.15, 0.6, 2.4):
+        parts = tuple(replace(p, rod_length=length, rod_inertia_deficit=0.0) for p in engine.slider_cranks)
+        own = replace(engine, slider_cranks=parts)
+        torque = crank_torque(own, still, short).sample(360)
+        roll = shaking_loads(own, still, short).sample(360)[:, 3]
+        assert torque == pytest.approx(roll, abs=1e-10 * np.abs(roll).max())
+        exact = crank_torque(own, still).sample(360)
+        errors.append(float(np.abs(torque - exact).max() / np.abs(exact).max()))
+    # what is left out is of second order in the rod ratio
+    assert errors[0] > 0.01
+    assert errors[1] == pytest.approx(errors[0] / 16.0, rel=0.3)
+    assert errors[2] == pytest.approx(errors[1] / 16.0, rel=0.1)
+    asked = problem.changed(objective=(Term(Measure(*MEASURES["rms crank torque"])),), decisions=(), limits=())
+    scale = Scale(asked, reference(asked))
+    assert 1e-3 < scale.loses(Fidelity("two-order", 720)) < 0.2

@@ -10,7 +10,14 @@ from laufruhe.machine import Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
-from laufruhe.physics.mechanism import ComplexArray, Direction, Effect, resolved_orders
+from laufruhe.physics.mechanism import (
+    TWO_ORDER_ROLL,
+    ComplexArray,
+    Direction,
+    Effect,
+    resolved_orders,
+    two_order_roll,
+)
 from laufruhe.physics.star_loads import star_loads
 from laufruhe.physics.wrench import ROLL
 
@@ -30,9 +37,17 @@ def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
     """Torque at unit speed of the mechanism's own crank, in the sense of the output."""
-    is_rigid = fidelity.rod == "rigid"
-    alike = "torque", replace(part, name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0), is_rigid
-    return Effect(Direction.ROLL, 1.0, alike, lambda: _orders(part, is_rigid))
+    is_rigid, is_short = fidelity.rod == "rigid", fidelity.kinematics == "two-order"
+    alike = "torque", replace(part, name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0), is_rigid, is_short
+    return Effect(Direction.ROLL, 1.0, alike, lambda: _short(part, is_rigid) if is_short else _orders(part, is_rigid))
+
+
+def _short(part: SliderCrank, is_rigid: bool) -> ComplexArray:
+    """Of two-order kinematics, to first order in lambda (T1); as many orders of any other mechanism."""
+    if type(part) is not SliderCrank:
+        return _orders(part, is_rigid)[: TWO_ORDER_ROLL + 1]
+    size = part.reciprocating_mass * part.crank_radius**2 * part.shaft.ratio
+    return size * two_order_roll(part.rod_ratio)
 
 
 def _orders(part: SliderCrank, is_rigid: bool) -> ComplexArray:

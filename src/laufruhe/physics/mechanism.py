@@ -100,6 +100,11 @@ def cylinder_wrench(part: SliderCrank, motion: Motion, axis: Any, square: Any, t
     return wrench
 
 
+def two_order_roll(rod_ratio: float) -> ComplexArray:
+    """(cos a + lam cos 2a)(-1)(sin a + lam/2 sin 2a), to first order in lam: roll moment (L3) and torque (T1)."""
+    return 1j * np.array([0.0, -rod_ratio / 4.0, 0.5, 0.75 * rod_ratio])
+
+
 def _slider_crank(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
     """Piston and rod by their closed forms (K7-K10)."""
     radius, ratio = part.crank_radius, part.shaft.ratio
@@ -112,8 +117,7 @@ def _slider_crank(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, 
 
     def roll() -> ComplexArray:
         if fidelity.kinematics == "two-order":
-            # (cos a + lam cos 2a)(-n)(sin a + lam/2 sin 2a), to first order in lam
-            return ratio * 1j * np.array([0.0, -part.rod_ratio / 4.0, 0.5, 0.75 * part.rod_ratio])
+            return ratio * two_order_roll(part.rod_ratio)
         return order_coefficients.inertia_roll_orders(*shape, ratio, _highest(part, fidelity))
 
     def rod() -> ComplexArray:
@@ -127,6 +131,9 @@ def _slider_crank(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, 
         Effect(Direction.ROLL, mass * radius**2, shape, roll),
     ), (Effect(Direction.ROLL, deficit, ("rod", shape), rod),)
 
+
+TWO_ORDER_ROLL = 3
+"""Last order of a roll moment with two-order kinematics."""
 
 CLOSED_FORMS: dict[type[SliderCrank], Callable[..., tuple[tuple[Effect, ...], tuple[Effect, ...]]]] = {
     SliderCrank: _slider_crank,
