@@ -102,7 +102,7 @@ def test_from_a_file(tmp_path: Path) -> None:
     problem = load(written(tmp_path, text))
     assert problem.fidelity == Fidelity(gas_orders=12)
     assert "gas to order 12" in problem.fidelity.summary
-    with pytest.raises(InputError, match=r"fidelity\.gas_orders.*goes with gas"):
+    with pytest.raises(InputError, match=r"fidelity\.gas_orders.*needs gas"):
         load(written(tmp_path, text + "gas = false\n"))
     with pytest.raises(InputError, match=r"fidelity\.gas_orders"):
         load(written(tmp_path, text.replace("gas_orders = 12", "gas_orders = 0")))

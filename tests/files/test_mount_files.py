@@ -88,7 +88,7 @@ REFUSED = {
     "impossible inertia": (MOUNTS, BLOCK.replace("27 kg", "270 kg"), SAG, "block: .*belong to no body"),
     "massless block": (MOUNTS, BLOCK.replace("420 kg", "0 kg"), SAG, "block.mass .*must be more than 0"),
     "minimum of a peak": (MOUNTS, BLOCK, SAG + '[[constraints]]\nlimit = "maximum mount travel"\nmin = "1 mm"\n',
-                          r"constraints\[2\].min: does not go with mount travel"),
+                          r"constraints\[2\].min: cannot stand beside mount travel"),
     "no side": (MOUNTS, BLOCK, SAG.replace('max = "40/3 Hz"', ""), "is missing; give min or max or outside"),
     "band upside down": (MOUNTS, BLOCK, SAG.replace('max = "40/3 Hz"', 'outside = ["9 Hz", "5 Hz"]'), "is no band"),
     "frequencies minimised": (MOUNTS, BLOCK, SAG.replace('"static sag"', '"natural frequencies"'),

@@ -139,7 +139,7 @@ def test_grades(tmp_path: Path) -> None:
         (" ± 1 %", '[robust]\nover = "99.9 %"\nengines = 100\n', "leaves none"),
         ("", '[tolerances]\nresidual_unbalance = "G 6.3"\n', "is missing, and a grade is of a mass"),
         ("", '[tolerances]\nresidual_unbalance = "6.3"\n', "neither a grade nor an unbalance"),
-        ("", '[tolerances]\nrotor_mass = "60 kg"\n', "goes with a grade"),
+        ("", '[tolerances]\nrotor_mass = "60 kg"\n', "needs a grade"),
         ("", shaft("s", 2, "0 mm", 'unbalance = { between = ["0 kg m", "1 kg m"], tolerance = "1 g" }'), "percent"),
     ],
 )

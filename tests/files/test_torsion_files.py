@@ -104,7 +104,7 @@ def test_what_a_quantity_needs() -> None:
 def test_more_discs_than_a_shaft_has() -> None:
     disc = {"end": "rear", "inertia": "0.1 kg m^2", "shaft": {"stiffness": "6e5 N m/rad"}}
     discs = [{**disc, "name": f"disc {k}"} for k in range(61)]
-    with pytest.raises(InputError, match="has 61 discs, and at most 60 may be told beside the throws"):
+    with pytest.raises(InputError, match="has 61 discs, and at most 60 may be given beside the throws"):
         changed(discs=discs)
 
 

@@ -112,7 +112,7 @@ def test_economics_of_a_sag_says_that_it_is_no_load(tmp_path: Path) -> None:
 
 
 def test_equal_power_does_not_rebuild_a_block_on_springs(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="equal power says nothing of a block and the springs under it"):
+    with pytest.raises(InputError, match="the rules of equal power do not cover a block and its springs"):
         computed(study(tmp_path, "layout comparison", in_case="equal_power_to = 2"))
 
 

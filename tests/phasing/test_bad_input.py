@@ -115,7 +115,7 @@ def test_cylinders_are_asked_for(tmp_path):
     engines.problem(tmp_path, 4, engine='throws = "open"')
     path = tmp_path / "none.toml"
     path.write_text((tmp_path / "scene.toml").read_text().replace("cylinders = 4\n", ""), encoding="utf-8")
-    with pytest.raises(InputError, match=r"engine\.cylinders: is missing, and open throws do not tell it"):
+    with pytest.raises(InputError, match=r"engine\.cylinders: is missing, and open throws do not say how many"):
         load(path)
 
 

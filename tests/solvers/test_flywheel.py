@@ -189,7 +189,7 @@ def test_more_room_is_never_worse(diesel: laufruhe.solvers.Result) -> None:
          "flywheel.inertia", "given twice"),
         ("[flywheel]\n", "flywheel.inertia", "missing"),
         ('[flywheel]\ninertia = "0 kg m^2"\n', "flywheel.inertia", "more than"),
-        (INERTIA + 'crankshaft_inertia = "1 kg m^2"\n', "flywheel.crankshaft_inertia", "goes with a rim"),
+        (INERTIA + 'crankshaft_inertia = "1 kg m^2"\n', "flywheel.crankshaft_inertia", "needs a rim"),
         (RIM.replace('"60 mm"', '"230 mm"'), "flywheel.rim.height", "leaves no hole"),
         (RIM + 'arms = { count = 4, at_rim = ["9 mm", "9 mm"], at_hub = ["9 mm", "9 mm"], hub_diameter = "200 mm" }\n',
          "hub_diameter", "does not fit"),

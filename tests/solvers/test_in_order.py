@@ -169,12 +169,12 @@ def test_a_share_of_the_first_is_given_up_for_the_second(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"added mass"', '"added mass"\nwithin = 0.1', "objective[2].within = 0.1: goes with an objective before"),
+        ('"added mass"', '"added mass"\nwithin = 0.1', "objective[2].within = 0.1: is for an objective that others"),
         ('minimise = "rms shaking force"', 'terms = [{ quantity = "rms shaking force" }, { quantity = "added mass" }]',
          "objective[1].terms: is a weighted sum before other objectives"),
         ('"added mass"', '"added moss"', "objective[2].minimise"),
-        ("samples = 120", 'kinematics = "auto"', "fidelity.kinematics: goes with one objective"),
-        ("[fidelity]", "[robust]\n[fidelity]", "robust: goes with one objective, and there are 2"),
+        ("samples = 120", 'kinematics = "auto"', "fidelity.kinematics: needs a single objective"),
+        ("[fidelity]", "[robust]\n[fidelity]", "robust: needs a single objective, and there are 2"),
     ],
 )  # fmt: skip
 def test_refusals(old: str, new: str, said: str, tmp_path: Path) -> None:

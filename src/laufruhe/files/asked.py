@@ -201,13 +201,13 @@ class Scene:
 def _stray(key: str, channel: Channel) -> str:
     """Why a key means nothing for a channel."""
     if key == "of":
-        return "goes with masses and places of shafts only"
+        return "is for masses and places of shafts only"
     if channel.is_mass:
         return "means nothing for a mass"
     if channel.is_load and key in _PLACES:
         return f"means nothing for a {channel}, which has no {_PLACES[key]} of its own"
     if channel.is_load and key == "direction_weights":
-        return f"goes with forces and travels at places, not with a {channel}"
+        return f"is for forces and travels at places, not for a {channel}"
     return f"means nothing for {channel}" if channel.is_mounting else f"means nothing for a {channel}"
 
 
@@ -235,7 +235,7 @@ def objectives_of(tables: Sequence[ObjectiveTable] | None, scene: Scene, single:
         raise Refused("objective", [], "is empty", "leave it out, or say what is to be minimised")
     last = len(tables) - 1
     if last and single:
-        rule = f"goes with one objective, and there are {len(tables)} in order"
+        rule = f"needs a single objective, and there are {len(tables)} in order"
         raise Refused(single[0], None, rule, "leave it out, or keep the first of them")
     return tuple(
         _ranked(table, scene, f"objective[{k + 1}]" if last else "objective", k == last)
@@ -247,7 +247,7 @@ def _ranked(table: ObjectiveTable, scene: Scene, where: str, is_last: bool) -> R
     """One objective, which limits those after it."""
     terms = _terms(table, scene, where)
     if is_last and table.within is not None:
-        raise Refused(f"{where}.within", table.within, "goes with an objective before others", "leave it out")
+        raise Refused(f"{where}.within", table.within, "is for an objective that others follow", "leave it out")
     if not is_last and len(terms) > 1:
         rule = "is a weighted sum before other objectives, and no limit is one"
         raise Refused(f"{where}.terms", None, rule, "put it last, or rank its parts")
@@ -292,7 +292,7 @@ def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
     for key in _SIDES:
         if getattr(table, key) is not None and key not in sides:
             rule = f"{channel}, which has a largest value only" if norm else table.limit
-            raise Refused(f"{where}.{key}", None, f"does not go with {rule}", remedy)
+            raise Refused(f"{where}.{key}", None, f"cannot stand beside {rule}", remedy)
     if all(getattr(table, key) is None for key in sides):
         raise Refused(f"{where}.{sides[0]}", None, "is missing", "add it" if norm else remedy)
     low, high = (_side(getattr(table, key), measure, f"{where}.{key}") for key in ("min", "max"))

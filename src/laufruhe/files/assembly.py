@@ -39,7 +39,7 @@ def assembly_of(table: AssemblyTable | None, engine: Engine, folder: Path) -> As
         if len(rows) < count:
             raise Refused(where, file, f"has {len(rows)} parts for {count} cylinders", "measure one for each at least")
         if len(rows) > MOST_PARTS:
-            raise Refused(where, file, f"has {len(rows)} parts", f"at most {MOST_PARTS} are told apart")
+            raise Refused(where, file, f"has {len(rows)} parts", f"at most {MOST_PARTS} can be handled")
         if min(min(row) for row in rows) <= 0.0:
             raise Refused(where, file, "has a mass that is not above zero", "correct it")
         lots.append(Lot(key[:-1], tuple((unit * row[0], unit * row[1] if len(row) > 1 else 0.0) for row in rows)))

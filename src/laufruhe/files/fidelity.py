@@ -47,7 +47,9 @@ def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
     """The problem at the fidelity that a table describes."""
     is_auto = table.kinematics == "auto"
     if table.tolerance is not None and not is_auto:
-        raise Refused("fidelity.tolerance", table.tolerance, "goes with auto only", 'add kinematics = "auto"')
+        raise Refused(
+            "fidelity.tolerance", table.tolerance, 'is for kinematics = "auto" only', 'add kinematics = "auto"'
+        )
     told: dict[str, Any] = {}
     for knob in KNOBS:
         value = getattr(table, knob.key)

@@ -61,7 +61,7 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
     one_of(table, "flywheel", "inertia", "rim", named="[flywheel.rim]")
     if table.rim is None:
         if table.crankshaft_inertia is not None:
-            rule = "goes with a rim; inertia is that of all that turns"
+            rule = "needs a rim; inertia is that of all that turns"
             raise Refused("flywheel.crankshaft_inertia", None, rule, "leave it out")
         numbers = {"inertia": ("kg m^2", Open.of(table.inertia))}
         wheel = Flywheel(numbers["inertia"][1].start)
@@ -71,7 +71,7 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
         wheel = Flywheel(table.crankshaft_inertia or 0.0, _rim(table.rim))
         decisions = _decided(section, 1)
     if crank_inertia is not None:
-        rule, told = "is told by [flywheel] too", units.shown(crank_inertia, "kg m^2")
+        rule, told = "is given by [flywheel] too", units.shown(crank_inertia, "kg m^2")
         raise Refused("fidelity.crank_inertia", told, rule, "keep one: with this one loads feel the uneven speed")
     return wheel, decisions
 
@@ -114,7 +114,7 @@ def check_told_alike(engine: Engine, table: FlywheelTable | None, decisions: Seq
             rule = "is open, and the discs of [torsion] tell the inertia of all that turns"
             raise Refused(own.name, None, rule, "leave [flywheel] out, and open a disc")
         if any(isinstance(drive, TorsionDrive) and (drive.part, drive.number) in discs for drive in own.drives):
-            raise Refused(where, None, f"tells an inertia that follows from {own.name}, which is open", "leave it out")
+            raise Refused(where, None, f"gives an inertia that follows from {own.name}, which is open", "leave it out")
     told, least = wheel.inertia, inertia_of_discs(chain, engine.slider_cranks)
     most = least + sum(absorber.inertia for absorber in chain.absorbers)
     if not least * (1.0 - _ROUNDED) <= told <= most * (1.0 + _ROUNDED):

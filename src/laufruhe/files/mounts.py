@@ -37,8 +37,8 @@ _FIELDS = {
 }  # fmt: skip
 # what mirroring in y = 0 does to each number of a mount
 _MIRRORED = [1.0] * 8 + [-1.0, 1.0, -1.0, 1.0, -1.0]
-_NOT_RIGID = ('goes with kind = "elastic"', "leave it out, or set the kind")
-_NOT_ELASTIC = ('goes with kind = "rigid"', "give stiffness instead")
+_NOT_RIGID = ('is for kind = "elastic" only', "leave it out, or set the kind")
+_NOT_ELASTIC = ('is for kind = "rigid" only', "give stiffness instead")
 
 
 class BlockTable(Table):

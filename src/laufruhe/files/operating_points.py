@@ -96,7 +96,7 @@ def _loads(
     if brake is None:
         raise Refused(f"{where}.{given[0]}", None, "needs [friction]", "say what is lost between gas and brake")
     if table.motored or not table.gas:
-        raise Refused(f"{where}.{given[0]}", None, "goes with an engine that burns fuel", "leave it out")
+        raise Refused(f"{where}.{given[0]}", None, "is for engines that burn fuel", "leave it out")
     bmep = table.bmep if table.bmep is not None else brake.pressure(table.brake_torque or 0.0)
     least, middle, largest = brake.indicated(bmep, speed, name)
     if least == largest:

@@ -149,7 +149,7 @@ def _cylinders(engine: EngineTable) -> int:
     told = [count for _, count in told_cylinders(engine)]
     told += [len(engine.slider_cranks)] if engine.kind.is_free else []
     if not told:
-        raise Refused("engine.cylinders", None, "is missing, and open throws do not tell it", "add it")
+        raise Refused("engine.cylinders", None, "is missing, and open throws do not say how many", "add it")
     return told[0]
 
 

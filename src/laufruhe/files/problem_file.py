@@ -78,7 +78,7 @@ class ProblemFile(Table):
 
     @property
     def single(self) -> list[str]:
-        """What stands here that goes with one objective only."""
+        """What stands here that needs a single objective only."""
         given = [key for key in ("assembly", "robust") if getattr(self, key) is not None]
         return [*given, *(["fidelity.kinematics"] if self.fidelity.kinematics == "auto" else [])]
 

@@ -169,7 +169,7 @@ def _pin_of(throw: Throw, cylinders: Sequence[SliderCrank]) -> _Pin:
 def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
     key = table.factor_key or FACTORS[0]
     others = [name for name in ("x", "opposite_throw", "unbalance", "mass", *FACTORS) if name != key]
-    none_of(table, others, where, f"does not go with {key}", "leave one of them out")
+    none_of(table, others, where, f"cannot stand beside {key}", "leave one of them out")
     fraction, drives = Open.of(getattr(table, key)), []
     for number in range(1, len(pins) + 1) if table.throws is None else table.throws:
         pin = _pin(pins, number, f"{where}.throws")
@@ -192,7 +192,7 @@ def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
 
 def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
     reference, x = 0.0, None if table.x is None else Open.of(table.x).start
-    none_of(table, ("throws",), where, "goes with balance_factor only", "use opposite_throw")
+    none_of(table, ("throws",), where, "is for balance_factor only", "use opposite_throw")
     if table.opposite_throw is not None:
         pin = _pin(pins, table.opposite_throw, f"{where}.opposite_throw")
         reference, x = pin.angle + math.pi, pin.x if x is None else x
@@ -229,7 +229,9 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
 
 def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaft, where: str, into: RotorList) -> None:
     if table.unbalance is not None or table.mass is not None or table.angle != 0.0:
-        raise Refused(f"{where}.coupled", coupled.to, "does not go with a size or an angle of its own", "leave one out")
+        raise Refused(
+            f"{where}.coupled", coupled.to, "cannot stand beside a size or an angle of its own", "leave one out"
+        )
     leaders = {rotor.name: rotor for rotor in into.rotors if rotor.role is Role.BALANCER}
     if coupled.to not in leaders:
         remedy = nearest(coupled.to, list(leaders)) if leaders else "define the other one first"

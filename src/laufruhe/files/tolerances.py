@@ -317,7 +317,7 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
     """What balancing leaves on the crankshaft, at any angle, on planes from the first throw to the last."""
     if table is None or table.residual_unbalance is None:
         if table is not None and table.rotor_mass is not None:
-            raise Refused("tolerances.rotor_mass", None, "goes with a grade", "add residual_unbalance, or leave it out")
+            raise Refused("tolerances.rotor_mass", None, "needs a grade", "add residual_unbalance, or leave it out")
         return []
     grade = grade_of(table.residual_unbalance)
     if grade is None:
@@ -327,7 +327,7 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
             rule, remedy = "is neither a grade nor an unbalance", 'write for example "G 6.3" or "50 g cm"'
             raise Refused(RESIDUAL, table.residual_unbalance, rule, remedy) from None
         if table.rotor_mass is not None:
-            raise Refused("tolerances.rotor_mass", None, "goes with a grade, not with an unbalance", "leave it out")
+            raise Refused("tolerances.rotor_mass", None, "needs a grade, not an unbalance", "leave it out")
     elif table.rotor_mass is None:
         rule = "is missing, and a grade is of a mass"
         raise Refused("tolerances.rotor_mass", None, rule, "add that of crankshaft, flywheel and clutch")

@@ -125,7 +125,7 @@ def torsion_of(
             rule = f"is of one crankshaft, and {part.name} works on shaft '{part.shaft.name}'"
             raise Refused("torsion", None, rule, "leave it out")
     if len(table.discs) > MOST_DISCS:
-        rule = f"has {len(table.discs)} discs, and at most {MOST_DISCS} may be told beside the throws"
+        rule = f"has {len(table.discs)} discs, and at most {MOST_DISCS} may be given beside the throws"
         raise Refused("torsion.discs", None, rule, "join those that turn together")
     throws = [throw for throw in throws if throw.shaft == CRANKSHAFT]
     opened, own = _Opened(), _throw_discs(table, parts, throws)

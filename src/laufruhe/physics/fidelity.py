@@ -81,17 +81,17 @@ class Fidelity:
         if self.orders is not None and self.orders < 1:
             raise ChoiceError("orders", self.orders, "must be at least 1", "leave it out to keep all")
         if self.gas_orders is not None and not (self.gas and self.gas_orders >= 1):
-            raise ChoiceError("gas_orders", self.gas_orders, "goes with gas, and must be at least 1", "leave it out")
+            raise ChoiceError("gas_orders", self.gas_orders, "needs gas, and must be at least 1", "leave it out")
         if not self.crank_inertia > 0.0:
             raise ChoiceError("crank_inertia", self.crank_inertia, "must be positive", "give kg m2")
         if self.is_uneven and self.kinematics != "exact":
-            rule = "goes with exact kinematics only"
+            rule = "needs exact kinematics"
             raise ChoiceError("crank_inertia", self.crank_inertia, rule, "leave kinematics out")
         if self.modes is None:
             return
         modes = list(self.modes)
         if self.mounts != "frequency":
-            raise ChoiceError("modes", modes, "go with mounts in the frequency domain", "leave one of the two out")
+            raise ChoiceError("modes", modes, "need mounts in the frequency domain", "leave one of the two out")
         if len(set(modes)) != len(modes) or not all(1 <= mode <= MODES for mode in modes):
             raise ChoiceError("modes", modes, f"must be different numbers from 1 to {MODES}", "1 is the lowest mode")
 

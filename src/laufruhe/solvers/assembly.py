@@ -95,7 +95,7 @@ def _check(problem: Problem) -> None:
         raise ModelError("[assembly] takes a crank that turns evenly; leave fidelity.crank_inertia out")
     for term in problem.objective:
         if not term.measure.is_load or term.measure.channel.feels_inertia:
-            raise ModelError(f"[assembly] makes norms of loads least, and no {term.measure.name}; ask for a load")
+            raise ModelError(f"[assembly] minimises loads only, not {term.measure.name}; ask for a load")
     if not problem.objective:
         raise ModelError("[assembly] minimises nothing; add [objective]")
 

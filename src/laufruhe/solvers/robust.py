@@ -175,7 +175,7 @@ def _check(problem: Problem) -> None:
         raise ModelError("[robust] takes a crank that turns evenly; leave fidelity.crank_inertia out, or [robust]")
     for measure in problem.measures:
         if measure.channel.is_number or measure.channel.feels_inertia:
-            raise ModelError(f"[robust] takes norms of loads, and no {measure.name}; ask for it without [robust]")
+            raise ModelError(f"[robust] is for loads only, not for {measure.name}; ask for it without [robust]")
     if not problem.objective:
         raise ModelError("[robust] minimises nothing; add [objective]")
     if problem.over is not None and problem.over.share is not None and any(m.measure.is_load for m in problem.limits):

@@ -238,7 +238,7 @@ class SmoothProgram:
         if not pairs:
             felt = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
             there = ", ".join(f"{order:g}" for order in felt[:MOST_NAMED]) or "none"
-            raise ModelError(f"nothing is to be felt of {quantity.name}; name an order that is there: {there}")
+            raise ModelError(f"{quantity.name} is zero for every design; name an order that it has: {there}")
         ratios = [ca.sqrt(force / firm) for force, firm in pairs]
         top = self._held.named(quantity.name).head(ca.mmax(ca.vertcat(*ratios)))
         for force, firm in pairs:

@@ -87,7 +87,7 @@ def _by_orders(problem: Problem, phasing: Phasing, families: Sequence[Family]) -
     if not squares or problem.decisions or phasing.shafts.optional or family.fixed or phasing.method is Method.PROGRAM:
         return _by_designs(problem, phasing, families)
     if phasing.cylinders > MOST_SLOTS:
-        raise ModelError(f"firing orders of more than {MOST_SLOTS} cylinders are too many to look at; give throws")
+        raise ModelError(f"firing orders of more than {MOST_SLOTS} cylinders are too many to examine; give throws")
     model = family.model(phasing)
     objective = PairObjective.of(model.at(model.samples))
     found = enumerate_orders(objective, phasing.cylinders, phasing.best, phasing.time_limit)

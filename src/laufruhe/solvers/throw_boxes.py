@@ -97,7 +97,7 @@ class ThrowPrograms:
             raise ModelError(f"{2e-6 * sum(sizes):.0f} million numbers at once")
         every = [norm for _, norm in (*self._terms, *self._limits)]
         if not all(np.isfinite(norm.waves).all() and np.isfinite(norm.fixed.constant).all() for norm in every):
-            raise ModelError("a load on a resonance that nothing damps has no waves")
+            raise ModelError("a load on an undamped resonance has no finite response")
         self._low = self._told_apart()
         self._turned: dict[tuple[int, ...], _Turned] = {}
         self._proofs: list[Multipliers] = []

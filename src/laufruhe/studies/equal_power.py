@@ -22,7 +22,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
     """
     cylinders = problem.engine.slider_cranks
     if problem.engine.block is not None:
-        raise ModelError("equal power says nothing of a block and the springs under it; leave equal_power_to out")
+        raise ModelError("the rules of equal power do not cover a block and its springs; leave equal_power_to out")
     if len({(part.crank_radius, part.bore) for part in cylinders}) > 1:
         raise ModelError("cylinders differ in bore or stroke, so no one scale gives equal power; make them equal")
     scale = equal_power_scale(len(cylinders), reference_cylinders)

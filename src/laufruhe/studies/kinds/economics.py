@@ -57,7 +57,7 @@ class Claim(Table):
     @model_validator(mode="after")
     def _says_something(self) -> Claim:
         if self.says is None and self.falls_by is None:
-            raise f.refusal("claims nothing; give says, falls_by, or both")
+            raise f.refusal("has no claim; give says, falls_by, or both")
         return self
 
 
@@ -98,7 +98,7 @@ class Economics(Part):
     @classmethod
     def _ascend(cls, limits: list[float]) -> list[float]:
         if len(limits) < 2:
-            raise f.refusal("is no front; give two masses or more")
+            raise f.refusal("needs two masses or more")
         if sorted(set(limits)) != limits:
             raise f.refusal("must ascend; order the masses and name each once")
         return limits

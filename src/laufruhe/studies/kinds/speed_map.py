@@ -50,7 +50,7 @@ class SpeedsTable(f.Table):
         if self.first >= self.last:
             raise f.refusal("go nowhere; write the lower speed first")
         if (self.points is None) == (self.step is None):
-            raise f.refusal("have no steps, or are told them twice; give points or step, one of them")
+            raise f.refusal("need either points or step; give one of them")
         if self.step is not None and not 1.0 <= (self.last - self.first) / self.step < MOST_SPEEDS:
             raise f.refusal("have a step that does not fit between their ends; give another")
         return self
