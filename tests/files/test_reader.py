@@ -49,7 +49,7 @@ cycle = "two-stroke"
 stroke = "90 mm"
 rod_length = "170 mm"
 reciprocating_mass = "0.6 kg"
-shafts = [{ name = "second", ratio = -1, position = ["0 mm", "400 mm"] }]
+shafts = [{ name = "second", ratio = -1, position = ["0 mm", "460 mm"] }]
 slider_cranks = [{ x = "0 mm" }, { x = "0 mm", shaft = "second", throw = 180, bank_angle = 180 }]
 [[operating_points]]
 speed = "3000 rpm"
@@ -287,7 +287,7 @@ def test_free_parts(old: str, new: str, said: str, tmp_path: Path) -> None:
 
 def test_two_cylinders_in_one_place_on_two_shafts(tmp_path: Path) -> None:
     """A second shaft on the same axis leaves no more room."""
-    second = changed(PARTS, 'ratio = -1, position = ["0 mm", "400 mm"]', 'ratio = 1, position = ["0 mm", "0 mm"]')
+    second = changed(PARTS, 'ratio = -1, position = ["0 mm", "460 mm"]', 'ratio = 1, position = ["0 mm", "0 mm"]')
     alike = changed(second, ", throw = 180, bank_angle = 180", "")
     assert "stands in the place of cylinder 1" in complaint_about(written(tmp_path, alike))
 
