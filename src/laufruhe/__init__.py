@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
-from laufruhe.errors import InputError, LaufruheError, ModelError, SolverError
+from laufruhe.errors import InputError, LaufruheError, ModelError, SolverError, check_whole, wrong_call
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,9 +75,12 @@ def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
         If a solver stops without an answer.
     """
     from dataclasses import replace
+    from numbers import Real
 
     from laufruhe.solvers import solve as decide
 
+    if time_limit is not None and not (isinstance(time_limit, Real) and time_limit > 0.0):
+        raise wrong_call("time_limit", time_limit, "must be a number of seconds above zero", "try 60")
     return decide(replace(_problem(problem), sharply=True), time_limit=time_limit)
 
 
@@ -98,7 +101,7 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
     ModelError
         If the engine cannot be evaluated, or has no operating point.
     """
-    from laufruhe.machine import Engine
+    from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem import channels
     from laufruhe.problem.measure import Measure, Term
     from laufruhe.problem.problem import Problem
@@ -106,6 +109,10 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
 
     if not isinstance(design, Engine):
         return state(_problem(design))
+    listed: Sequence[object] = points
+    strange = next((point for point in listed if not isinstance(point, OperatingPoint)), None)
+    if strange is not None:
+        raise wrong_call("points", strange, "is no operating point", "give a list of laufruhe.machine.OperatingPoint")
     if not points:
         raise ModelError(f"'{design.name}' has no operating point; give points")
     channel = channels.MOUNT_FORCE if design.mounts else channels.SHAKING_FORCE
@@ -135,6 +142,7 @@ def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:
     from laufruhe.studies.reader import load_study
     from laufruhe.studies.runner import run
 
+    check_whole("jobs", jobs, 1)
     _, path = given(source)
     with TemporaryDirectory() as folder:
         datasets, _ = run(load_study(source), path.parent, Path(folder) / KEPT, jobs=jobs)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from numbers import Integral
 
 
 def printed(text: str, most: int = 2000) -> str:
@@ -80,3 +82,19 @@ class UncarriedLoadError(ModelError):
 
 class SolverError(LaufruheError, RuntimeError):
     """A solver stopped without an answer that can be used."""
+
+
+def wrong_call(where: str, given: object, rule: str, remedy: str) -> InputError:
+    """What a call in Python is refused with: an argument, as it was given, the rule and the remedy."""
+    return InputError("laufruhe", (Complaint(where, printed(repr(given), 60), rule, remedy),))
+
+
+def check_whole(where: str, given: object, least: int, most: float = math.inf) -> None:
+    """Refuse an argument that is no whole number between two bounds."""
+    if isinstance(given, bool) or not isinstance(given, Integral) or not least <= int(given) <= most:
+        rule = (
+            f"must be a whole number, {least} or more"
+            if most == math.inf
+            else f"must be a whole number, {least} to {most}"
+        )
+        raise wrong_call(where, given, rule, "give one")

@@ -16,7 +16,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from laufruhe.errors import Complaint, InputError, ModelError, printed
+from laufruhe.errors import Complaint, InputError, ModelError, wrong_call
 from laufruhe.files import edits
 from laufruhe.files.asked import Scene, limits_of, objectives_of
 from laufruhe.files.assembly import assembly_of
@@ -72,8 +72,8 @@ def given(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]
     if isinstance(source, str) and ("\n" in source or "=" in source):
         return _whole(_parsed(source.encode("utf-8"), UNNAMED), UNNAMED), UNNAMED
     if not isinstance(source, str | os.PathLike):
-        rule, remedy = f"is a {type(source).__name__}", "give a path, the text of a problem file, or its tables"
-        raise InputError("laufruhe", (Complaint("problem", printed(repr(source), 60), rule, remedy),))
+        remedy = "give a path, the text of a problem file, or its tables"
+        raise wrong_call("problem", source, f"is of type {type(source).__name__}", remedy)
     path = Path(source)
     return tables_of(path), shown_as(path)
 

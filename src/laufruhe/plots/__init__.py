@@ -50,6 +50,7 @@ def draw_and_show(result: Result, folder: Path, kinds: Sequence[str]) -> dict[st
 
 
 def _drawn(result: Result, folder: Path, kinds: Sequence[str]) -> Iterator[tuple[str, list[str], Figure]]:
+    folder.mkdir(parents=True, exist_ok=True)
     for name, figure in figures(result):
         files = [f"{name}.{kind}" for kind in kinds]
         for file in files:

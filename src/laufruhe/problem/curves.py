@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, check_whole
 from laufruhe.numerics.spectrum import Spectrum, common_base, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.modes import MOTIONS
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = NDArray[np.float64]
+MOST_STEPS = 1_000_000
 STEPS = 720
 """Over the cycle; what is sampled is known at every angle."""
 
@@ -114,6 +115,7 @@ def _shown(axis: Axis, k: int) -> str:
 
 def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
     """Loads on the block, the mounts and the bearings, and how far the mounts move, over the cycle (C7)."""
+    check_whole("steps", steps, 1, MOST_STEPS)
     first = next(iter(designs.values()))
     whole = first.engine.cycle.angle
     angles = Axis("angle", tuple(float(k) for k in np.degrees(whole) * np.arange(steps) / steps), "deg")

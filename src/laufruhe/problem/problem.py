@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import Complaint, ModelError
+from laufruhe.errors import Complaint, ModelError, wrong_call
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.assembly import Assembly
@@ -274,14 +274,20 @@ class Problem:
         laufruhe.errors.InputError
             In the words of a file with that number.
         """
+        if not isinstance(values, Mapping):
+            raise wrong_call("values", values, "is no table of names and values", 'write {"engine.rod_ratio": 0.28}')
+        for name in values:
+            _check_name(name)
         return self._origin.with_values(values)
 
     def open(self, name: str, low: Any, high: Any, start: Any = None) -> Problem:
         """The problem with one more number open between two bounds; it starts where it stands unless told."""
+        _check_name(name)
         return self._origin.opened(name, low, high, start)
 
     def fix(self, name: str, value: Any = None) -> Problem:
         """The problem with one number fixed, at a value or where it starts."""
+        _check_name(name)
         return self._origin.fixed(name, value)
 
     @property
@@ -322,6 +328,11 @@ class Problem:
         on_mounts = any(decision.mount_drives for decision in moved)
         given = Numbers.of(self.engine, self.mount_numbers if on_mounts else ())
         return moved_numbers(given, moved, values)
+
+
+def _check_name(name: object) -> None:
+    if not isinstance(name, str):
+        raise wrong_call("name", name, "is no name of a number", 'write for example "engine.rod_ratio"')
 
 
 Phasing: TypeAlias = PhasingOf[Problem]
