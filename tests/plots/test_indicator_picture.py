@@ -10,7 +10,7 @@ import pytest
 
 import laufruhe
 from laufruhe.machine import Chambers, Steam
-from laufruhe.plots.results import indicator
+from laufruhe.plots.results import cycle, engine, indicator
 from laufruhe.solvers import Result
 from picture_faults import drawn_texts, overlaps
 
@@ -54,3 +54,10 @@ def test_words_stand_apart(result: Result) -> None:
 
 def test_engines_without_chambers_have_none() -> None:
     assert not indicator.applies(laufruhe.evaluate(READY.with_name("tractor-single.toml")))
+
+
+def test_nothing_is_said_to_fire(result: Result) -> None:
+    for picture in (cycle, engine):
+        words = " ".join(text.get_text() for text in picture.figure(result).texts)
+        assert "fir" not in words.replace("first", "")
+        assert "dead centre" in words

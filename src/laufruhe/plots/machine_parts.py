@@ -27,11 +27,12 @@ MM = 1e3
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a slider-crank is, zeta = z + i y [m] (C4), and the bodies of one that has no piston."""
+    """Where a slider-crank is, zeta = z + i y [m] (C4), the foot of its rod, and the bodies of one without a piston."""
 
     part: SliderCrank
     crank: complex
     pin: complex
+    foot: complex
     piston: complex
     bodies: tuple[Outline, ...]
 
@@ -46,7 +47,19 @@ class Pose:
         bodies = tuple(
             replace(body, points=centre + axis * body.points) for body in part.outlines(float(turn - part.bank))
         )
-        return cls(part, centre, centre + part.crank_radius * cmath.exp(1j * turn), centre + way * axis, bodies)
+        pin = part.crank_radius * cmath.exp(1j * turn)
+        # the pin of a Scotch yoke slides across its rod, which stays on the axis
+        foot = pin if math.isfinite(part.rod_length) else axis * (pin / axis).real
+        return cls(part, centre, centre + pin, centre + foot, centre + way * axis, bodies)
+
+
+def slot(axes: Axes, pose: Pose, bore: float, order: float) -> None:
+    """What the pin of a Scotch yoke slides in, from the front."""
+    if math.isfinite(pose.part.rod_length):
+        return
+    across = 1j * pose.part.crank_radius * cmath.exp(1j * pose.part.bank)
+    ends = (pose.foot - across, 0.16 * bore), (pose.foot + across, 0.16 * bore)
+    bar(axes, *ends, order, facecolor=METAL, edgecolor=INK)
 
 
 def half_disc(unbalance: float) -> float:

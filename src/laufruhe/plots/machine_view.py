@@ -33,6 +33,7 @@ from laufruhe.plots.machine_parts import (
     heights_of,
     look_of,
     piston_at,
+    slot,
 )  # fmt: skip
 from laufruhe.plots.style import AFTER, GREY, ORANGE, PALE, Page, entry_of_dots, page
 from laufruhe.plots.words import INK, SMALL, round_ticks, width_of
@@ -150,7 +151,8 @@ def _front(axes: Axes, scene: Scene, phi: float) -> None:
         else:
             cylinder(axes, pose, bore)
             piston_at(axes, pose, bore, behind)
-            bar(axes, (pose.pin, 0.15 * bore), (pose.piston, 0.09 * bore), behind, facecolor=METAL, edgecolor=INK)
+            bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, facecolor=METAL, edgecolor=INK)
+            slot(axes, pose, bore, behind)
         bar(axes, (pose.crank, 0.2 * bore), (pose.pin, 0.15 * bore), behind + 2.0, **_crank_look(scene))
         axes.add_patch(Circle(at(pose.pin), MM * 0.08 * bore, facecolor="white", edgecolor=INK, zorder=7.5))
     for rotor in scene.weights:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.machine import Chambers
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.torsion import has_torsion
@@ -113,6 +114,11 @@ def is_met(limit: LimitValue) -> bool:
 def has_mounts(result: Result) -> bool:
     """Whether there are mounts, rigid or elastic."""
     return bool(result.problem.engine.mounts)
+
+
+def has_firing(result: Result) -> bool:
+    """Whether its cylinders fire; chambers of steam and pumps work from a dead centre to the next."""
+    return not any(isinstance(point.gas, Chambers) for point in result.problem.points)
 
 
 def has_loads(result: Result) -> bool:

@@ -15,7 +15,7 @@ from matplotlib.ticker import MultipleLocator
 from laufruhe.machine import Engine
 from laufruhe.plots.style import Series, entry, headed, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK, aligned, empty, fitted, in_thousands, round_ticks, width_of
-from laufruhe.present.measures import Array, hardest_point, has_loads
+from laufruhe.present.measures import Array, hardest_point, has_firing, has_loads
 from laufruhe.solvers.result import Result
 
 STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6
@@ -77,8 +77,11 @@ def figure(result: Result) -> Figure:
     at = "" if len(result.problem.points) > 1 else f" at {result.problem.points[0].name}"
     what = "Loads on the block and forces on the mounts" if mounts else "Loads on the block"
     none = f" None, so not shown: {', '.join(balanced)}." if balanced else ""
-    lines = f"{what}{at}; above, the cylinders that fire.{none}"
-    firing = entry("a cylinder fires", color=FAINT, linewidth=0.8, linestyle=STYLES[2])
+    marked, mark = ("the cylinders that fire", "a cylinder fires")
+    if not has_firing(result):
+        marked, mark = "the cylinders whose dead centre at the head end it is", "a dead centre at the head end"
+    lines = f"{what}{at}; above, {marked}.{none}"
+    firing = entry(mark, color=FAINT, linewidth=0.8, linestyle=STYLES[2])
     legend = [*(one.entry() for one in series), firing]
     return headed(
         drawn, result, "Forces and moments over one working cycle", lines, legend, _left_out(result, shown, mounts)

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from laufruhe.plots.machine_parts import THICKNESS
 from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
 from laufruhe.plots.style import headed, styled
+from laufruhe.present.measures import has_firing
 from laufruhe.solvers.result import Result
 
 
@@ -26,6 +27,7 @@ def figure(result: Result) -> Figure:
     weights = f" Weights as half discs of steel, {1e3 * THICKNESS:g} mm thick, of the same unbalance."
     cycle = scene.engine.cycle.angle
     fires = [part.name for part in scene.engine.cylinders if abs(math.remainder(part.firing_angle, cycle)) < 1e-9]
-    centre = f", the firing dead centre of {' and '.join(fires)}" if fires else ""
+    firing = "firing " if has_firing(result) else ""
+    centre = f", the {firing}dead centre of {' and '.join(fires)}" if fires else ""
     lines = f"To scale, at a crank angle of 0°{centre}.{weights if scene.weights else ''}"
     return headed(drawn, result, "The engine", lines, legend_of(scene))
