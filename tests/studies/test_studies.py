@@ -24,12 +24,13 @@ from laufruhe.cli import study as cli_study
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.files.study_tables import CaseTable
-from laufruhe.problem.measure import Limit
+from laufruhe.problem.measure import MEASURES, Limit, Measure
 from laufruhe.solvers import solve
 from laufruhe.studies import Point, Scenes, kinds, run, runner
 from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
+from laufruhe.studies.kinds.layout_comparison import LayoutComparison
 from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
@@ -178,6 +179,33 @@ def test_nothing_open_is_not_called_an_optimum(tmp_path: Path) -> None:
     assert parts["coords"]["proof"]["data"] == ["as given", "global"]
     assert parts["data_vars"]["lower_bound"]["data"][0] is None
     assert parts["seconds"] > 0.0
+
+
+def test_designs_are_ranked_by_further_quantities(tmp_path: Path) -> None:
+    """Each as its own solve has it; of an articulated rod no pin force is told, and no weight is the least mass."""
+    more = (
+        'metric = "mean mount force"\nfurther = ["added mass", "maximum crank-pin force", "peak to peak stored work"]'
+    )
+    path = study(tmp_path, part("layout comparison", ["boxer-four", "vee-six-90"], more=more))
+    data = computed(path)
+    for k, name in enumerate(("boxer-four", "vee-six-90")):
+        result = solve(load(PROBLEMS / f"{name}.toml"))
+        for j, quantity in enumerate(data["quantity"].values.tolist()):
+            wanted = result.final.value(Measure(*MEASURES[quantity]))
+            assert data["further"].values[k, j] == pytest.approx(wanted, rel=1e-6, abs=1e-9)
+    _, words, ranking = LayoutComparison.table(data)
+    assert "Ranked" in words
+    assert ranking.rows[0][0] == (
+        "boxer-four" if data["objective"].values[0] < data["objective"].values[1] else "vee-six-90"
+    )
+    assert next(row for row in ranking.rows if row[0] == "boxer-four")[2] == "0 (1)"
+
+
+def test_a_further_quantity_that_an_engine_lacks_is_one_line(tmp_path: Path) -> None:
+    more = 'further = ["maximum main-bearing force"]'
+    with pytest.raises(InputError, match="needs main bearings") as caught:
+        computed(study(tmp_path, part("layout comparison", ["boxer-four"], more=more)))
+    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_a_scene_of_two_names_is_solved_once_and_shown_twice(tmp_path: Path) -> None:

@@ -117,14 +117,16 @@ def _flat(data: xr.Dataset) -> Any:
     narrow = data.drop_dims({str(values.dims[1]) for values in across.values()})
     units = {str(name): values.attrs.get("units", "") for name, values in narrow.variables.items()}
     rows = narrow.to_dataframe().rename(columns={name: _headed(name, unit) for name, unit in units.items()})
+    columns: dict[str, Any] = {}
     for name, values in across.items():
         along = values.dims[1]
         own = [values.attrs.get("units", "")] * data.sizes[along]
         units_of = values.attrs.get("unit_of", f"{along}_unit")
         named = data[units_of].values.tolist() if units_of in data.coords else own
         for k, (of, unit) in enumerate(zip(data[along].values, named, strict=True)):
-            rows[_headed(f"{name}: {of}", unit)] = values.values[:, k]
-    return rows
+            columns[_headed(f"{name}: {of}", unit)] = values.values[:, k]
+    # all at once: frames of many columns grow slowly
+    return rows.join(type(rows)(columns, index=rows.index))
 
 
 def _headed(name: str, unit: str) -> str:

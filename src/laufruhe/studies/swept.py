@@ -13,12 +13,13 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
-from laufruhe.errors import SolverError
+from laufruhe.errors import ModelError, SolverError
 from laufruhe.files.asked import QuantityName
 from laufruhe.files.study_tables import Axis, CaseTable, SweepTable, axis_of, changed, keys_of
 from laufruhe.present.measures import limits_of, main_load, mount_orders, shaking_orders
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, measured
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve, state
 from laufruhe.solvers.result import Result
@@ -50,13 +51,13 @@ def decided(problem: Problem) -> tuple[Result, str, str]:
     return result, str(result.status), proof
 
 
-def solved(problem: Problem) -> Record:
+def solved(problem: Problem, further: Mapping[str, Measure] | None = None) -> Record:
     """What is kept of a scene [SI]; NaN for what it has not, as one without a design.
 
     Its metric and the unit of that, status and proof ("as given" where nothing was open), the
     objective as given, as decided, and what no design falls below; mean and maximum force by
     mount [N], means over the operating points by their weights; what was decided, and forces by
-    order; how limits stand, and their shadow prices, by name.
+    order; how limits stand, and their shadow prices, by name; and the design in further measures.
     """
     shown, status, proof = decided(problem)
     objective, bound = shown.objective, shown.certificate.lower_bound if shown.certificate else math.nan
@@ -83,7 +84,16 @@ def solved(problem: Problem) -> Record:
         "limit_value": {limit.name: _finite(limit.value) for limit in limits},
         "shadow_price": {limit.name: limit.shadow_price for limit in limits if shown.certificate},
         "limit_units": {limit.name: limit.unit for limit in limits},
+        "further": {name: _told(shown.final, of) if designed else math.nan for name, of in (further or {}).items()},
     }
+
+
+def _told(design: Evaluation, measure: Measure) -> float:
+    """NaN where a design does not tell it: the mass of a weight without a radius, or the pin of an articulated rod."""
+    try:
+        return _finite(design.value(measure))
+    except ModelError:
+        return math.nan
 
 
 def _by_order(design: Evaluation) -> dict[str, float]:

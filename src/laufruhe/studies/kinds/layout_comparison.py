@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
+import numpy as np
 import xarray as xr
+from pydantic import Field
 
+from laufruhe.files.asked import QuantityName, QuantityTable, Scene
+from laufruhe.files.study_tables import CaseTable
+from laufruhe.problem.measure import MEASURES, Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.studies.part import Record
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import SweptPart
-from laufruhe.studies.swept_shown import bars, claimed, over_sweep, swept_names
+from laufruhe.studies.swept import SweptPart, solved
+from laufruhe.studies.swept_shown import MOST_ROWS, bars, by_point, claimed, over_sweep, swept_names
+from laufruhe.studies.text import NOTHING, Rows, Text, number
+from laufruhe.units import readable
 
-_SAME = 1e-9
+_SAME, _NOTHING = 1e-9, 1e-7
 
 
 class LayoutComparison(SweptPart):
     """Engines side by side, of equal cylinders or of equal power."""
 
     kind: Literal["layout comparison"]
+    further: list[QuantityName] = Field(
+        default_factory=list, max_length=8, description="By which the designs decided are ranked beside the metric."
+    )
 
     def points(self, scenes: Scenes) -> list[Point]:
         """Every case at every combination, if sizes are alike."""
@@ -29,7 +42,26 @@ class LayoutComparison(SweptPart):
             rule = f"differs between cases '{self.cases[0].name}' and '{odd.name}'"
             raise scenes.refused(odd, "equal_power_to", rule, "give all cases the same, or none")
         self._check_cylinders(scenes)
+        for case in self.cases:
+            self._measures(scenes.problem(Point(case, self.combinations()[0], self.metric)), case, scenes)
         return found
+
+    def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[str, Measure]:
+        """What each engine is ranked by beside the metric."""
+        scene, found = Scene(problem.engine, problem.points), {}
+        for name in self.further:
+            with scenes.named(case):
+                # an engine without weights has none to add up, and is no worse for it
+                is_mass = name in MEASURES and MEASURES[name][0].is_mass
+                own = Measure(*MEASURES[name]) if is_mass else scene.measure(name, QuantityTable(), "study.further")
+                found[name] = own
+        return found
+
+    def answer(self, point: Point, scenes: Scenes) -> Record:
+        """The proven optimum of one scene, and the same design in every further quantity."""
+        with scenes.blamed(point):
+            problem = scenes.problem(point)
+            return solved(problem, self._measures(problem, point.case, scenes))
 
     def _check_cylinders(self, scenes: Scenes) -> None:
         """Layouts are compared from one cylinder: else size would pass for layout."""
@@ -51,7 +83,21 @@ class LayoutComparison(SweptPart):
         """As of every sweep, with the size that engines are compared at."""
         power = self.cases[0].equal_power_to
         at = "equal cylinders" if power is None else f"the power of {power} cylinders"
-        return super().dataset(points, records).assign_attrs(at=at)
+        found = super().dataset(points, records).assign_attrs(at=at)
+        if not self.further:
+            return found
+        values = np.array([[record["further"][name] for name in self.further] for record in records], dtype=float)
+        told = {"long_name": "further quantity of the design decided, in quantity_unit"}
+        units = [MEASURES[name][0].unit for name in self.further]
+        return found.assign(further=(("point", "quantity"), values, told)).assign_coords(
+            quantity=self.further, quantity_unit=("quantity", units)
+        )
+
+    @staticmethod
+    def table(data: xr.Dataset) -> list[Text]:
+        """A row a point; then all of them ranked by the metric, with their places by every further quantity."""
+        found = by_point(data)
+        return [*found, *_ranking(data)] if "further" in data else found
 
     @staticmethod
     def picture(data: xr.Dataset) -> Picture:
@@ -64,3 +110,33 @@ class LayoutComparison(SweptPart):
             decided = (data["proof"].values != "as given").any()
             words = f"Every point: {claimed(data)}." if decided else "As given."
         return over_sweep(data, [], words)
+
+
+def _ranking(data: xr.Dataset) -> list[Text]:
+    """Best first; places among those that tell a quantity, those that differ by nothing on one place."""
+    best = data["objective"].values
+    columns = [(data.attrs["metric"], data["objective"].attrs["units"], best)]
+    for k, name in enumerate(data["quantity"].values.tolist()):
+        values = data["further"].values[:, k]
+        # what cancels leaves a rounding
+        near = _NOTHING * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+        columns.append((name, str(data["quantity_unit"].values[k]), np.where(np.abs(values) < near, 0.0, values)))
+    swept, rows = swept_names(data), []
+    scaled = [(name, *readable(unit), values, _places(values)) for name, unit, values in columns]
+    for k in sorted(range(len(best)), key=lambda k: (math.isnan(best[k]), best[k])):
+        row = [str(data["case"].values[k]), *(str(data[name].values[k]) for name in swept)]
+        rows.append(row + [_placed(factor * values[k], places[k]) for _, _, factor, values, places in scaled])
+    head = ["case", *swept, *(f"{name} [{unit}]" if unit else name for name, unit, _, _, _ in scaled)]
+    words = "Ranked by the first quantity; in parentheses the place by each. A dash: not told by that problem."
+    return [words, Rows(head, rows[:MOST_ROWS], len(rows))]
+
+
+def _places(values: np.ndarray) -> list[int]:
+    """From 1, of each value; 0 of what is not told."""
+    told = values[np.isfinite(values)]
+    near = _SAME * float(np.abs(told).max(initial=0.0))
+    return [1 + int((told < value - near).sum()) if math.isfinite(value) else 0 for value in values]
+
+
+def _placed(value: float, place: int) -> str:
+    return f"{number(value)} ({place})" if place else NOTHING
