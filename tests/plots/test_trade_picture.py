@@ -6,6 +6,7 @@ import math
 from itertools import combinations, pairwise
 from typing import Any, cast
 
+import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Annotation, Text
@@ -13,6 +14,7 @@ from matplotlib.text import Annotation, Text
 from cli import scenes
 from laufruhe.plots import trade
 from laufruhe.studies.trade import Row, Trade
+from picture_faults import faults_of
 
 ROWS = 16
 
@@ -41,6 +43,7 @@ def _trade(errors: list[float]) -> Trade:
 )
 def test_names_cover_neither_each_other_nor_the_panel(errors: list[float]) -> None:
     figure = trade.figure(_trade(errors))
+    assert faults_of(figure) == []
     axes = figure.axes[0]
     names = [text for text in axes.texts if isinstance(text, Annotation)]
     assert [name.get_text() for name in names] == [f"fidelity {k}, 720 steps" for k in range(len(errors))]
@@ -59,3 +62,15 @@ def test_names_stand_in_the_order_of_their_errors() -> None:
     figure = trade.figure(_trade(errors))
     heights = {error: text.xyann[1] for error, text in zip(errors, figure.axes[0].texts, strict=True)}
     assert all(heights[low] < heights[high] for low, high in pairwise(sorted(heights)))
+
+
+def test_dots_of_errors_too_small_to_tell_do_not_pile_up() -> None:
+    """They stand in a band under the axis, no two on each other."""
+    figure = trade.figure(_trade([0.0] * 12 + [1e-5, 1.0]))
+    axes = figure.axes[0]
+    dots = np.concatenate([np.asarray(found.get_offsets()) for found in axes.collections[:2]])
+    assert len(dots) == 14
+    pixels = axes.transData.transform(dots)
+    assert min(math.dist(one, other) for one, other in combinations(pixels, 2)) > 0.9 * trade.DOT * figure.dpi
+    assert sum(dots[:, 1] < trade.LEAST_ERROR) == 12
+    assert axes.get_ylim()[0] < dots[:, 1].min()

@@ -13,18 +13,24 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import NDArray
 
 from laufruhe.plots.style import Page, heading, page, styled
-from laufruhe.plots.words import FAINT, INK, spread
+from laufruhe.plots.words import FAINT, INK, SMALL, spread, typeset
 from laufruhe.studies.trade import Row, Trade
 
 Array = NDArray[np.float64]
 
 LEAST_ERROR, LEAST_REGRET = 1e-7, 1e-8
-PANEL, NAMES = (5.2, 4.4), 2.0
-"""Width and height of the panel, width of the names beside it [inch]."""
+PANEL, DOT = (5.4, 4.4), 0.13
+"""Width and height of the panel, and room of a dot [inch]."""
 NAME_HEIGHT = 0.036
 """Of a name, over the panel."""
 _FEW_DECADES = 30.0
-_PLAIN = FuncFormatter(lambda value, _: f"{value:g}")
+_PLAIN = FuncFormatter(lambda value, _: _power(value))
+
+
+def _power(value: float) -> str:
+    """A number of an axis; small ones as powers of ten."""
+    exponent = round(math.log10(value)) if value > 0.0 else 0
+    return typeset(f"10^{exponent}") if exponent < -3 and math.isclose(value, 10.0**exponent) else f"{value:g}"
 
 
 def has_picture(found: Trade) -> bool:
@@ -35,14 +41,15 @@ def has_picture(found: Trade) -> bool:
 @styled()
 def figure(found: Trade) -> Figure:
     """One panel: evaluation time of another design against error, the front joined."""
-    drawn = page(1, 1, (PANEL[0] + NAMES, PANEL[1]))
+    drawn = page(1, 1, PANEL)
     axes, rows = drawn.panels[0], found.rows
-    place = axes.get_position()
-    axes.set_position((place.x0, place.y0, PANEL[0] / (PANEL[0] + NAMES) * place.width, place.height))
     times = np.array([1e6 * row.evaluation for row in rows])
-    errors = np.array([max(row.error, LEAST_ERROR) for row in rows])
-    joined = [(1e6 * row.evaluation, max(row.error, LEAST_ERROR)) for row in _front(rows)]
-    axes.plot(*zip(*joined, strict=True), color=FAINT, lw=1.1, zorder=2)
+    axes.set(xscale="log", yscale="log", xlabel="time of another design [µs]", ylabel="relative error of the objective")
+    axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
+    errors = _places(axes, np.array([row.error for row in rows]), times)
+    front = _front(rows)
+    joined = sorted((times[k], errors[k]) for k, row in enumerate(rows) if row in front and row.error >= LEAST_ERROR)
+    axes.plot([time for time, _ in joined], [error for _, error in joined], color=FAINT, lw=1.1, zorder=2)
     decides = np.array([not math.isnan(row.regret) for row in rows])
     axes.scatter(times[~decides], errors[~decides], s=55, zorder=3, facecolors="white", edgecolors=INK, linewidths=0.8)
     regrets = [max(row.regret, LEAST_REGRET) for row in rows if not math.isnan(row.regret)]
@@ -50,24 +57,47 @@ def figure(found: Trade) -> Figure:
         times[decides], errors[decides], c=regrets, cmap="viridis_r", norm=LogNorm(LEAST_REGRET, 1.0), s=55, zorder=3,
         edgecolors=INK, linewidths=0.5,
     )  # fmt: skip
-    axes.set(xscale="log", yscale="log", xlabel="time of another design [µs]", ylabel="relative error of the objective")
-    axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
-    axes.set_ylim(0.5 * errors.min(), 2.0 * errors.max())
     if times.max() < _FEW_DECADES * times.min():
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(_PLAIN)
+    # the band under the axis has a name of its own
+    least = 1.01 * LEAST_ERROR if min(row.error for row in rows) < LEAST_ERROR else 0.0
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > least else ""))
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(_PLAIN)
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
     _name(axes, rows, times, errors)
     if regrets:
         _colour_bar(drawn, dots)
     hollow = "" if decides.all() else " Hollow: nothing decided."
     heading(
-        drawn.figure, "Speed against accuracy", found.problem.title, [],
-        f"Joined: beaten by none in both. At the edge: errors under {LEAST_ERROR:g}, regrets under "
-        f"{LEAST_REGRET:g}.{hollow} Computed with Laufruhe.",
+        drawn.figure, "Speed against accuracy", "Every fidelity: time of one evaluation against its error.", [],
+        f"Joined: beaten by none in both. Regrets under {_power(LEAST_REGRET)} are drawn as that.{hollow} "
+        "Computed with Laufruhe.", found.problem.title,
     )  # fmt: skip
     return drawn.figure
+
+
+def _places(axes: Axes, errors: Array, times: Array) -> Array:
+    """Errors as they are drawn: those too small to tell stand beside each other in a band under the axis."""
+    small = errors < LEAST_ERROR
+    wide, high = PANEL
+    low, end = np.log10(axes.get_xlim())
+    across = wide * (np.log10(times) - low) / (end - low)
+    levels = np.zeros(len(errors), dtype=int)
+    for j, k in enumerate(order := [k for k in np.argsort(times, kind="stable") if small[k]]):
+        taken = {levels[other] for other in order[:j] if across[k] - across[other] < DOT}
+        levels[k] = next(level for level in range(len(errors)) if level not in taken)
+    band = DOT * (levels.max(initial=0) + 1.5) if small.any() else 0.0
+    least = LEAST_ERROR if small.any() else 0.5 * errors.min()
+    top = 2.0 * max(errors.max(), 2.0 * least)
+    decades = (math.log10(top) - math.log10(least)) / max(high - band, 0.5 * high)
+    axes.set_ylim(least * 10.0 ** (-decades * band), top)
+    if small.any():
+        axes.axhspan(axes.get_ylim()[0], least, color="#f0f2f4", linewidth=0.0, zorder=0.4)
+        middle = math.sqrt(least * axes.get_ylim()[0])
+        axes.text(-0.02, middle, f"under {_power(least)}", transform=axes.get_yaxis_transform(), ha="right",
+                  va="center", color=FAINT, size=SMALL)  # fmt: skip
+    return np.where(small, least * 10.0 ** (-decades * DOT * (levels + 0.75)), errors)
 
 
 def _colour_bar(drawn: Page, dots: PathCollection) -> None:
@@ -75,7 +105,7 @@ def _colour_bar(drawn: Page, dots: PathCollection) -> None:
     place, high = drawn.panels[0].get_position(), drawn.figure.get_size_inches()[1]
     above = drawn.figure.add_axes((place.x0 + 0.3 * place.width, place.y1 + 0.3 / high, 0.7 * place.width, 0.1 / high))
     bar = drawn.figure.colorbar(dots, cax=above, orientation="horizontal", format=_PLAIN)
-    bar.ax.tick_params(labelsize=7, which="major")
+    bar.ax.tick_params(labelsize=SMALL, which="major")
     bar.ax.minorticks_off()
     bar.ax.text(-0.02, 0.5, "regret of its optimum", transform=bar.ax.transAxes, ha="right", va="center", fontsize=9)
 
@@ -96,7 +126,7 @@ def _name(axes: Axes, rows: tuple[Row, ...], times: Array, errors: Array) -> Non
     heights = (np.log10(errors) - low) / (high - low) - 1e-6 * np.argsort(np.argsort(times))
     for row, time, error, height in zip(rows, times, errors, spread(heights, NAME_HEIGHT), strict=True):
         axes.annotate(
-            row.name, (time, error), xytext=(1.03, height), textcoords="axes fraction", fontsize=7, va="center",
+            row.name, (time, error), xytext=(1.03, height), textcoords="axes fraction", fontsize=SMALL, va="center",
             ha="left", color=INK, annotation_clip=False, zorder=1,
             arrowprops={"arrowstyle": "-", "color": "#c4c4c4", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 3.0},
         )  # fmt: skip

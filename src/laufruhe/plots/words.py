@@ -150,7 +150,7 @@ def apart(texts: Sequence[Text], room: float = 1.15) -> None:
 
 def typeset(words: str) -> str:
     """Units as they are printed: m² for m^2, ° for degrees, µs for us."""
-    words = re.sub(r"\^(-?\d)", lambda found: found[1].translate(_RAISED), words)
+    words = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(_RAISED), words)
     return re.sub(r"\[(.*?)\]", lambda found: f"[{_UNITS.get(found[1], found[1])}]", words)
 
 
