@@ -17,6 +17,7 @@ WANTED = {
     ("solve", "tractor-four-lanchester"): {"bars": "tractor-four-lanchester-bars"},
     ("study", "tractor-study"): {name: f"tractor-study-{name}" for name in ("fig-10", "fig-22", "reciprocating-mass")},
     ("study", "torsion-pareto"): {"firing-order": "torsion-pareto"},
+    ("study", "bearing-pareto"): {"mount-force": "bearing-pareto"},
     ("trade", "tractor-four-lanchester"): {"tractor-four-lanchester": "tractor-four-lanchester-trade"},
 }
 

@@ -66,15 +66,17 @@ def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, 
     all_mounts = values[0].shape[1] - 1
     # that of all mounts stands apart from the others
     places = np.array([k - part[0] + (0.3 if k == all_mounts and len(part) > 1 else 0.0) for k in part])
+    # a bar this high holds a number
+    room = 0.18 * axes.figure.dpi / axes.bbox.height * factor * top
     for k, (table, one) in enumerate(zip(values, series, strict=True)):
         mean, most = factor * table[:, part]
         at = places + (k - 0.5 * (len(values) - 1)) * (WIDTH + 0.04)
         axes.bar(at, mean, WIDTH, color=one.colour, linewidth=0, label="mean")
         axes.bar(at, most, WIDTH, facecolor="none", edgecolor=one.colour, linewidth=1.4, label="maximum")
         for x, low, high in zip(at, mean, most, strict=True):
-            words, most_room = number(high, 3, factor * top), 0.09 * factor * top
+            words = number(high, 3, factor * top)
             axes.annotate(words, (x, high), (0, 2), textcoords="offset points", ha="center", size=SMALL, color=INK)
-            if low > most_room:
+            if low > room:
                 inside: Any = {"ha": "center", "va": "top", "size": SMALL, "color": ink_on(one.colour)}
                 axes.annotate(number(low, 3, factor * top), (x, low), (0, -2), textcoords="offset points", **inside)
     axes.set_xticks(places)

@@ -16,7 +16,7 @@ from laufruhe.studies.replication.models import AxisTable, BarsTable, CurveTable
 if TYPE_CHECKING:
     import xarray as xr
 
-GROUP, ABOVE, LEAST_INSIDE, LEAST_SHOWN = 0.84, 0.012, 0.07, 1e-6
+GROUP, ABOVE, LEAST_INSIDE, LEAST_SHOWN = 0.84, 0.012, 0.055, 1e-6
 DIGITS = 3
 BAR = 0.31
 """Least width of a bar and its number [inch]."""
@@ -40,7 +40,7 @@ def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) 
         panels,
         credit(data),
         # broken into rows, panels need less height each
-        size=(table.size[0], table.size[1] * (0.75 if len(panels) > whole else 1.0)),
+        size=(table.size[0], table.size[1] * (0.85 if len(panels) > whole else 1.0)),
         columns=table.columns,
         gap=table.gap,
     )
@@ -94,7 +94,8 @@ def _drawn_panel(panel: PanelTable, names: Names, reading: str) -> Panel:
     for curve in panel.curves:
         marks += _curves(curve, names)
     if panel.bars:
-        marks += _bars(panel.bars, names)
+        ends = _axis(panel.y, names).ends
+        marks += _bars(panel.bars, names, 0.0 if ends is None else max(ends))
     for words in panel.words:
         across, up = (number_of(at, names) for at in (words.x, words.y))
         marks.append(Words(across, up, filled(words.text, names), 9.0, words.colour, words.across, words.along))
@@ -134,7 +135,7 @@ def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
             yield Words(float(xs[-1]), float(ys[-1]), f" {filled(curve.end, own)}", 9.0, colour)
 
 
-def _bars(bars: BarsTable, names: Names) -> Iterator[Mark]:
+def _bars(bars: BarsTable, names: Names, end: float) -> Iterator[Mark]:
     """Filled bars, the outlines around them, and the numbers of both."""
     series = list(_each(bars.each, names))
     fills = [join(value_of(bars.filled, own)) for own in series]
@@ -149,7 +150,7 @@ def _bars(bars: BarsTable, names: Names) -> Iterator[Mark]:
             yield Bars(places, high, 0.9 * width, colour, hollow=True)
         for x, inner, outer in zip(places, low, high, strict=True):
             yield Words(x, outer + ABOVE * top, _number(outer, top, bars.number), 9.0, "ink", "center", "bottom")
-            if bars.outline and inner > LEAST_INSIDE * top:
+            if bars.outline and inner > LEAST_INSIDE * max(top, end):
                 number = _number(inner, top, bars.number)
                 yield Words(x, inner - ABOVE * top, number, 9.0, "ink", "center", "top", inside=colour)
 
