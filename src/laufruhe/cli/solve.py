@@ -94,7 +94,8 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         copy = json_file(request.json, [request.problem], places)
         open_numbers = len(problem.decisions)
         what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
-        say(f"deciding {what}" if open_numbers or problem.phasing is not None else "evaluating")
+        what = "which parts go where" if problem.assembly else what
+        say(f"deciding {what}" if open_numbers or problem.phasing is not None or problem.assembly else "evaluating")
         result = answer(problem, Watched(say, problem.objective_unit or ""))
         pictures: dict[str, str] = {}
         if request.kinds:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.budget import limited, passed
-from laufruhe.numerics.progress import Listener, listening
+from laufruhe.numerics.progress import Listener, listening, tell
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
@@ -309,6 +309,7 @@ def _decided(problem: Problem) -> Result:
         asked = ", ".join(dict.fromkeys(measure.name for measure in problem.measures))
         raise ModelError(f"no method decides {_named(kinds)} together for {asked}; fix one of them, or ask for less")
     # what is decided apart is asked once more, each part by itself
+    tell(method.name)
     conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F} else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})

@@ -21,6 +21,7 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.built_engines import BuiltEngines, values_of
 from laufruhe.machine import Engine
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.progress import tell
 from laufruhe.problem.assembly import Lot
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
@@ -59,9 +60,11 @@ def solve_assembly(problem: Problem) -> Result:
         raise ValueError("there are no parts to choose among")
     _check(problem)
     started = time.perf_counter()
+    tell("what every part adds")
     terms, lots = _terms(problem), assembly.lots
     search = _Search(terms, lots, len(problem.engine.slider_cranks), problem.tolerance)
     bound = search.run()
+    tell("the best assembly, and random ones", value=search.value, bound=bound)
     given = replace(problem, engine=assembled(problem.engine, lots, search.given))
     best = replace(problem, engine=assembled(problem.engine, lots, search.best))
     initial, final = evaluate(given), evaluate(best)
@@ -160,6 +163,7 @@ class _Search:
             if passed():
                 break
             under, _, node = heapq.heappop(queue)
+            tell("parts bounded", self.nodes, value=self.value, bound=under)
             lot, cylinder = next((at for at in self.order if node[at[0]][at[1]] < 0), (-1, -1))
             if lot < 0:
                 continue

@@ -88,8 +88,10 @@ class MountSearch:
         first: tuple[list[float], Array] | None = None,
     ) -> None:  # fmt: skip
         self.problem, self.moves, self._workers = problem, moves, workers
+        tell("starts of the mounts")
         self._points, self._size = start_points(problem)
         self._points = self._points if first is None else [first, *self._points[1:]]
+        tell("smooth program of all that is open")
         self.joint = SmoothProgram(problem, self._size, moves=moves)
         self._given = given_design(problem, initial) if moves is None else None
         self.best: Found | None = None

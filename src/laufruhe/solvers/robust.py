@@ -20,6 +20,7 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.load_models.built_engines import evaluated
 from laufruhe.numerics.budget import in_time
+from laufruhe.numerics.progress import tell, within
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -122,12 +123,14 @@ def solve_robust(problem: Problem, solve: Solve) -> Result:
         raise ValueError("nothing is asked of built engines")
     _check(problem)
     started = time.perf_counter()
-    drawing = solve(problem.changed(over=None))
+    with within("drawing"):
+        drawing = solve(problem.changed(over=None))
     acting = problem.tolerances.acting
     if (drawing.certificate is None and problem.decisions) or not acting.each:
         return replace(drawing, problem=problem)
     problem = replace(problem, tolerances=acting, fidelity=drawing.problem.fidelity)
     start = decided_values(problem, drawing)
+    tell("worst errors of the drawing")
     seeker, found = _found(problem, over, start, drawing)
     if found.conflict:
         return none_within(problem, evaluate(problem), found.conflict, {"solve": time.perf_counter() - started})
