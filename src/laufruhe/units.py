@@ -214,11 +214,12 @@ _SHOWN = {
 
 
 def readable(unit: str) -> tuple[str, float]:
-    """The unit that a report shows, and its factor on an SI value."""
-    return _SHOWN.get(unit, (unit, 1.0))
+    """The unit that a report shows, as it is printed, and its factor on an SI value."""
+    name, factor = _SHOWN.get(unit, (unit, 1.0))
+    return name.replace("^2", "²").replace("^3", "³"), factor
 
 
 def shown(value: float, unit: str, digits: int = 4) -> str:
-    """Value and unit as a report prints them: degrees, mm, rpm, N/mm."""
-    name, factor = readable(unit)
+    """Value and unit as a message tells them, and as they may be typed: degrees, mm, rpm, N/mm^2."""
+    name, factor = _SHOWN.get(unit, (unit, 1.0))
     return f"{value * factor:.{digits}g} {name}".rstrip()

@@ -90,7 +90,7 @@ def test_places_and_tables(result: Result, record: dict) -> None:
         "Critical speeds of the crankshaft as decided",
         "Barred speed ranges",
     } <= set(grids)
-    stress = grids["Shear stress of the crankshaft [N/mm^2]"]
+    stress = grids["Shear stress of the crankshaft [N/mm²]"]
     assert float(stress.rows[0][-1]) < 100.0
     assert "2.5, 5, 7.5, 10" in grids["Critical speeds of the crankshaft as decided"].note
 
