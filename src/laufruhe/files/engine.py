@@ -18,6 +18,7 @@ from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
 from laufruhe.machine.drives import DRIVES, Sizes
 from laufruhe.machine.facing import least_room, with_shared_chambers
 from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
+from laufruhe.machine.leads import led_parts
 from laufruhe.numerics.turns import as_turn, within
 
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
@@ -160,7 +161,7 @@ def layout_of(table: EngineTable) -> Layout:
 def _asked(table: EngineTable, gas: bool = False) -> Asked:
     """What [engine] says to its layout."""
     given = {key.name: table.own(key.name) for key in table.kind.keys}
-    masses = [key.name for key in table.kind.keys if key.kind == "open mass"]
+    masses = [key.name for key in table.kind.keys if key.kind in ("open mass", "open lead")]
     own = {
         name: value if not isinstance(value, Open) else value.start if name in masses else None
         for name, value in given.items()
@@ -282,7 +283,8 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
             raise Refused(f"{where}.name", shaft.name, "is the name of another shaft", "give each its own name")
         with blamed_on(where):
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
-    return tuple(_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks))
+    leads = {shaft.name: Open.of(shaft.lead).start for shaft in table.shafts}
+    return led_parts([_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks)], leads)
 
 
 def _sharing(table: EngineTable, part: SliderCrankTable) -> int:

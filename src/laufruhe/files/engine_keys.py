@@ -42,6 +42,7 @@ class ShaftTable(Table):
     name: Name
     ratio: f.Ratio = 1.0
     position: f.Pair[f.Length] = Field(description="Position of the axis: y to the left, z up.")
+    lead: f.OpenAngle = f.told("Crank angle by which all that it carries comes earlier.", 0.0)
 
 
 class SliderCrankTable(Table):
@@ -68,6 +69,7 @@ _KINDS: dict[str, Any] = {
     "non-negative length": f.NonNegativeLength,
     "angle": f.Angle,
     "open angle": f.OpenAngle,
+    "open lead": f.OpenAngle,
     "angles": list[f.Angle],
     "mass": f.Mass,
     "inertia": f.Inertia,

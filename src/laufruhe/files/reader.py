@@ -29,6 +29,7 @@ from laufruhe.files.flywheel import check_told_alike, flywheel_of
 from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.geared import geared_of
+from laufruhe.files.leads import leads_of
 from laufruhe.files.mounts import mounts_of, run_of
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
@@ -274,7 +275,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     if of_sizes and gear is not None and gear.density is not None:
         check_factors(file.counterweights, "counts masses that follow from sizes, which are open")
     check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))
-    loads = (*piston_masses(table, cylinders, file.counterweights), *collected.decisions, *of_geared)
+    loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)
     scene, decisions = Scene(engine, points), (*loads, *found.decisions, *of_wheel, *of_chain, *of_sizes)
     ranks = objectives_of(file.objective, scene, file.single)
     _check_decided(decisions, bool(ranks))

@@ -8,6 +8,7 @@ from enum import IntEnum
 from typing import Any, ClassVar, Protocol
 
 from laufruhe.machine import Engine, Mount, SliderCrank
+from laufruhe.machine.leads import led
 from laufruhe.machine.running_gear import Size
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.reduced_inertia import turned_by
@@ -40,6 +41,8 @@ class Kind(IntEnum):
     """Of the running gear: stresses fall with it, and masses follow (Z2)."""
     SHARE = 10
     """Of inertia on a geared shaft: the roll moment is affine in it while the masses of the pistons are held."""
+    LEAD = 11
+    """Of a geared shaft: every load of order h that it carries comes earlier by h times as much (P13)."""
 
 
 @dataclass
@@ -62,6 +65,8 @@ class Numbers:
         Changes of sizes of the running gear, by the same [m].
     shares
         Of geared inertias by name.
+    leads
+        Changes of the leads of shafts by name [rad].
     """
 
     unbalances: dict[str, Any] = field(default_factory=dict)
@@ -72,6 +77,7 @@ class Numbers:
     torsion: dict[tuple[str, str], Any] = field(default_factory=dict)
     sizes: dict[Size, Any] = field(default_factory=dict)
     shares: dict[str, Any] = field(default_factory=dict)
+    leads: dict[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
@@ -105,7 +111,8 @@ class Numbers:
             found = found.resized({size: own[size] + float(self.sizes.get(size, 0.0)) for size in own})
         if torsion is not None and (self.pistons or self.sizes):
             torsion = turned_by(torsion, given.slider_cranks, found.slider_cranks)
-        return replace(found, torsion=torsion)
+        found = replace(found, torsion=torsion)
+        return led(found, self.leads) if self.leads else found
 
     def _loaded(self, part: SliderCrank) -> SliderCrank:
         """With its masses changed."""
@@ -228,6 +235,19 @@ class SizeDrive:
     def move(self, numbers: Numbers, change: Any) -> None:
         """Of the size."""
         numbers.sizes[self.size] = numbers.sizes.get(self.size, 0.0) + change.real
+
+
+@dataclass(frozen=True)
+class LeadDrive:
+    """Lead of one shaft += change."""
+
+    shaft: str
+    kind: ClassVar[Kind] = Kind.LEAD
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Of the shaft."""
+        numbers.leads[self.shaft] = numbers.leads.get(self.shaft, 0.0) + float(change.real)
 
 
 @dataclass(frozen=True)

@@ -138,6 +138,18 @@ def _asks_flywheel(problem: Problem) -> bool:
     return all(measure.channel.is_flywheel for measure in problem.measures)
 
 
+def _leads(problem: Problem) -> Result:
+    from laufruhe.solvers.leads import solve_leads
+
+    return solve_leads(problem)
+
+
+def _asks_led(problem: Problem) -> bool:
+    """Whether all that is asked is of loads on block and mounts that come earlier with a shaft, and none of gas."""
+    loads = all(measure.is_load and not measure.is_inside for measure in problem.measures)
+    return loads and _adds_points(problem) and not problem.feels_gas and not problem.fidelity.is_uneven
+
+
 def _asks_places(problem: Problem) -> bool:
     """Whether no bearing that is asked about carries a shaft whose unbalances have open places."""
     carried = {bearing.shaft.name for bearing in problem.engine.bearings}
@@ -182,6 +194,7 @@ METHODS: tuple[Method, ...] = (
     Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
     Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, _torsion),
     Method("boxes of sizes", frozenset({Kind.SIZE}), _asks_sizes, Reach.WHOLE, _sizes),
+    Method("boxes of leads", frozenset({Kind.LEAD}), _asks_led, Reach.WHOLE, _leads),
     Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_sharply)),
     Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,

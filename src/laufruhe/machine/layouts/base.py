@@ -22,8 +22,8 @@ class Key:
     Attributes
     ----------
     kind
-        "length", "positive length", "non-negative length", "angle", "open angle", "angles", "cylinder", "sign",
-        "inertia", "ratio", "mass", "open mass", or "rod" of a mass, centre of gravity and inertia.
+        "length", "positive length", "non-negative length", "angle", "open angle", "open lead", "angles", "cylinder",
+        "sign", "inertia", "ratio", "mass", "open mass", or "rod" of a mass, centre of gravity and inertia.
     default
         Where it is left out.
     remedy

@@ -67,7 +67,7 @@ class OpposedPiston(Inline):
             "sign",
             "Speed ratio of the second crank of opposed pistons; -1 by default, against the first.",
         ),
-        Key("crank_lead", "angle", "Angle by which the pistons of the second crank of opposed pistons lead.", 0.0),
+        Key("crank_lead", "open lead", "Angle by which the pistons of the second crank of opposed pistons lead.", 0.0),
         Key(
             "second_reciprocating_mass",
             "open mass",

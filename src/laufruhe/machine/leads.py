@@ -1,0 +1,32 @@
+"""Shafts that are turned ahead of where they stand, with all that they carry (L10)."""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from laufruhe.machine.engine import Engine
+from laufruhe.machine.facing import with_shared_chambers
+from laufruhe.machine.slider_crank import SliderCrank
+
+
+def led_parts(parts: Sequence[SliderCrank], leads: Mapping[str, float]) -> tuple[SliderCrank, ...]:
+    """Slider-cranks whose shafts come some crank angles earlier [rad], by the names of the shafts."""
+    return tuple(_led(part, leads.get(part.shaft.name, 0.0)) for part in parts)
+
+
+def _led(part: SliderCrank, lead: float) -> SliderCrank:
+    if not lead:
+        return part
+    return replace(part, throw=part.throw + part.shaft.ratio * lead, firing_angle=part.firing_angle - lead)
+
+
+def led(engine: Engine, leads: Mapping[str, float]) -> Engine:
+    """An engine whose shafts come some crank angles earlier [rad]: every load on them does."""
+    parts = led_parts(engine.slider_cranks, leads)
+    if any(part.facing is not None for part in parts):
+        parts = with_shared_chambers([replace(part, facing=None) for part in parts], engine.cycle.angle)
+    turned = {shaft.name: cmath.exp(1j * shaft.ratio * leads.get(shaft.name, 0.0)) for shaft in engine.shafts}
+    rotors = tuple(replace(rotor, unbalance=rotor.unbalance * turned[rotor.shaft.name]) for rotor in engine.rotors)
+    return replace(engine, slider_cranks=parts, rotors=rotors)

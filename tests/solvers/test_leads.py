@@ -1,0 +1,112 @@
+"""Leads of geared shafts: against scans, against masses on their ways, and what is not decided with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import moving_masses as mm
+from laufruhe.errors import InputError, ModelError
+from laufruhe.files.reader import load
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+from laufruhe.solvers.result import Status
+from problem_files import PROBLEMS, changed, loaded
+
+THREE = (PROBLEMS / "geared-three-leads.toml").read_text(encoding="utf-8")
+RADIUS, ROD, PISTON, SPEED = 0.04, 0.16, 0.8, 1500.0 * np.pi / 30.0
+WEIGHT = '[[counterweights]]\nname = "w"\nx = "0 mm"\nunbalance = { between = ["0 kg m", "1 kg m"] }\n'
+FEW = changed(THREE, "[objective]", "[fidelity]\nsamples = 180\n[objective]")
+
+
+@pytest.mark.slow
+def test_the_ready_problem_is_proven_and_the_least_of_a_scan() -> None:
+    """Forces and roll of three pistons on a beam of two mounts, from their ways: no leads of a grid have less."""
+    result = solve(problem := load(PROBLEMS / "geared-three-leads.toml"))
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    steps = 48
+    up, turning = [], []
+    for ratio in (1.0, 1.0, -1.0):
+        pin = mm.crank_pin(RADIUS, 0.0, ratio)
+        path = mm.piston(pin, ROD, 0.0)
+        force = mm.force([mm.Mass(PISTON, 0.0, path)], SPEED).real
+        rate = mm.differentiated(path, times=1).real
+        up.append(force)
+        # the torque that the piston takes from the cranks, and the block from them
+        turning.append(force * rate)
+    places, shift = (0.0, 0.15, -0.15), mm.STEPS // steps // 2 * 2
+    least = np.inf
+    for j in range(0, mm.STEPS, shift):
+        for k in range(0, mm.STEPS, shift):
+            forces = [np.roll(signal, -by) for signal, by in zip(up, (0, j, k), strict=True)]
+            torque = sum(np.roll(signal, -by) for signal, by in zip(turning, (0, j, k), strict=True))
+            moment = torque + sum(y * force for y, force in zip(places, forces, strict=True))
+            left, right = (0.5 * sum(forces) + side * moment / 0.6 for side in (1.0, -1.0))
+            least = min(least, 0.5 * float(np.mean(np.abs(left)) + np.mean(np.abs(right))))
+    value = objective_value(problem, result.final)
+    assert value <= least * (1.0 + 1e-6)
+    assert least <= 1.05 * value
+    assert result.certificate.lower_bound <= value
+
+
+def test_forces_with_a_lead_are_those_of_the_masses(tmp_path: Path) -> None:
+    text = changed(THREE, "{ between = [0, 360], start = 0 }", "40")
+    text = changed(text, "{ between = [0, 360], start = 0 }", "-75")
+    wrench = evaluate(loaded(tmp_path, text)).loads[0].wrench.sample(mm.STEPS)
+    masses = []
+    for ratio, lead, centre in ((1.0, 0.0, 0j), (1.0, 40.0, 0.15j), (-1.0, -75.0, -0.15j)):
+        pin = mm.crank_pin(RADIUS, ratio * np.radians(lead), ratio, centre)
+        masses.append(mm.Mass(PISTON, 0.0, mm.piston(pin, ROD, 0.0, centre)))
+    one = PISTON * RADIUS * SPEED**2
+    np.testing.assert_allclose(wrench[:, 2] + 1j * wrench[:, 1], mm.force(masses, SPEED), atol=1e-6 * one)
+
+
+def test_two_that_turn_alike_are_best_half_a_turn_apart(tmp_path: Path) -> None:
+    """Of first order nothing is left, wherever the search starts; a limit is kept where it asks for less."""
+    text = changed(FEW, '[[engine.slider_cranks]]\nshaft = "right"\nx = "0 mm"\n', "")
+    text = changed(text, 'ratio = -1\nposition = ["-150 mm", "0 mm"]\nlead = { between = [0, 360], start = 0 }',
+                   'position = ["-150 mm", "0 mm"]')  # fmt: skip
+    text = changed(text, '"mean mount force"', '"rms shaking force"\norders = [1]')
+    result = solve(loaded(tmp_path, text))
+    assert result.status is Status.OPTIMAL
+    assert np.degrees(result.decisions[0].value) == pytest.approx(180.0, abs=1e-4)
+    narrow = solve(loaded(tmp_path, changed(text, "[0, 360], start = 0", "[10, 120]")))
+    assert narrow.status is Status.OPTIMAL
+    assert np.degrees(narrow.decisions[0].value) == pytest.approx(120.0, abs=1e-6)
+    one = PISTON * RADIUS * SPEED**2
+    assert narrow.objective is not None
+    assert narrow.objective.value == pytest.approx(2.0 * np.cos(np.pi / 3.0) * one / np.sqrt(2.0), rel=1e-5)
+
+
+def test_a_limit_holds_the_lead_away(tmp_path: Path) -> None:
+    """Of opposed pistons the least lead; with a roll moment limited to what another one has, that one."""
+    text = (PROBLEMS / "opposed-pistons-masses.toml").read_text(encoding="utf-8")
+    text = changed(text, '{ between = ["1 kg", "3 kg"] }', '"2 kg"')
+    text = changed(text, "crank_lead = 12", "crank_lead = { between = [8, 20] }")
+    text = changed(text, "[objective]", "[fidelity]\nsamples = 180\n[objective]")
+    result = solve(loaded(tmp_path, text))
+    assert result.status is Status.OPTIMAL
+    assert np.degrees(result.decisions[0].value) == pytest.approx(8.0, abs=1e-9)
+    at_twelve = evaluate(loaded(tmp_path, changed(text, "{ between = [8, 20] }", "12")))
+    limit = '[[constraints]]\nlimit = "rms roll moment"\nmax = "{:.9f} N m"\n[objective]'
+    measured = np.sqrt(np.mean(at_twelve.loads[0].wrench.sample(360)[:, 3] ** 2))
+    held = loaded(tmp_path, changed(text, "[objective]", limit.format(measured)))
+    found = solve(held)
+    assert found.final.value(held.limits[0].measure) <= measured * (1.0 + 2e-5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[objective]", WEIGHT + "[objective]", "no method decides unbalance and lead together"),
+        ('"mean mount force"', '"maximum crank-pin force"', "no method decides lead together"),
+    ],
+)  # fmt: skip
+def test_what_is_not_decided_with_leads_is_told(old: str, new: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises((InputError, ModelError)) as caught:
+        solve(loaded(tmp_path, changed(THREE, old, new)))
+    assert said in str(caught.value)
