@@ -21,6 +21,7 @@ from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.assembly import solve_assembly
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.in_order import solve_in_order
+from laufruhe.solvers.leads import solve_leads
 from laufruhe.solvers.places import solve_places
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.robust import solve_robust
@@ -138,12 +139,6 @@ def _asks_flywheel(problem: Problem) -> bool:
     return all(measure.channel.is_flywheel for measure in problem.measures)
 
 
-def _leads(problem: Problem) -> Result:
-    from laufruhe.solvers.leads import solve_leads
-
-    return solve_leads(problem)
-
-
 def _asks_led(problem: Problem) -> bool:
     """Whether all that is asked is of loads on block and mounts that come earlier with a shaft, and none of gas."""
     loads = all(measure.is_load and not measure.is_inside for measure in problem.measures)
@@ -194,7 +189,7 @@ METHODS: tuple[Method, ...] = (
     Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
     Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, _torsion),
     Method("boxes of sizes", frozenset({Kind.SIZE}), _asks_sizes, Reach.WHOLE, _sizes),
-    Method("boxes of leads", frozenset({Kind.LEAD}), _asks_led, Reach.WHOLE, _leads),
+    Method("boxes of leads", frozenset({Kind.LEAD}), _asks_led, Reach.WHOLE, solve_leads),
     Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_sharply)),
     Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,
