@@ -155,3 +155,12 @@ def test_what_knows_where_the_crank_stands_has_no_boxes() -> None:
     fixed = '[[counterweights]]\nname = "still"\nx = "50 mm"\nunbalance = "0.01 kg m"\nangle = 30\n'
     result = solve(_read(TWIN + MOUNTS + WEIGHTS + fixed + _objective("rms shaking force")))
     assert "boxes" not in result.certificate.method
+
+
+def test_weights_that_know_how_far_pins_are_apart_have_no_boxes() -> None:
+    """A share of what turns on offset pins is another weight at every offset: a bound from one would be false."""
+    share = '[[counterweights]]\nname = "share"\nbalance_factor = 0.5\n'
+    problem = _read(SPLIT + MOUNTS + share + _objective("rms shaking force"))
+    near, far = (abs(_at(problem, angle, False).engine.rotors[-1].unbalance) for angle in problem.phasing.split)
+    assert abs(near - far) > 1e-3
+    assert "boxes" not in solve(problem).certificate.method

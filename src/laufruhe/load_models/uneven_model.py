@@ -258,15 +258,16 @@ def rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
     """The throw that each rotor turns with: found by moving one throw at a time."""
     out = {}
     still = replace(candidate, firing_order=None, without_gas=True)
-    before = _rotor_states(phasing.realise(still))
+    before = rotor_states(phasing.realise(still))
     for k in range(len(candidate.throws)):
         throws = tuple(angle + (0.1 if j == k else 0.0) for j, angle in enumerate(candidate.throws))
-        after = _rotor_states(phasing.realise(replace(still, throws=throws)))
+        after = rotor_states(phasing.realise(replace(still, throws=throws)))
         out.update({name: k for name, state in after.items() if state != before[name]})
     return out
 
 
-def _rotor_states(problem: Problem) -> dict[str, tuple[complex, ...]]:
+def rotor_states(problem: Problem) -> dict[str, tuple[complex, ...]]:
+    """Unbalance of every rotor, and what open ones drive it with."""
     gains: dict[str, list[complex]] = {rotor.name: [] for rotor in problem.engine.rotors}
     for decision in problem.decisions:
         for drive in decision.rotor_drives:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.angle_waves import AngleWaves
-from laufruhe.load_models.uneven_model import rides_of
+from laufruhe.load_models.uneven_model import rides_of, rotor_states
 from laufruhe.machine.firing_windows import SLACK, FiringWindow
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
@@ -79,7 +79,13 @@ def _open_angle(problem: Problem, phasing: Phasing) -> _Open | None:
     if phasing.shafts.optional or not _turns_freely(phasing):
         return None
     (low, high), other = (phasing.bank, split[0]) if is_open[0] else (split, phasing.bank[0])
-    return _Open(is_open[0], low, high, other)
+    own = _Open(is_open[0], low, high, other)
+    # a share of what turns on offset pins knows how far they are apart
+    ends = [
+        phasing.realise(Candidate((0.0,), None, *own.geometry(angle), without_gas=True))
+        for angle in (low, 0.5 * (low + high), high)
+    ]
+    return own if all(rotor_states(end) == rotor_states(ends[0]) for end in ends) else None
 
 
 def _turns_freely(phasing: Phasing) -> bool:
