@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from laufruhe import load
+from laufruhe import InputError, load
 from laufruhe.files.catalogue import engines
 from laufruhe.files.drafts import draft_of_engine
 from laufruhe.units import DECIMAL_COMMA
@@ -68,3 +68,16 @@ def test_ready_problems_raise_none(path: object) -> None:
 @pytest.mark.parametrize(("text", "is_one"), [("1,25 kg", True), (",5", True), ("1,250,000 N", False), ("1.25", False)])
 def test_a_decimal_comma_is_known_from_a_list(text: str, is_one: bool) -> None:
     assert bool(DECIMAL_COMMA.match(text)) is is_one
+
+
+def test_a_number_without_quotes_is_told_from_other_toml() -> None:
+    for given, remedy in (("90 mm", 'in quotes, as in "90 mm"'), ('90 mm"', 'in quotes, as in "90 mm"'),
+                          ("0,28", "decimals follow a point, as in 0.28"), ("[90,", "correct it there")):  # fmt: skip
+        with pytest.raises(InputError) as caught:
+            load(SINGLE.replace('stroke = "90 mm"', f"stroke = {given}"))
+        assert str(caught.value).endswith(remedy)
+
+
+def test_a_choice_of_two_names_both() -> None:
+    with pytest.raises(InputError, match="use one of: two-stroke, four-stroke"):
+        load(SINGLE.replace("four-stroke", "4-stroke"))

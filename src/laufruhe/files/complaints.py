@@ -20,6 +20,8 @@ MOST_COMPLAINTS = 20
 """That a file gets at once."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _CLOSE = 0.6
+_FEW = 3
+_UNQUOTED = re.compile(r'[+-]?[\d.]+(?:[eE][+-]?\d+)? *[A-Za-z°%][^"=]*"?$')
 _RULES = {
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",
@@ -115,7 +117,9 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]]) -> Comp
         allowed = str(detail["ctx"].get("expected") or detail["ctx"].get("expected_tags"))
         value = detail["ctx"].get("tag", detail["input"])
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
-        return Complaint(where, short(value), "is not allowed", nearest(str(value), words))
+        # of two or three all are told: the nearest in letters need not be the one that is meant
+        remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)
+        return Complaint(where, short(value), "is not allowed", remedy)
     message = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "must")
     rule, _, remedy = _RULES.get(kind, message).partition("; ")
     return Complaint(where, short(detail["input"]), rule, remedy or "correct it")
@@ -136,6 +140,9 @@ def toml_remedy(content: bytes, error: tomllib.TOMLDecodeError) -> str:
     value = line.partition("=")[2].strip()
     if units.DECIMAL_COMMA.match(value):
         return f"decimals follow a point, as in {printed(value.replace(',', '.', 1), 40)}"
+    if _UNQUOTED.match(value):
+        text = value.strip('"')
+        return f'a number with its unit stands in quotes, as in "{printed(text, 40)}"'
     return "correct it there"
 
 

@@ -71,12 +71,12 @@ def why_star(result: Result) -> str:
     more = [text for ours, theirs, text in told if ours > theirs]
     if not told:
         return f"Star {k} has the same free forces and couples as star 1." if abs(gain) < UNFELT else ""
-    said = f"Star 1 beats star {k} by {trimmed(100.0 * gain, 3)} %." if gain >= UNFELT else f"Star {k} is as good."
-    said += f" Its throws leave a smaller {', '.join(less)}." if less and gain >= UNFELT else ""
-    said += (
-        f" {'It leaves' if less else 'Its throws leave'} a larger {', '.join(more)}." if more and gain >= UNFELT else ""
-    )
-    return said
+    if gain < UNFELT:
+        return f"Star {k} is as good."
+    said = f"Star 1 beats star {k} by {trimmed(100.0 * gain, 3)} %."
+    said += f" Its throws leave a smaller {' and '.join(less)}." if less else ""
+    lead = "It leaves" if less else "Its throws leave"
+    return said + (f" {lead} a larger {' and '.join(more)}." if more else "")
 
 
 def _told_apart(result: Result, best: RankedStar, rival: RankedStar) -> list[tuple[float, float, str]]:
