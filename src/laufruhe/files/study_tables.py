@@ -29,7 +29,12 @@ def _single(given: object) -> object:
     return given
 
 
+def _settled(given: object) -> object:
+    return [_single(each) for each in given] if isinstance(given, list) else _single(given)
+
+
 Value: TypeAlias = Annotated[bool | int | float | str, BeforeValidator(_single)]
+Setting: TypeAlias = Annotated[bool | int | float | str | list[bool | int | float | str], BeforeValidator(_settled)]
 End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
 
 
@@ -58,7 +63,9 @@ class CaseTable(Table):
 
     name: Name
     problem: str
-    set: dict[str, Value] = Field(default_factory=dict, description="Paths of the problem file and their new values.")
+    set: dict[str, Setting] = Field(
+        default_factory=dict, description="Paths of the problem file and their new values, or lists of these."
+    )
     without: list[str] = Field(
         default_factory=list, description="Tables that are left out, such as balancer_shafts or gas."
     )

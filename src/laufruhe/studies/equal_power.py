@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
+from laufruhe.machine.layouts import Layout
 from laufruhe.machine.similarity import EqualPowerScale, equal_power_scale
 from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.problem import Problem
@@ -25,9 +26,19 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
         raise ModelError("the rules of equal power do not cover a block and its springs; leave equal_power_to out")
     if len({(part.crank_radius, part.bore) for part in cylinders}) > 1:
         raise ModelError("cylinders differ in bore or stroke, so no one scale gives equal power; make them equal")
-    scale = equal_power_scale(len(cylinders), reference_cylinders)
+    scale, phasing = equal_power_scale(len(cylinders), reference_cylinders), problem.phasing
+    if phasing is not None:
+        # every star is that of the engine in its new size
+        realise, layout = phasing.realise, phasing.layout
+        phasing = replace(
+            phasing,
+            realise=lambda candidate: at_equal_power(realise(candidate), reference_cylinders),
+            layout=lambda bank, split: _layout(layout(bank, split), scale),
+        )
     return replace(
         problem,
+        origin=None,
+        phasing=phasing,
         engine=_engine(problem.engine, scale),
         points=tuple(replace(point, speed=point.speed * scale.speed) for point in problem.points),
         decisions=tuple(_decision(decision, scale) for decision in problem.decisions),
@@ -78,6 +89,11 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
             for mount in engine.mounts
         ),
     )
+
+
+def _layout(layout: Layout, scale: EqualPowerScale) -> Layout:
+    places, throws = (tuple(scale.length * x for x in of) for of in (layout.positions, layout.throw_positions))
+    return replace(layout, positions=places, throw_positions=throws)
 
 
 def _decision(decision: Decision, scale: EqualPowerScale) -> Decision:

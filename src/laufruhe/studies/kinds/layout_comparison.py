@@ -16,6 +16,7 @@ from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
 from laufruhe.studies.picture import Picture
+from laufruhe.studies.ranked import side_by_side
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import SweptPart, solved
 from laufruhe.studies.swept_shown import MOST_ROWS, bars, by_point, claimed, over_sweep, swept_names
@@ -104,6 +105,8 @@ class LayoutComparison(SweptPart):
         """Bars of every engine as given and at its optimum; lines where something is swept."""
         at = data.attrs["at"]
         words = f"Engines of {at}." if at == "equal cylinders" else f"At {at}."
+        if "further" in data and not swept_names(data):
+            return side_by_side(data, words)
         if not swept_names(data):
             return bars(data, data["case"].values, words)
         if len(set(data["case"].values.tolist())) == 1:

@@ -1,0 +1,96 @@
+"""Layouts at equal power, each decided, and ranked by several quantities."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import laufruhe
+from laufruhe.files.reader import load_tables
+from laufruhe.physics.bearing_loads import pin_forces
+from laufruhe.plots.picture import draw
+from laufruhe.problem.problem import Problem
+from laufruhe.studies.equal_power import at_equal_power
+from laufruhe.studies.kinds.layout_comparison import LayoutComparison
+from laufruhe.studies.scenes import Scenes
+from problem_files import PROBLEMS
+
+RANKED = ["mean mount force", "added mass", "maximum crank-pin force", "degree of irregularity"]
+FORCE = {"minimise": "mean mount force"}
+
+
+def tables(name: str) -> dict[str, Any]:
+    return tomllib.loads((PROBLEMS / f"compare-{name}.toml").read_text(encoding="utf-8"))
+
+
+def problem(name: str, cylinders: int, **more: Any) -> Problem:
+    told = tables(name)
+    told["engine"] |= {"cylinders": cylinders}
+    return load_tables({**told, **more}, Path(f"{name}.toml"))
+
+
+@pytest.mark.slow
+def test_an_open_crank_is_decided_in_its_new_size() -> None:
+    """Of similar engines forces go as one over the number of cylinders (eq. 23), whichever crank is best."""
+    drawn = problem("inline", 3, objective=FORCE)
+    rebuilt = at_equal_power(drawn, 4)
+    assert rebuilt.phasing is not None
+    found, scaled = laufruhe.solve(drawn), laufruhe.solve(rebuilt)
+    assert scaled.objective.value == pytest.approx(found.objective.value * 4.0 / 3.0, rel=2e-3)
+    small, large = (result.final.engine.slider_cranks for result in (found, scaled))
+    assert [part.x for part in large] == pytest.approx([part.x * (4.0 / 3.0) ** 0.5 for part in small])
+    assert large[0].bore == pytest.approx(0.1 * (4.0 / 3.0) ** 0.5)
+
+
+@pytest.fixture(scope="module")
+def data() -> xr.Dataset:
+    """Three engines of the ready study."""
+    told = tomllib.loads((PROBLEMS / "layouts-equal-power.toml").read_text(encoding="utf-8"))["study"]["parts"][0]
+    wanted = ("in line 6", "boxer 2", "radial 3")
+    told["cases"] = [case for case in told["cases"] if case["name"] in wanted]
+    part, scenes = LayoutComparison.model_validate(told), Scenes(PROBLEMS)
+    points = part.points(scenes)
+    return part.dataset(points, [part.answer(point, scenes) for point in points])
+
+
+@pytest.mark.slow
+def test_engines_are_ranked_by_what_their_designs_do(data: xr.Dataset) -> None:
+    """Numbers anew from the problem files; the least is first, and what is not modelled has no rank."""
+    assert data["proof"].values.tolist() == ["global"] * 3
+    assert data["quantity"].values.tolist() == RANKED
+    boxer = at_equal_power(load_tables({**tables("boxer"), "engine": {
+        **tables("boxer")["engine"], "cylinders": 2, "firing_order": [1, 2]}}, Path("b.toml")), 4)  # fmt: skip
+    result = laufruhe.solve(boxer)
+    forces = pin_forces(result.final.engine, boxer.points[0]).sample(20000)
+    row = data["further"].values[data["case"].values.tolist().index("boxer 2")]
+    assert row[2] == pytest.approx(np.linalg.norm(forces, axis=-1).max(), rel=1e-3)
+    masses = sum(abs(r.unbalance) / r.radius for r in result.final.engine.rotors if r.radius)
+    assert row[1] == pytest.approx(masses, rel=1e-2)
+    assert row[0] + row[1] == pytest.approx(result.objective.value, rel=1e-6)
+    assert np.isnan(data["further"].values[data["case"].values.tolist().index("radial 3"), 2])
+
+
+@pytest.mark.slow
+def test_the_page_has_a_row_and_the_picture_a_panel_for_each(data: xr.Dataset) -> None:
+    *_, rows = LayoutComparison.table(data)
+    assert [row[0] for row in rows.rows] == ["in line 6", "boxer 2", "radial 3"]
+    assert [row[2].split()[-1] for row in rows.rows] == ["(1)", "(2)", "(3)"]
+    figure = draw(LayoutComparison.picture(data))
+    assert [axes.get_title(loc="left").split("\n")[0] for axes in figure.axes[:4]] == RANKED
+
+
+def test_the_ready_study_has_every_layout_from_one_to_twelve_cylinders() -> None:
+    told = tomllib.loads((PROBLEMS / "layouts-equal-power.toml").read_text(encoding="utf-8"))["study"]["parts"][0]
+    part, scenes = LayoutComparison.model_validate(told), Scenes(PROBLEMS)
+    engines = [scenes.problem(point).engine for point in part.points(scenes)]
+    assert len(engines) == 33
+    assert {case.equal_power_to for case in part.cases} == {4}
+    assert part.further == RANKED
+    power = [sum(p.piston_area * p.crank_radius for p in e.slider_cranks) for e in engines]
+    speeds = [scenes.problem(point).points[0].speed for point in part.points(scenes)]
+    assert np.array(power) * np.array(speeds) == pytest.approx(power[3] * speeds[3])
