@@ -102,7 +102,9 @@ def _pale(figure: Figure, texts: list[Text]) -> Iterator[str]:
         rows = slice(max(len(pixels) - math.ceil(box.y1), 0), max(len(pixels) - math.floor(box.y0), 1))
         under = pixels[rows, max(math.floor(box.x0), 0) : math.ceil(box.x1)].reshape(-1, 3)
         if len(under):
-            seen = contrast(to_hex(text.get_color()), to_hex(np.median(under, axis=0) / 255.0))
+            box_of_its_own = text.get_bbox_patch()
+            behind = np.median(under, axis=0) / 255.0 if box_of_its_own is None else box_of_its_own.get_facecolor()[:3]
+            seen = contrast(to_hex(text.get_color()), to_hex(tuple(behind)))
             if seen < READ:
                 yield f"contrast {seen:.1f}: {text.get_text()!r}"
     figure.set_dpi(DPI)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -174,7 +174,7 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
     """From the left, z up, or from above, y down: the front of the engine at the left."""
     bore = bore_of(scene.engine)
     poses = [Pose.of(part, phi) for part in scene.engine.slider_cranks]
-    quarter = 0.5 * math.pi if scene.is_flat else 0.0
+    quarter, pistons = 0.5 * math.pi if scene.is_flat else 0.0, list[tuple[Pose, float]]()
 
     def level(place: complex) -> float:
         return MM * (place.imag if scene.is_flat else place.real)
@@ -202,7 +202,8 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
             box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, facecolor=METAL)
             high = MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
             box(axes, (x - 0.48 * bore, x + 0.48 * bore), (piston - 0.5 * high, piston + 0.5 * high), 5.0, **PISTON)
-        _number(axes, pose, piston, quarter, bore)
+        pistons.append((pose, piston))
+    _numbers(axes, pistons, quarter, bore)
     for rotor in scene.weights:
         low, high = heights_of(half_disc(abs(rotor.unbalance)), direction(rotor, phi) - quarter)
         middle = level(complex(rotor.shaft.z, rotor.shaft.y))
@@ -214,15 +215,25 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
     axes.set(xlabel="x [mm], the front at the left", ylabel="y [mm]" if scene.is_flat else "z [mm]")
 
 
-def _number(axes: Axes, pose: Pose, up: float, quarter: float, bore: float) -> None:
-    """Of a cylinder, on its piston, where the piston is large enough for it."""
-    number = next((word for word in pose.part.name.split() if word.isdecimal()), "")
-    # pistons of two banks may stand behind each other
-    lean = float(np.sign(round(math.sin(pose.part.bank - quarter), 9)))
-    inches = 0.96 * MM * bore / abs(np.ptp(axes.get_xlim())) * axes.bbox.width / axes.figure.dpi
-    if width_of(number) < (0.45 if lean else 0.9) * inches:
+def _numbers(axes: Axes, pistons: Sequence[tuple[Pose, float]], quarter: float, bore: float) -> None:
+    """Of the cylinders, on their pistons, where these are large enough; those of one place together."""
+    inch = abs(float(np.ptp(axes.get_xlim()))) * axes.figure.dpi / axes.bbox.width
+    found: list[tuple[float, float, list[str]]] = []
+    for pose, up in pistons:
+        number = next((word for word in pose.part.name.split() if word.isdecimal()), "")
+        # pistons of two banks may stand behind each other
+        lean = float(np.sign(round(math.sin(pose.part.bank - quarter), 9)))
+        if not number or width_of(number) > (0.45 if lean else 0.9) * 0.96 * MM * bore / inch:
+            continue
         place = MM * (pose.part.x - 0.25 * bore * lean)
-        axes.text(place, up, number, ha="center", va="center_baseline", size=SMALL, zorder=6.0)
+        near = (names for x, z, names in found if max(abs(x - place), abs(z - up)) < 0.16 * inch)
+        if (names := next(near, None)) is None:
+            found.append((place, up, [number]))
+        elif number not in names and width_of(", ".join([*names, number])) < 0.9 * MM * bore / inch:
+            names.append(number)
+    behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.0}
+    for place, up, names in found:
+        axes.text(place, up, ", ".join(names), ha="center", va="center_baseline", size=SMALL, zorder=6.0, bbox=behind)
 
 
 def reaches(scene: Scene) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
