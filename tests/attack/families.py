@@ -18,7 +18,8 @@ from attack.star_list import even_stars
 Generator = np.random.Generator
 LOADS = ("mount force", "shaking force", "rocking couple", "roll moment")
 NORMS = ("mean", "maximum", "rms", "peak to peak")
-UNITS = {"mount force": "N", "shaking force": "N", "rocking couple": "N m", "roll moment": "N m", "mount travel": "m"}
+UNITS = {"mount force": "N", "shaking force": "N", "rocking couple": "N m", "roll moment": "N m", "mount travel": "m",
+         "main-bearing force": "N"}  # fmt: skip
 
 
 def q(value: float, unit: str, digits: int = 6) -> str:
@@ -376,6 +377,39 @@ def with_chambers(rng: Generator) -> Table:
     return {**table, "gas": {"model": "chambers", "chambers": chambers}}
 
 
+def crankcase(rng: Generator) -> Table:
+    """Weights against main bearings; torque, stored work, twist and irregularity beside them, as limits that hold."""
+    engine = {k: v for k, v in gas_engine(rng).items() if k != "rod_inertia_deficit"}
+    size, count, apart = moving_mass(engine), len(engine["throws"]), float(engine["cylinder_spacing"].split()[0])
+    table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
+    if rng.random() < 0.6:
+        table["gas"] = {
+            "model": "seiliger", "peak_pressure": q(rng.uniform(55, 85), "bar"), "imep": q(rng.uniform(6.5, 10), "bar"),
+        }  # fmt: skip
+    places = [(0.5 * count - k) * apart + rng.uniform(-0.2, 0.2) * apart for k in range(count + 1)]
+    table["main_bearings"] = [{"x": q(x, "m")} for x in places]
+    table["counterweights"] = counterweights(rng, size, int(rng.integers(1, 4)))
+    inertia = q(rng.uniform(10.0, 40.0) * size, "kg m^2")
+    twists = count > 1 and rng.random() < 0.5
+    if twists:
+        table["torsion"] = {
+            "throw_inertia": q(rng.uniform(0.2, 1.0) * size * 0.1, "kg m^2"), "cylinder_damping": "2.0 N m s/rad",
+            "loss_factor": 0.02, "crank": {"stiffness": q(rng.uniform(2e5, 1e6), "N m/rad")},
+            "discs": [{"name": "flywheel", "end": "rear", "inertia": inertia,
+                       "shaft": {"stiffness": q(rng.uniform(2e5, 1e6), "N m/rad")}}],
+        }  # fmt: skip
+    else:
+        table["flywheel"] = {"inertia": inertia}
+    # numbers come last, as results list them
+    kinds = (
+        ("rms crank torque", "1e6 N m"), ("peak to peak stored work", "1e7 J"), ("maximum crank-pin force", "1e8 N"),
+        *([("rms shaft twist", "1.0 rad")] if twists else []), ("degree of irregularity", 1.9),
+    )  # fmt: skip
+    chosen = [kinds[k] for k in sorted(rng.choice(len(kinds), 2, replace=False))]
+    table["constraints"] = [{"limit": name, "max": most, "name": name} for name, most in chosen]
+    return with_objective(rng, table, channels=("main-bearing force", "mount force"))
+
+
 def star_of(engine: Table, count: int) -> Table:
     found = {k: v for k, v in engine.items() if k not in ("throws", "offset", "bank_stagger", "split_pin_angle")}
     return {**found, "throws": "open", "firing_order": "open", "cylinders": count}
@@ -605,6 +639,7 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "parts": of_unbalances(parts),
     "points": of_unbalances(inline, 5),
     "gas": with_gas,
+    "crankcase": crankcase,
     "yokes": of_unbalances(yoke),
     "chambers": with_chambers,
     "stars": stars,

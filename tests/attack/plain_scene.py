@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from attack import plain_loads, plain_mounts
+from attack import plain_crankcase, plain_loads, plain_mounts
 from attack.plain_loads import SAMPLES, number
 
 Table = dict[str, Any]
@@ -185,6 +185,8 @@ class Scene:
     def signal(self, asked: Table) -> np.ndarray:
         """(points, places, samples, d) of a load that is asked for."""
         _, channel = norm_and_channel(asked["quantity"])
+        if channel in plain_crankcase.CHANNELS:
+            return plain_crankcase.signal(self, _machine(self._key, self.order), channel, asked.get("orders"))
         found = [plain_mounts.over_cycle(c) for c in self.coefficients(channel, asked.get("orders"))]
         signal = np.stack(found).transpose(0, 2, 1, 3)
         if channel in ON_BLOCK:
@@ -205,6 +207,8 @@ class Scene:
             return norm_of(norm, self.signal(asked), self.weights(asked))
         if channel.endswith("mass"):
             return self.mass(channel)
+        if channel == "degree of irregularity":
+            return plain_crankcase.irregularity(self, _machine(self._key, self.order), self.weights(asked))
         block = self.mounting
         assert isinstance(block, plain_mounts.Elastic), channel
         if channel == "transmissibility":

@@ -17,8 +17,10 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.willans import mean_pressure, motoring_friction, willans_friction
+from laufruhe.plots.results import willans
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
+from picture_faults import faults_of
 from problem_files import PROBLEMS, changed, loaded
 
 LOADS = np.array([1.0, 3.0, 5.0, 8.0, 11.0]) * 1e5
@@ -218,3 +220,24 @@ def test_a_limit_on_the_worst_mean_is_one_on_every_point(tmp_path: Path) -> None
     assert joint.objective.value == pytest.approx(apart.objective.value, rel=2e-4)
     prices = sum(limit.shadow_price for limit in apart.limits)
     assert joint.limits[0].shadow_price == pytest.approx(prices, rel=1e-2)
+
+
+def test_the_line_is_drawn_down_to_no_fuel(tmp_path: Path) -> None:
+    """Of a fuel table and of motoring: readings, line, friction with its deviations; nothing where it is only told."""
+    (tmp_path / "fuel.csv").write_text(
+        "speed,load,fuel\n" + "\n".join(f"1750,{load},{fuel}" for load, fuel in zip(LOADS * 1e-5, FUEL, strict=True))
+    )
+    (tmp_path / "drag.csv").write_text("speed,drag\n1000,1.5\n1750,2.1\n2500,2.6\n3000,3.1\n")
+    own = '[friction]\nfile = "fuel.csv"\n'
+    fuelled = '[friction]\nfile = "fuel.csv"\nload_unit = "bar"\n'
+    motored = '[friction]\nfile = "drag.csv"\nkind = "motoring"\nload_unit = "bar"\n'
+    for told in (fuelled, motored):
+        result = laufruhe.evaluate(loaded(tmp_path, changed(BRAKE, own, told)))
+        (test,) = result.problem.friction
+        intercept, slope = test.line
+        at = test.asked if test.is_motored else -test.friction.mean
+        assert intercept + slope * at == pytest.approx(test.friction.mean if test.is_motored else 0.0, abs=1e-9)
+        assert willans.applies(result)
+        drawn = willans.figure(result)
+        assert faults_of(drawn, result.problem.title) == []
+    assert not willans.applies(laufruhe.evaluate(loaded(tmp_path, changed(BRAKE, own, '[friction]\nfmep = "2 bar"\n'))))

@@ -13,7 +13,7 @@ from laufruhe.files.complaints import Refused, measured, one_of
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Table
 from laufruhe.machine import Cycle
-from laufruhe.physics.willans import FEWEST, Friction, mean_pressure, motoring_friction, willans_friction
+from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
 
 SAME_SPEED = 0.01
 """Share of a speed within which rows of a fuel table belong to it."""
@@ -42,6 +42,8 @@ class Brake:
         Of the engine [m3].
     said
         Of every load asked so far, for the reader of a report.
+    tests
+        Readings behind these, where there are any.
     """
 
     def __init__(self, table: FrictionTable, folder: Path, displacement: float, cycle: Cycle) -> None:
@@ -50,6 +52,7 @@ class Brake:
         if table.file is not None and table.deviation is not None:
             raise Refused("friction.deviation", None, "follows from the file", "leave it out")
         self.said: list[str] = []
+        self.tests: list[FrictionTest] = []
         self._rows = [] if table.file is None else self._read(table.file, folder)
 
     def _read(self, file: str, folder: Path) -> list[tuple[float, ...]]:
@@ -86,15 +89,26 @@ class Brake:
             f"Indicated mean pressure at {where} {middle} bar, {least} to {most} bar: {1e-5 * brake:.4g} bar at the "
             f"brake and {loss} bar of friction, {self.table.deviations:g} deviations of {off} bar to either side."
         )
+        if self._rows:
+            is_motored = self.table.kind == "motoring"
+            x, y = zip(*(row[:2] if is_motored else row[1:] for row in self._at(speed)), strict=True)
+            asked = speed if is_motored else brake
+            self.tests.append(FrictionTest(where, is_motored, x, y, asked, friction, self.table.deviations))
         return found
+
+    def _at(self, speed: float) -> list[tuple[float, ...]]:
+        """Readings that tell the friction at a speed."""
+        if self.table.kind == "motoring":
+            return self._rows
+        return [row for row in self._rows if math.isclose(row[0], speed, rel_tol=SAME_SPEED)]
 
     def _friction(self, speed: float, where: str) -> Friction:
         if self.table.fmep is not None:
             return Friction(self.table.fmep, self.table.deviation or 0.0)
         try:
+            own = self._at(speed)
             if self.table.kind == "motoring":
-                return motoring_friction([row[0] for row in self._rows], [row[1] for row in self._rows], speed)
-            own = [row for row in self._rows if math.isclose(row[0], speed, rel_tol=SAME_SPEED)]
+                return motoring_friction([row[0] for row in own], [row[1] for row in own], speed)
             if len(own) < FEWEST:
                 rule = f"has {len(own)} points at {units.shown(speed, 'rad/s')} of {where}, and a line takes {FEWEST}"
                 raise Refused("friction.file", self.table.file, rule, "measure more loads at that speed")

@@ -35,6 +35,39 @@ class Friction:
 
 
 @dataclass(frozen=True)
+class FrictionTest:
+    """What was measured, and the load at the brake that it makes an indicated one of.
+
+    Attributes
+    ----------
+    at
+        Name of the operating point.
+    is_motored
+        Whether drag was measured over speed [Pa, rad/s]; else fuel, in any unit, over brake mean pressure [Pa].
+    x, y
+        Of every reading.
+    asked
+        Speed [rad/s], or brake mean pressure [Pa], that is asked for.
+    friction, deviations
+        Told by the line, and how many deviations are looked at to either side.
+    """
+
+    at: str
+    is_motored: bool
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    asked: float
+    friction: Friction
+    deviations: float
+
+    @property
+    def line(self) -> tuple[float, float]:
+        """Intercept and slope of y over x."""
+        found = _line(self.x, self.y, "reading")
+        return found.intercept, found.slope
+
+
+@dataclass(frozen=True)
 class _Line:
     """y = a + b x, and the covariances of a and b."""
 

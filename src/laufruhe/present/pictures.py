@@ -9,6 +9,7 @@ PICTURES = {
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
     "indicator": "Indicator diagrams of steam cylinders and pumps, and the force on each rod over its stroke.",
+    "willans": "Fuel over the load at the brake, or drag over speed, and the line that tells the friction.",
     "torque": "Torque of gas, pistons and rods, its work and its orders, and the speed that a flywheel makes of it.",
     "chambers": "Volume, pressure and torque of each chamber of a rotor over three turns of the shaft.",
     "bearings": "Force on each main bearing over a cycle, as block and crankshaft feel it, and where they wear.",

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import Complaint, ModelError, wrong_call
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.willans import FrictionTest
 from laufruhe.problem.assembly import Assembly
 from laufruhe.problem.decision import Decision, Kind, Numbers, moved_numbers
 from laufruhe.problem.measure import Limit, Measure, Rank, Term
@@ -110,6 +111,8 @@ class Problem:
         The file that it was read from; None where it was made or changed in code.
     fires_together
         Whether cylinders are meant to fire at once.
+    friction
+        Measurements that loads at the brake are made indicated ones by.
     known_rows
         Of measures in time, whose largest length is convex in what loads are affine in.
     """
@@ -135,6 +138,7 @@ class Problem:
     sharply: bool = False
     ranks: tuple[Rank, ...] = ()
     fires_together: bool = False
+    friction: tuple[FrictionTest, ...] = ()
     known_rows: Mapping[Measure, KnownRows] = field(default_factory=dict, compare=False, repr=False)
 
     def __repr__(self) -> str:

@@ -1,0 +1,67 @@
+"""What was measured of the friction: fuel over load with its Willans line, or drag over speed (W2, W3)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from laufruhe.physics.willans import FrictionTest
+from laufruhe.plots.style import AFTER, SKY, entry, entry_of_dots, headed, page, styled
+from laufruhe.plots.words import INK
+from laufruhe.solvers.result import Result
+
+BAR, RPM = 1e-5, 30.0 / math.pi
+MOST = 4
+
+
+def applies(result: Result) -> bool:
+    """Where readings stand behind a load."""
+    return bool(result.problem.friction)
+
+
+@styled()
+def figure(result: Result) -> Figure:
+    """A panel for each operating point."""
+    tests = result.problem.friction[:MOST]
+    drawn = page(len(tests), 1, (6.4, 2.3), gap=0.75)
+    for axes, test in zip(drawn.panels, tests, strict=True):
+        (_motored if test.is_motored else _fuelled)(axes, test)
+    legend = [
+        entry_of_dots("measured", color=INK), entry("least squares", color=SKY),
+        entry("friction, and its deviations", color=AFTER),
+    ]  # fmt: skip
+    shown = "; ".join(
+        f"at {test.at} {BAR * test.friction.mean:.3g} bar, deviation {BAR * test.friction.deviation:.2g}"
+        for test in tests
+    )
+    return headed(drawn, result, "Friction by measurement", f"Friction mean pressure {shown}.", legend)
+
+
+def _fuelled(axes: Axes, test: FrictionTest) -> None:
+    """Fuel over brake mean pressure: the line meets no fuel at the friction."""
+    (intercept, slope), friction = test.line, test.friction
+    x, y = BAR * np.array(test.x), np.array(test.y)
+    ends = np.array([-friction.mean, max(*test.x, test.asked)])
+    axes.plot(BAR * ends, intercept + slope * ends, color=SKY, linewidth=1.6)
+    axes.plot(x, y, "o", color=INK, markersize=5.0)
+    room = BAR * test.deviations * friction.deviation
+    axes.errorbar(-BAR * friction.mean, 0.0, xerr=room, color=AFTER, capsize=4.0, linewidth=1.8)
+    axes.plot(BAR * test.asked, intercept + slope * test.asked, "D", color=AFTER, markersize=6.0)
+    axes.axhline(0.0, color=INK, linewidth=0.8)
+    axes.margins(0.06)
+    axes.set(xlabel=f"brake mean pressure at {test.at} [bar]", ylabel="fuel, as measured")
+
+
+def _motored(axes: Axes, test: FrictionTest) -> None:
+    """Drag over speed, and what it is at the speed asked."""
+    (intercept, slope), friction = test.line, test.friction
+    ends = np.array([min(*test.x, test.asked), max(*test.x, test.asked)])
+    axes.plot(RPM * ends, BAR * (intercept + slope * ends), color=SKY, linewidth=1.6)
+    axes.plot(RPM * np.array(test.x), BAR * np.array(test.y), "o", color=INK, markersize=5.0)
+    room = BAR * test.deviations * friction.deviation
+    axes.errorbar(RPM * test.asked, BAR * friction.mean, yerr=room, color=AFTER, capsize=4.0, linewidth=1.8, marker="D")
+    axes.margins(0.06)
+    axes.set(xlabel=f"speed, asked for at {test.at} [rpm]", ylabel="drag [bar]")

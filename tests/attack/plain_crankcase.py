@@ -1,0 +1,178 @@
+"""What happens inside the crankcase of an in-line engine, from positions and the law of the lever alone.
+
+A rod without a moment of its own pushes along itself; bearings beside a load share it as supports of a beam on two of
+them do; torque is work per angle; speed follows from energy; discs on shafts answer order by order.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from attack.plain_loads import (
+    ATMOSPHERE,
+    FINE,
+    LAST_ORDER,
+    SAMPLES,
+    Machine,
+    Mechanism,
+    angles,
+    number,
+    piston,
+    rod_end,
+    seiliger,
+    slope,
+)
+
+FORCES = ("main-bearing force", "crank-pin force")
+OF_SHAFT = ("crank torque", "stored work", "shaft twist")
+CHANNELS = (*FORCES, *OF_SHAFT)
+
+
+def signal(scene: Any, machine: Machine, channel: str, orders: list[float] | None) -> np.ndarray:
+    """(points, places, samples, d) at every operating point, of some orders alone where they are named."""
+    whole = np.stack([_at(scene, machine, channel, k) for k in range(len(scene.points))])
+    if orders is None:
+        return whole
+    parts, multiples = np.fft.rfft(whole, axis=2), np.arange(SAMPLES // 2 + 1) / machine.turns
+    parts[:, :, ~np.isin(multiples, orders)] = 0.0
+    return np.fft.irfft(parts, SAMPLES, axis=2)
+
+
+def irregularity(scene: Any, machine: Machine, weights: np.ndarray) -> float:
+    """The most of all points that count."""
+    if "flywheel" in scene.table:
+        own = number(scene.table["flywheel"]["inertia"])
+    else:
+        told = scene.table["torsion"]
+        own = number(told["discs"][0]["inertia"])
+        own += sum(number(told["throw_inertia"]) + m.pin_mass * m.radius**2 for m in machine.mechanisms)
+    return max(_uneven(scene, machine, k, own) for k in range(len(scene.points)) if weights[k] > 0.0)
+
+
+def _at(scene: Any, machine: Machine, channel: str, k: int) -> np.ndarray:
+    speed, gas = scene.speeds[k], _gas(scene, k)
+    if channel in FORCES:
+        pins = np.array([_on_pin(m, machine.turns, speed, gas) for m in machine.mechanisms])
+        found = pins if channel == "crank-pin force" else _on_bearings(scene, machine, pins, speed)
+        return np.stack([found.imag, found.real], axis=-1)
+    torques = [_torque(m, machine.turns, speed, gas) for m in machine.mechanisms]
+    if channel == "shaft twist":
+        return _twist(scene, machine, torques, speed)
+    total = np.sum(torques, axis=0)
+    found = total if channel == "crank torque" else _integral(total - total.mean(), machine.turns)
+    return found[None, :, None]
+
+
+def _gas(scene: Any, k: int) -> dict[str, Any] | None:
+    point = scene.points[k]
+    if "gas" not in scene.table or not point.get("gas", True):
+        return None
+    return {**scene.table["gas"], **({"imep": point["imep"]} if "imep" in point else {})}
+
+
+def _moving(m: Mechanism, turns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places of crank pin and piston over the crank angle."""
+    base = rod_end(m, angles(turns))
+    return base, piston(base, m.rod, m.bank, m.offset)[1]
+
+
+def _pressing(m: Mechanism, turns: int, gas: dict[str, Any] | None) -> np.ndarray:
+    """Force of the gas on the piston, along its axis from the crank."""
+    if gas is None or m.fires is None:
+        return np.zeros(SAMPLES)
+    over = seiliger(gas, m, turns) - number(gas.get("crankcase_pressure", ATMOSPHERE))
+    fine = angles(turns, FINE)
+    since = np.mod(angles(turns) - m.fires, 2.0 * np.pi * turns)
+    return -0.25 * math.pi * m.bore**2 * np.interp(since, fine, over, period=2.0 * np.pi * turns)
+
+
+def _on_pin(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
+    """Of the rod."""
+    base, end = _moving(m, turns)
+    along = -m.piston_mass * speed**2 * slope(slope(end, turns), turns).real + _pressing(m, turns, gas)
+    rod = end - base
+    return along * rod / rod.real
+
+
+def _on_bearings(scene: Any, machine: Machine, pins: np.ndarray, speed: float) -> np.ndarray:
+    """Each load on the two bearings beside it; what hangs over is levered up."""
+    places = [number(b["x"]) for b in scene.table["main_bearings"]]
+    out = np.zeros((len(places), SAMPLES), complex)
+    turned = np.exp(1j * angles(machine.turns))
+    loads = [(m.x, pin) for m, pin in zip(machine.mechanisms, pins, strict=True)]
+    # what turns with a throw beside its rod
+    loads += [(m.x, m.pin_mass * speed**2 * rod_end(m, angles(machine.turns))) for m in machine.mechanisms]
+    loads += [(x, unbalance * speed**2 * turned) for _, x, _, ratio, unbalance, _, role in scene.rotors if role == "c"]
+    ranked = sorted(range(len(places)), key=lambda j: places[j])
+    for x, load in loads:
+        above = min(max(sum(places[j] < x for j in ranked), 1), len(ranked) - 1)
+        low, high = ranked[above - 1], ranked[above]
+        share = (x - places[low]) / (places[high] - places[low])
+        out[high] += share * load
+        out[low] += (1.0 - share) * load
+    return out
+
+
+def _torque(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
+    """Of one cylinder: work of the gas less what the piston's energy takes."""
+    _, end = _moving(m, turns)
+    velocity = slope(end, turns)
+    energy = 0.5 * m.piston_mass * np.abs(velocity) ** 2
+    return -(speed**2) * slope(energy, turns).real + _pressing(m, turns, gas) * velocity.real
+
+
+def _integral(torque: np.ndarray, turns: int) -> np.ndarray:
+    c = np.fft.rfft(torque)
+    k = np.arange(len(c)) / turns
+    return np.fft.irfft(np.where(k > 0.0, c / (1j * np.where(k > 0.0, k, 1.0)), 0.0), len(torque))
+
+
+def _uneven(scene: Any, machine: Machine, k: int, own: float) -> float:
+    """From the energy of all that moves, whose mean speed over time is the one given."""
+    speed, gas, turns = scene.speeds[k], _gas(scene, k), machine.turns
+    inertia, torque = np.full(SAMPLES, own), np.zeros(SAMPLES)
+    for m in machine.mechanisms:
+        velocity = slope(_moving(m, turns)[1], turns)
+        inertia += m.piston_mass * np.abs(velocity) ** 2
+        torque += _pressing(m, turns, gas) * velocity.real
+    work = _integral(torque - torque.mean(), turns)
+
+    def mean_over_speed(energy: float) -> float:
+        return float(np.mean(speed / np.sqrt(2.0 * (energy + work) / inertia))) - 1.0
+
+    rough = 0.5 * speed**2 * inertia.mean()
+    energy = brentq(mean_over_speed, -work.min() * (1.0 + 1e-9) + 1e-9 * rough, 100.0 * rough + abs(work).max())
+    speeds = np.sqrt(2.0 * (energy + work) / inertia)
+    return float((speeds.max() - speeds.min()) / speed)
+
+
+def _twist(scene: Any, machine: Machine, torques: list[np.ndarray], speed: float) -> np.ndarray:
+    """Angle of each disc before the next one, from the front, shape (sections, samples, 1)."""
+    told, turns = scene.table["torsion"], machine.turns
+    stiff = [number(told["crank"]["stiffness"])] * (len(torques) - 1) + [number(told["discs"][0]["shaft"]["stiffness"])]
+    damping, loss = number(told["cylinder_damping"]), told["loss_factor"]
+    # cylinders are listed from the front; what turns beside their rods is at the crank radius
+    discs = []
+    for m in machine.mechanisms:
+        swinging = m.piston_mass * float(np.mean(np.abs(slope(_moving(m, turns)[1], turns)) ** 2))
+        discs.append(number(told["throw_inertia"]) + m.pin_mass * m.radius**2 + swinging)
+    inertia = np.array([*discs, number(told["discs"][0]["inertia"])])
+    size = len(inertia)
+    links = np.zeros((size, size), complex)
+    for k, own in enumerate(stiff):
+        links[[k, k + 1], [k, k + 1]] += own * (1.0 + 1j * loss)
+        links[[k, k + 1], [k + 1, k]] -= own * (1.0 + 1j * loss)
+    drives = np.array([np.fft.rfft(t) / SAMPLES for t in torques])
+    out = np.zeros((len(stiff), drives.shape[1]), complex)
+    through = np.cumsum(drives[:, 0].real)
+    out[:, 0] = through / np.array(stiff)
+    friction = np.diag([damping] * len(torques) + [0.0])
+    for k in range(1, int(LAST_ORDER * turns)):
+        rate = k / turns * speed
+        answer = np.linalg.solve(links + 1j * rate * friction - rate**2 * np.diag(inertia), [*drives[:, k], 0.0])
+        out[:, k] = answer[:-1] - answer[1:]
+    return np.fft.irfft(out, SAMPLES, axis=1)[:, :, None] * SAMPLES
