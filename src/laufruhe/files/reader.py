@@ -290,14 +290,13 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         limits=limits_of(file.constraints, scene),
         source=file.source,
         assumptions=(*file.assumptions, *(brake.said if brake else ())),
-        friction=tuple(brake.tests if brake else ()),
         tolerance=file.tolerance,
         mount_numbers=found.numbers,
         search=Search(**file.search.model_dump()),
         fires_together=table.fires_together,
         assembly=assembly_of(file.assembly, engine, path.parent),
     )
-    return at_fidelity(problem, file.fidelity)
+    return at_fidelity(replace(problem, friction=tuple(brake.tests if brake else ())), file.fidelity)
 
 
 def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:
