@@ -20,6 +20,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.report.sections import tables_of
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result, Status
+from laufruhe.studies.trade import trade
 from problem_files import PROBLEMS, changed, loaded
 
 RADIUS, ROD, PISTON, TURNING, AT = 0.1, 0.4, 8.0, 6.0, 0.1
@@ -187,3 +188,9 @@ def test_refusals(old: str, new: str, said: str, tmp_path: Path) -> None:
 def test_a_first_that_nothing_meets_is_told_as_of_one(tmp_path: Path) -> None:
     limited = TWO + '[[constraints]]\nlimit = "maximum shaking force"\nmax = "1 N"\n'
     assert solve(loaded(tmp_path, limited)).status is Status.INFEASIBLE
+
+
+def test_a_trade_is_of_the_first_objective(tmp_path: Path) -> None:
+    one, two = (trade(loaded(tmp_path, text)) for text in (TWO.replace(TWO[TWO.rindex("[[objective]]") :], ""), TWO))
+    assert two.problem.ranks == ()
+    assert two.optimum == pytest.approx(one.optimum, rel=1e-9)

@@ -24,6 +24,7 @@ from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from laufruhe.solvers.conic import solve_cones
@@ -115,9 +116,11 @@ class Trade:
 
 
 def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trade:
-    """Measure every fidelity; `ModelError` where the problem has no objective."""
+    """Measure every fidelity, by the first of several objectives; `ModelError` where the problem has none."""
     if not problem.objective:
         raise ModelError("a trade needs an objective; add [objective]")
+    if problem.ranks:
+        problem = problem.changed(ranks=())
     best = reference(problem)
     truth = objective_value(problem, best)
     least = math.nan
@@ -125,6 +128,8 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
         say("solving the reference")
         engine = optimum(problem.at(Fidelity(samples=REFERENCE_STEPS)), REFERENCE_STEPS)
         least = math.nan if engine is None else objective_value(problem, reference(problem, engine))
+        # what cancels has no share by which another design is worse
+        least = 0.0 if engine is not None and least <= nothing_of(problem, engine) else least
     rows, whole = [], False
     for name, own in ladder(problem):
         say(name)
