@@ -20,7 +20,15 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "extensions", "examples", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5"]
+exclude_patterns = [
+    "_build",
+    "jupyter_execute",
+    "extensions",
+    "examples",
+    "gallery/*.ipynb",
+    "gallery/*.py",
+    "gallery/*.md5",
+]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
 myst_heading_anchors = 3
 # links to files beside docs/ are for readers of the repository
@@ -29,7 +37,7 @@ suppress_warnings = ["myst.xref_missing", "config.cache"]
 autodoc_typehints = "none"
 
 # notebooks are run as the site is built; one that fails stops it
-nb_execution_mode = "cache"
+nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 
