@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from laufruhe import units
+from laufruhe.files.complaints import Refused
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fields import Open
 from laufruhe.problem.decision import Decision, LeadDrive
@@ -12,6 +14,7 @@ OPPOSED = "second crankshaft"
 
 def leads_of(table: EngineTable) -> list[Decision]:
     """A decision for every shaft whose lead is open."""
+    _check_ports(table)
     leads = [(f"{shaft.name}.lead", shaft.name, shaft.lead) for shaft in table.shafts]
     leads += [("crank lead", OPPOSED, table.own("crank_lead"))]
     return [
@@ -19,3 +22,11 @@ def leads_of(table: EngineTable) -> list[Decision]:
         for name, shaft, lead in leads
         if isinstance(lead, Open) and lead.is_open
     ]
+
+
+def _check_ports(table: EngineTable) -> None:
+    """Refuse bounds of a lead that go beyond the ports: the layout sees where it starts."""
+    lead, ports = table.own("crank_lead"), table.own("port_arc")
+    if isinstance(lead, Open) and ports is not None and max(map(abs, lead.bounds)) >= ports:
+        rule = f"goes beyond the ports, which are open for {units.shown(ports, 'rad')}"
+        raise Refused("engine.crank_lead", None, rule, "narrow its bounds")
