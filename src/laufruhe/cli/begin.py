@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from laufruhe import units
 from laufruhe.errors import Complaint, InputError
 from laufruhe.files import drafts, ready
 from laufruhe.files.catalogue import CatalogueEngine, engine_named, engines
@@ -31,6 +33,7 @@ _OWN = (
     ("rod_ratio", "Crank radius over rod length", "0.3", float),
     ("reciprocating_mass", "Reciprocating mass of a cylinder", "0.5 kg", str),
 )
+_UNITS = {"bank_stagger": "m", "bore": "m", "stroke": "m", "cylinder_spacing": "m", "reciprocating_mass": "kg"}
 _OF_BANKS = ("bank_angle", "split_pin_angle", "bank_stagger")
 _OF_SEVERAL = ("cylinder_spacing", "firing_order")
 _ORDERS = {1: "1", 2: "1-2", 3: "1-3-2", 4: "1-3-4-2", 5: "1-2-4-5-3", 6: "1-5-3-6-2-4", 8: "1-8-6-2-7-3-4-5"}
@@ -74,6 +77,16 @@ def _asked_for() -> str | None:
     return source.strip() or None
 
 
+def _typed(key: str, read: Callable[[str], Any], text: str) -> Any:
+    """An answer, or why it is asked again."""
+    try:
+        if read is not str or key in _UNITS:
+            units.parse(str(text), _UNITS.get(key, ""))
+        return read(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
 def _described() -> tuple[str, dict[str, Any]]:
     """Title and [engine] of an engine that the user describes."""
     title: str = typer.prompt("Title", default="My engine")
@@ -89,7 +102,7 @@ def _described() -> tuple[str, dict[str, Any]]:
         if (key in _OF_SEVERAL and alone) or shared or (key in _OF_BANKS and not kind.takes(key)):
             continue
         usual = _ORDERS.get(table["cylinders"], "") if key == "firing_order" else default
-        table[key] = typer.prompt(words, default=usual, type=read)
+        table[key] = typer.prompt(words, default=usual, value_proc=partial(_typed, key, read))
     if "firing_order" not in table:
         return title, table
     numbers = [part.strip() for part in table["firing_order"].replace(",", "-").split("-")]
