@@ -16,7 +16,7 @@ from cli import scenes
 from lanes import first_fast
 from laufruhe.files.reader import load
 from laufruhe.plots import draw
-from laufruhe.plots.results import bars, cycle, engine, polar, spectrum
+from laufruhe.plots.results import bars, cycle, engine, polar, spectrum, twins
 from laufruhe.plots.style import AFTER, BEFORE, DPI, fitted
 from laufruhe.present.measures import mount_orders
 from laufruhe.problem.evaluation import measured, samples_of
@@ -46,7 +46,7 @@ def size_of(path: Path) -> tuple[int, int]:
         [
             (scenes.TIGHT, ("engine.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
             (scenes.TWO_POINTS, ("engine.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
-            (scenes.PARTS, ("engine.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
+            (scenes.PARTS, ("engine.png", "twins.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
             (scenes.SHAKING_ONLY, ("engine.png", "cycle.png", "spectrum.png")),
         ],
         1,
@@ -57,7 +57,8 @@ def test_pictures_are_whole(text: str, names: tuple[str, ...], tmp_path: Path) -
     assert draw(result, tmp_path) == names
     assert {path.name for path in tmp_path.iterdir()} == set(names)
     makers = {
-        f"{maker.__name__.rpartition('.')[2]}.png": maker.figure for maker in (engine, polar, cycle, bars, spectrum)
+        f"{maker.__name__.rpartition('.')[2]}.png": maker.figure
+        for maker in (engine, twins, polar, cycle, bars, spectrum)
     }
     for name in names:
         inches = makers[name](result).get_size_inches()

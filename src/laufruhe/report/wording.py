@@ -26,11 +26,11 @@ def headline(result: Result) -> str:
     name = f"RMS{o.name[3:]}" if o.name.startswith("rms ") else o.name[:1].upper() + o.name[1:]
     if not changed(result):
         return f"{name} of the design as given: {figure(o.value, o.unit)}."
-    if abs(o.value - o.initial) <= UNFELT * max(abs(o.value), abs(o.initial)):
-        return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
     if math.isinf(o.initial):
         found = f"{name} is {figure(o.value, o.unit)}, {_proven(result.certificate)}"
         return f"{found}; the design as given stands on a resonance."
+    if abs(o.value - o.initial) <= UNFELT * max(abs(o.value), abs(o.initial)):
+        return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
     # of nothing there is no share
     change = f" ({percent(-o.reduction)})" if o.initial else ""
     given, decided = figure(o.initial, o.unit), figure(o.value, o.unit, scale=o.initial)
