@@ -154,7 +154,7 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
     _judge_value(verdict, result, scene, value, reading, floor)
     rival = _rival(openings, vector, told, value, rng, most)
     verdict.rivals = rival.looked_at if rival else 0
-    bound = certificate.lower_bound
+    bound, reading = certificate.lower_bound, reading + result.error_estimate
     if bound > scene.objective * (1.0 + reading) + floor and scene.worst <= 0.0:
         verdict.wrong.append(f"own design {scene.objective:.9g} lies under its bound {bound:.9g}")
     if scene.worst > KEPT:
@@ -170,7 +170,7 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
     if bound > rival.value * (1.0 + reading) + floor + passed:
         verdict.wrong.append(f"bound {bound:.9g}, a rival has {rival.value:.9g} {rival.told or ''}")
     over = (value - rival.value) / max(rival.value, floor)
-    allowed = (GAP + reading + result.error_estimate) * max(rival.value, floor) + floor + passed
+    allowed = (GAP + reading) * max(rival.value, floor) + floor + passed
     if verdict.kind == "global" and value - rival.value > allowed:
         verdict.wrong.append(f"global {value:.9g}, a rival has {rival.value:.9g} {rival.told or ''}")
     elif verdict.kind != "global":

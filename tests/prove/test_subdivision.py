@@ -16,7 +16,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.box_norms import under
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.subdivision import _Search, divided_bound, divides
+from laufruhe.prove.subdivision import StiffnessBoxes, divided_bound, divides
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.mount_search import judged_at
@@ -82,7 +82,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
     problem = asked_for(tmp_path, ASKED[name])
     assert divides(problem)
     given = evaluate(problem)
-    search = _Search(problem, 1e-4 * objective_value(problem, given))
+    search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, given))
     low, high = boxes(problem, 40, 1)
     bounds, _ = search.bounds(low, high)
     generator = np.random.default_rng(2)
@@ -101,7 +101,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
 
 def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
     problem = asked_for(tmp_path, ASKED["mean"])
-    search = _Search(problem, 0.0)
+    search = StiffnessBoxes(problem, 0.0)
     centre = np.array([d.start for d in problem.mount_decisions])
     value = objective_value(problem, evaluate(problem))
     lacking = []
@@ -150,7 +150,7 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
     problem = asked_for(tmp_path, ASKED["rms"], LIMITS)
     given = evaluate(problem)
     low, high = boxes(problem, 120, 3)
-    bounds, _ = _Search(problem, 0.0).bounds(low, high)
+    bounds, _ = StiffnessBoxes(problem, 0.0).bounds(low, high)
     generator = np.random.default_rng(4)
     allowed_ones = 0
     for below, above, bound in zip(low, high, bounds, strict=True):
@@ -178,7 +178,7 @@ def test_few_open_stiffnesses_are_decided_with_proof(text: str, tmp_path: Path) 
     assert result.status == "optimal"
     assert result.certificate.kind == "global"
     assert result.certificate.gap <= problem.tolerance
-    assert result.certificate.method.endswith("boxes")
+    assert "bounds of stiffness looked at in" in result.certificate.method
     given = evaluate(problem)
 
     axes = [np.geomspace(d.lower, d.upper, 25) for d in problem.mount_decisions]

@@ -25,13 +25,9 @@ class Under:
 
 def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Under:
     """A linear function under a norm of forces or travel, for every box (E38)."""
-    names = [mount.name for mount in model.problem.engine.mounts]
-    chosen = quantity.places(names)
-    rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
-    factors = np.tile(np.array(quantity.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
+    rows, factors = counted_rows(model, quantity)
     answer = model.answer(lines, at, quantity.channel, rows, factors)
-    share = quantity.shares(model.problem.points)
-    weights = share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen)
+    share, weights = quantity.shares(model.problem.points), line_weights(model, quantity, lines)
     if quantity.norm.is_euclidean:
         return root_under(answer, weights)
     points = [p for p in model.counted(quantity.points) if np.any(lines.points == p)]
@@ -50,6 +46,20 @@ def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Un
     )
     rest = np.sqrt(np.einsum("k,bk->b", weights, answer.rest**2))
     return Under(np.asarray(value), np.asarray(slopes), rest)
+
+
+def counted_rows(model: BoxModel, quantity: Measure) -> tuple[NDArray[np.intp], Array]:
+    """Rows of the mounts that count, and the factors on them."""
+    chosen = quantity.places([mount.name for mount in model.problem.engine.mounts])
+    rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
+    return rows, np.tile(np.array(quantity.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
+
+
+def line_weights(model: BoxModel, quantity: Measure, lines: Lines) -> Array:
+    """What the square of every order counts in a mean over the cycle, the mounts and the operating points."""
+    chosen = quantity.places([mount.name for mount in model.problem.engine.mounts])
+    share = quantity.shares(model.problem.points)
+    return np.asarray(share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen))
 
 
 def _sampled(model: BoxModel, quantity: Measure, answer: Answer, lines: Lines, p: int) -> Under:

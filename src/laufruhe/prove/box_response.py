@@ -106,8 +106,16 @@ class Answer:
 
 
 @dataclass(frozen=True, eq=False)
-class _Parts:
-    """Matrices of a mounting in coordinates in which the mass is one."""
+class Matrices:
+    """Of a mounting, in coordinates in which the mass is one.
+
+    Attributes
+    ----------
+    stiffness, loss, damping
+        A, and of B what does not grow with frequency and what does, shape (6, 6).
+    springs, losses, dampers
+        From motion to what each does to the mounts, shape (3 mounts, 6).
+    """
 
     stiffness: Array
     loss: Array
@@ -115,6 +123,11 @@ class _Parts:
     springs: Array
     losses: Array
     dampers: Array
+
+
+def is_travel(channel: Channel) -> bool:
+    """Whether the motion of mounts is asked for, else their forces."""
+    return channel is channels.MOUNT_TRAVEL
 
 
 class BoxModel:
@@ -126,6 +139,11 @@ class BoxModel:
         On elastic mounts, with all but stiffness given.
     evaluation
         Of any design: its wrenches are those of all.
+
+    Attributes
+    ----------
+    root
+        From motion in coordinates in which the mass is one, shape (6, 6): its transpose takes coordinates there.
     """
 
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
@@ -133,8 +151,8 @@ class BoxModel:
         decisions = problem.mount_decisions
         self.lower, self.upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
         base = self.mounting(self.lower)
-        self._root = np.linalg.inv(np.linalg.cholesky(base.block.mass_matrix))
-        self.travels = (base.motions @ self._root.T).reshape(-1, 6)
+        self.root = np.linalg.inv(np.linalg.cholesky(base.block.mass_matrix))
+        self.travels = (base.motions @ self.root.T).reshape(-1, 6)
         self._base = self._parts(base)
         ends = [np.where(np.arange(len(decisions)) == j, self.upper, self.lower) for j in range(len(decisions))]
         moved = [self._parts(self.mounting(end)) for end in ends]
@@ -153,11 +171,11 @@ class BoxModel:
         """At these stiffnesses."""
         return mounting_in(self.problem.design([float(v) for v in x], self.problem.mount_decisions))
 
-    def _parts(self, mounting: ElasticMounting) -> _Parts:
-        seen = mounting.motions @ self._root.T
-        totals = (self._root @ mounting.total(each) @ self._root.T for each in self._each(mounting))
+    def _parts(self, mounting: ElasticMounting) -> Matrices:
+        seen = mounting.motions @ self.root.T
+        totals = (self.root @ mounting.total(each) @ self.root.T for each in self._each(mounting))
         maps = ((each @ seen).reshape(-1, 6) for each in self._each(mounting))
-        return _Parts(*totals, *maps)
+        return Matrices(*totals, *maps)
 
     @staticmethod
     def _each(mounting: ElasticMounting) -> tuple[Array, Array, Array]:
@@ -165,7 +183,7 @@ class BoxModel:
 
     def lines(self, quantity: Measure | None = None) -> Lines:
         """Every order with a load; of a quantity, those that it counts."""
-        moved = self._root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
+        moved = self.root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
         found: list[tuple[int, int, float, float, ComplexArray]] = []
         for p, loads in enumerate(self.evaluation.loads):
             size = np.abs(loads.wrench.coefficients).max(axis=1, initial=0.0)
@@ -195,6 +213,10 @@ class BoxModel:
         """Operating points of these names; all when None."""
         return [k for k, point in enumerate(self.problem.points) if names is None or point.name in names]
 
+    def matrices(self, x: Array) -> Matrices:
+        """At one design."""
+        return self._parts(self.mounting(x))
+
     def stiffness(self, x: Array) -> Array:
         """A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
         return self._at("stiffness", x)
@@ -202,7 +224,7 @@ class BoxModel:
     def sag(self, x: Array) -> Array:
         """At many designs, shape (boxes,); infinite where a mode is free (E9)."""
         weight = weight_wrench(self.mounting(self.lower).block)
-        matrices, pull = self.stiffness(x), self._root @ weight
+        matrices, pull = self.stiffness(x), self.root @ weight
         held = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
         settled = np.linalg.solve(np.where(held[:, None, None], matrices, np.eye(6)), pull)
         return np.where(held, settled @ pull / -weight[2], math.inf)
@@ -229,7 +251,7 @@ class BoxModel:
         turned = np.where(room > 0.0, change[:, None] / np.where(room > 0.0, room, 1.0), 1.0)
         found = np.full(len(lower), np.inf)
         for motion in motions:
-            shape, momentum = self._root[:, motion], np.linalg.inv(self._root)[motion]
+            shape, momentum = self.root[:, motion], np.linalg.inv(self.root)[motion]
             shares = (shape @ modes) * (momentum @ modes)
             size = np.linalg.norm(shape) * np.linalg.norm(momentum)
             found = np.minimum(found, (shares + 2.0 * size * np.minimum(turned, 1.0)).max(axis=1))
@@ -280,7 +302,7 @@ class BoxModel:
     def _maps(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices) -> tuple[ComplexArray, ComplexArray]:
         """From motion to forces or travel at the centres, (boxes, lines, r, 6), and by side, (..., n, r, 6)."""
         boxes, count, open_numbers = len(at.centres), len(lines.omegas), len(self.lower)
-        if channel is channels.MOUNT_TRAVEL:
+        if is_travel(channel):
             flat = np.broadcast_to(self.travels[rows].astype(complex), (boxes, count, len(rows), 6))
             return flat, np.zeros((boxes, count, open_numbers, len(rows), 6), dtype=complex)
         moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
@@ -294,7 +316,7 @@ class BoxModel:
         room = lines.omegas**2 - self.highest
         motion = np.linalg.norm(lines.loads, axis=1) / np.where(room > 0.0, room, 1.0)
         motion = np.where(room > 0.0, motion, np.inf)
-        if channel is channels.MOUNT_TRAVEL:
+        if is_travel(channel):
             return motion * float(np.linalg.norm(self.travels))
         top = self._parts(self.mounting(self.upper))
         still = float(np.linalg.norm(top.springs + 1j * top.losses))

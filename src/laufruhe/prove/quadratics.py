@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 # least curvature that is left to a sum of quadratic functions of size one
 CONVEX_BY = 1e-9
@@ -84,8 +86,8 @@ def _least(cost: Array, cones: Sequence[tuple[Array, Array]], held: int = 0) -> 
     import clarabel
     from scipy.sparse import csc_array
 
-    slopes = [-np.eye(held, len(cost)), *(-_column(steps).T for _, steps in cones)]
-    right = np.concatenate([np.zeros(held), *(_column(constant) for constant, _ in cones)])
+    slopes = [-np.eye(held, len(cost)), *(-column(steps).T for _, steps in cones)]
+    right = np.concatenate([np.zeros(held), *(column(constant) for constant, _ in cones)])
     kinds = [clarabel.NonnegativeConeT(held), *(clarabel.PSDTriangleConeT(len(constant)) for constant, _ in cones)]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -97,8 +99,14 @@ def _least(cost: Array, cones: Sequence[tuple[Array, Array]], held: int = 0) -> 
     return x if np.all(np.isfinite(x)) else None
 
 
-def _column(matrices: Array) -> Array:
+@cache
+def triangle(size: int) -> tuple[Indices, Indices, Array]:
+    """Places of the upper triangle column by column, and the factors that keep lengths."""
+    columns, rows = np.tril_indices(size)
+    return rows, columns, np.where(rows == columns, 1.0, math.sqrt(2.0))
+
+
+def column(matrices: Array) -> Array:
     """The upper triangles column by column, so that lengths are kept, shape (..., n (n + 1) / 2)."""
-    size = matrices.shape[-1]
-    rows, columns = np.tril_indices(size)
-    return np.asarray(matrices[..., columns, rows] * np.where(rows == columns, 1.0, math.sqrt(2.0)))
+    i, j, factor = triangle(matrices.shape[-1])
+    return np.asarray(matrices[..., i, j] * factor)

@@ -82,7 +82,7 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
     room
         Difference that counts as none [SI].
     """
-    search = _Search(problem, LEFT_OUT * room)
+    search = StiffnessBoxes(problem, LEFT_OUT * room)
     most = search.most_boxes
     if not most or not search.is_sampled_fully:
         return Divided(0.0, 0)
@@ -127,8 +127,14 @@ def divide(search: Bounded, lower: Array, upper: Array, value: float, room: floa
     return Divided(min(heap[0][0] if heap else enough, enough), seen, left)
 
 
-class _Search:
-    """Bounds of boxes."""
+class StiffnessBoxes:
+    """Bounds of boxes.
+
+    Attributes
+    ----------
+    constant
+        Of the objective: loads of the block and masses are the same on all mounts.
+    """
 
     what = "boxes of stiffness"
 
@@ -137,9 +143,8 @@ class _Search:
         evaluation = evaluate_start(problem)
         self.model = BoxModel(problem, evaluation)
         terms = [term for term in problem.load_terms if term.measure.on_mounts]
-        # loads of the block and masses are the same on all mounts
         rest = [term for term in problem.load_terms if not term.measure.on_mounts]
-        self._constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
+        self.constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         share = left_out / max(sum(term.weight for term in terms), 1e-300)
         self._terms = [(term.weight, term.measure, *_felt(self.model, term.measure, share)) for term in terms]
         self._limits = [
@@ -190,7 +195,7 @@ class _Search:
             total += weight * (least.value - least.rest - left_out)
             slopes += weight * least.slopes
             pull = np.maximum(pull, _pull(at))
-        found = self._constant + _known(total - np.abs(slopes).sum(axis=1))
+        found = self.constant + _known(total - np.abs(slopes).sum(axis=1))
         for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
             if _is_ratio(asked):
                 ratio, pulled = self._ratio(asked, lower, upper)

@@ -112,7 +112,7 @@ def softest_of(problem: Problem) -> Softest:
             turning = root[:, 3:] @ root[:, 3:].T
             square = (1.0 + STRETCH) * square + (1.0 + 1.0 / STRETCH) * reach**2 * turning
         arms.append(square)
-    floors += _limited_floors(problem, root)
+    floors += limited_stiffness(problem, root)[0]
     return Softest(
         (1.0 - SLACK) * np.array(floors),
         np.array(arms),
@@ -132,17 +132,18 @@ def _ranges(problem: Problem) -> tuple[Array, Array]:
     return low, high
 
 
-def _limited_floors(problem: Problem, root: Array) -> list[Array]:
-    """L from limits: a lowest natural frequency, and the largest sag (E31)."""
-    found = []
+def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array]]:
+    """L that A is not under, by least frequency and largest sag (E31), and U that it is not over (E43)."""
+    floors, ceilings = [], []
     weight = weight_wrench(mounting_in(problem.engine).block)
     for limit in problem.mount_limits:
-        if limit.measure.channel is channels.FREQUENCIES and limit.minimum > 0.0:
-            found.append((math.tau * limit.minimum) ** 2 * np.eye(6))
+        if limit.measure.channel is channels.FREQUENCIES:
+            floors += [(math.tau * limit.minimum) ** 2 * np.eye(6)] if limit.minimum > 0.0 else []
+            ceilings += [(math.tau * limit.maximum) ** 2 * np.eye(6)] if limit.maximum < math.inf else []
         if limit.measure.channel is channels.SAG and 0.0 < limit.maximum < math.inf:
             pull = root @ weight
-            found.append(np.outer(pull, pull) / (limit.maximum * -weight[2]))
-    return found
+            floors.append(np.outer(pull, pull) / (limit.maximum * -weight[2]))
+    return floors, ceilings
 
 
 def _of_quantity(problem: Problem, quantity: Measure, softest: Softest, model: AffineModel) -> float:

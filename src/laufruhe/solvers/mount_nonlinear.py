@@ -21,6 +21,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach, gap_of, room_of
+from laufruhe.prove.spring_search import spring_bound
 from laufruhe.prove.subdivision import Divided, divided_bound, divides
 from laufruhe.prove.transmitted_bound import transmitted_bound
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, none_within
@@ -111,10 +112,19 @@ def _divided(problem: Problem, search: MountSearch) -> Divided:
         found = search.chosen
         value = found.design.value if found is not None and found.design.excess <= KEPT else math.inf
         room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
-        divided = divided_bound(problem, value, room)
+        divided = _by_boxes(problem, value, room)
         if not divided.places or not search.again(divided.places):
             break
     return divided
+
+
+def _by_boxes(problem: Problem, value: float, room: float) -> Divided:
+    """By the forces of springs, a few boxes of which close many stiffnesses; by expansions what these leave open."""
+    few = spring_bound(problem, value, room)
+    if few.boxes and few.bound >= value - room:
+        return few
+    many = divided_bound(problem, value, room)
+    return Divided(max(few.bound, many.bound), few.boxes + many.boxes, many.places or few.places)
 
 
 def _mounts(design: Design) -> list[float]:
@@ -215,7 +225,7 @@ def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, 
     if proven is not None:
         text += f"; balance on these mounts proven within {proven[1]:.0e}"
     if divided.boxes:
-        text += f"; bounds of stiffness divided into {divided.boxes} boxes"
+        text += f"; bounds of stiffness looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
     return text
 
 
