@@ -19,7 +19,8 @@ from problem_files import PROBLEMS, written
 
 PAGES = {".laufruhe.json", "result.json", "report.md", "report.html"}
 TABLES = {"tables.xlsx", "forces.csv", "orders.csv", "measures.csv"}
-ALL_FILES = PAGES | TABLES | {"decisions.csv", "limits.csv"}
+DECIDED = {"decisions.csv", "limits.csv", "table-weights.csv"}
+ALL_FILES = PAGES | TABLES | DECIDED
 ALL_FILES |= {f"{name}.png" for name in ("engine", "polar", "cycle", "bars", "spectrum")}
 
 
@@ -152,7 +153,7 @@ def test_pictures_of_another_result_do_not_stay(here: Path) -> None:
     run("solve", path)
     (here / "results/scene/notes.txt").write_text("mine")
     run("solve", path, "--no-plots")
-    assert tree(here / "results/scene") == PAGES | TABLES | {"decisions.csv", "limits.csv", "notes.txt"}
+    assert tree(here / "results/scene") == PAGES | TABLES | DECIDED | {"notes.txt"}
     assert tree(here / "results") == {f"scene/{name}" for name in tree(here / "results/scene")}
 
 

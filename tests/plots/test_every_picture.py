@@ -41,7 +41,7 @@ samples = 48
 # layouts, cycles, mounts, what is open: each fills other pictures
 MODELS = (
     "vee-two-90", "rotary-two", "soft-mounts-run-up", "tractor-four-bearings", "inline-five-torsion",
-    "inline-seven-uneven", "waterworks-steam-pump", "selective-assembly", "radial-seven", "robust",
+    "inline-seven-uneven", "waterworks-steam-pump", "selective-assembly", "radial-seven", "car-four-willans", "robust",
 )  # fmt: skip
 
 
