@@ -58,7 +58,7 @@ trace beyond the limit of Python's reader; whole numbers that no float holds, in
 that are no text in replications; control and bidirectional characters on the screen; lines of 5,000 characters
 and thousands of lines; units of hundreds of factors, seconds each; a search of even stars for 24 to 48
 cylinders that did not end; an empty list of orders; a matplotlibrc of the working folder; a stroke
-of 1e-320 mm; a rod ratio that makes a rod longer than floats; an empty firing order; a tab in a study's title;
+of 1e-320 mm; a rod ratio that makes a rod longer than floats; an empty firing order; a tab in a title or a name;
 keys that begin with a blank; `explain` of a flywheel.
 """
 
