@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.machine import Bearing, OperatingPoint
+from laufruhe.machine.running_gear import Bolts, PistonPin, RunningGear, Shank, Webs
 from laufruhe.numerics.norms import NORMS, Grid, lengths
 from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel, MassChannel
@@ -172,7 +173,10 @@ def inside() -> tuple[Problem, AffineModel]:
     whole = scene(4)
     bearings = tuple(Bearing(str(k), 0.25 - 0.12 * k, 0.06, 0.025, 0.01) for k in range(5))
     parts = tuple(replace(part, big_end=(0.05, 0.03)) for part in whole.engine.slider_cranks)
-    engine = replace(whole.engine, slider_cranks=parts, bearings=bearings)
+    gear = RunningGear(
+        webs=Webs(0.08, 0.02), rod=Shank(0.022), piston_pin=PistonPin(0.028, 0.016, 0.07), bolts=Bolts(2, 0.008)
+    )
+    engine = replace(whole.engine, slider_cranks=parts, bearings=bearings, gear=gear)
     own = replace(whole, engine=engine, objective=tuple(Term(measure) for measure in INSIDE))
     return own, AffineModel(own)
 

@@ -222,7 +222,7 @@ def test_an_inertia_is_told_once_and_serves_both(tmp_path: Path) -> None:
     assert problem.engine.flywheel == Flywheel(1.0)
     told = laufruhe.solve(problem).limits[0].value
     assert told == pytest.approx(irregularity(problem.engine, problem.points[0], 1.0, problem.fidelity))
-    with pytest.raises(InputError, match="told by"):
+    with pytest.raises(InputError, match="given by"):
         loaded(tmp_path, uneven + INERTIA + LEAST)
 
 

@@ -188,7 +188,7 @@ BAD_TOLERANCES = [
     ('reciprocating_mass = "10 g", unbalance = "50 g cm", alignment = "0.05 mm", ', "", "leave nothing to chance"),
     ("engines = 200", "engines = 0", "engines"),
     ('force = "100 kp"', 'force = "0 kp"', "must be more than 0 N"),
-    ('claim = "promises nothing"', 'claim = "promises nothin"', "did you mean 'promises nothing'"),
+    ('claim = "promises nothing"', 'claim = "promises nothin"', "use one of: promises nothing, matters"),
     ('tractor-six.toml"', 'tractor-seven.toml"', "tractor-seven.toml"),
 ]
 

@@ -120,7 +120,8 @@ class MountSearch:
         columns = self._points[0][1] if before is None or before.optimum is None else _point(before)[1]
         for place in places:
             alone = None if self.problem.unbalances else judged_at(self.problem, place.tolist())
-            if alone is not None:
+            # what passes a limit by a rounding is no better for it
+            if alone is not None and alone.excess <= 0.0:
                 self._keep(Found(alone, self.joint))
         starts = [self.joint.start(place.tolist(), columns) for place in places]
         self._take(solve_nonlinear(self.joint.program, starts, self._workers, ITERATIONS))
