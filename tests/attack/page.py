@@ -36,7 +36,8 @@ momentum and energy differentiated by transforms, least energy of springs, six m
 by trying. It evaluates the design that was returned and looks for a better one: cutting planes of linear programs
 where unbalances alone are open (a bound of its own), every even star one by one, else random designs, evolution and a
 simplex. **Wrong** is: a value or a limit's value off by more than the stated error and what the plain model resolves;
-a design below a bound; a `global` value above a rival by more than the gap; "infeasible" where a rival keeps all
+a design below a bound by more than the stated error of the samples; a `global` value above a rival by more than that
+and the gap; "infeasible" where a rival keeps all
 limits with 2e-5 to spare; a limit passed by more than 3e-5; a result worse than the design as given; `failed`, an
 error, a warning, or anything on the screen. **Beaten**: a `local` design that a rival beats by more than 1e-3; it
 claims nothing else, and is not counted as wrong.
