@@ -68,6 +68,7 @@ def test_open_springs_add_up_to_what_the_matrices_change_by(tmp_path: Path) -> N
     for j in range(len(model.lower)):
         own = springs.decisions == j
         total = np.einsum("i,ia,ib->ab", springs.gains[own], springs.arms[own], springs.arms[own])
+        assert np.allclose(total, model.stiffness_slopes[j], rtol=1e-9, atol=1e-9 * np.abs(total).max())
         end = np.where(np.arange(len(model.lower)) == j, model.upper, model.lower)
         change = model.matrices(end).stiffness - model.matrices(model.lower).stiffness
         assert np.allclose(total * (model.upper - model.lower)[j], change, rtol=1e-9, atol=1e-9 * np.abs(change).max())
@@ -139,6 +140,14 @@ def test_a_bound_holds_whatever_a_solver_proposes(tmp_path: Path, monkeypatch: p
     for wrong in (noise, noise, lambda squares, limits, numbers: ([np.zeros((k.size, k.size)) for k in limits], low)):
         monkeypatch.setattr(semidefinite, "_proposed", wrong)
         assert boxes._relaxed(low, high) <= least
+
+
+@pytest.mark.parametrize("norm", ["rms", "mean"])
+def test_orders_that_nothing_excites_have_no_bound(norm: str, tmp_path: Path) -> None:
+    """Alone they are nothing; beside others they add nothing."""
+    silent = f'minimise = "{norm} mount force"\norders = [3]\noperating_points = ["idle"]'
+    assert spring_bound(asked_for(tmp_path, silent), 0.0, 0.0).bound == 0.0
+    assert spring_bound(asked_for(tmp_path, silent), 1.0, 1e-4).bound == 0.0
 
 
 def powertrain(orders: str, frequency: str, opened: int) -> dict[str, Any]:

@@ -217,6 +217,11 @@ class BoxModel:
         """At one design."""
         return self._parts(self.mounting(x))
 
+    @property
+    def stiffness_slopes(self) -> Array:
+        """A by every open number, shape (n, 6, 6)."""
+        return self._slopes["stiffness"]
+
     def stiffness(self, x: Array) -> Array:
         """A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
         return self._at("stiffness", x)

@@ -39,8 +39,16 @@ def spring_bound(problem: Problem, value: float, room: float) -> Divided:
     room
         Difference that counts as none [SI].
     """
-    if not is_bounded(problem) or not value < math.inf:
+    if not is_bounded(problem) or not 0.0 < value < math.inf:
         return Divided(0.0, 0)
+    try:
+        return _divided(problem, value, room)
+    except np.linalg.LinAlgError:
+        # a middle on a resonance that nothing damps
+        return Divided(0.0, 0)
+
+
+def _divided(problem: Problem, value: float, room: float) -> Divided:
     boxes = _SpringBoxes(problem, room, value)
     most, model = boxes.most_boxes, boxes.model
     if not most or not boxes.is_sampled_fully:
@@ -99,7 +107,8 @@ class _SpringBoxes:
         at = middle_of(self.model, lower, upper)
         total = self._plain.constant
         for weight, quantity, lines in self._terms:
-            total += weight * self._least(quantity, lines, at)
+            # what nothing excites is nothing
+            total += weight * self._least(quantity, lines, at) if len(lines.omegas) else 0.0
         return total
 
     def _least(self, quantity: Measure, lines: Lines, at: Middle) -> float:
@@ -143,20 +152,12 @@ class _SpringBoxes:
     def _limits(self, k: int, each: Response, at: Middle, numbers: int) -> list[Held]:
         """That one order has to keep."""
         found = spring_sides(k, self._springs, each, numbers)
-        slopes = self._slopes(at)
-        unit = at.highest
+        slopes, unit = self.model.stiffness_slopes * at.half[:, None, None], at.highest
         for sign, matrices in ((1.0, self._floors), (-1.0, self._ceilings)):
             for matrix in matrices:
                 given = sign * (at.here.stiffness - matrix) / unit
                 found.append(stiffness_limit(k, self._springs, each, Limited(given, sign * slopes / unit), sign / unit))
         return found
-
-    def _slopes(self, at: Middle) -> Array:
-        """A by s, shape (n, 6, 6)."""
-        each = np.einsum("ia,ib->iab", self._springs.arms, self._springs.arms) * self._springs.gains[:, None, None]
-        found = np.zeros((len(at.half), 6, 6))
-        np.add.at(found, self._springs.decisions, each)
-        return found * at.half[:, None, None]
 
 
 def _main(model: BoxModel, quantity: Measure) -> Lines:
