@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ Indices = NDArray[np.intp]
 
 # least curvature that is left to a sum of quadratic functions of size one
 CONVEX_BY = 1e-9
-_TIGHT = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
+_TIGHT = {"verbose": False, "tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +90,20 @@ def _least(cost: Array, cones: Sequence[tuple[Array, Array]], held: int = 0) -> 
     slopes = [-np.eye(held, len(cost)), *(-column(steps).T for _, steps in cones)]
     right = np.concatenate([np.zeros(held), *(column(constant) for constant, _ in cones)])
     kinds = [clarabel.NonnegativeConeT(held), *(clarabel.PSDTriangleConeT(len(constant)) for constant, _ in cones)]
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    for name, value in _TIGHT.items():
-        setattr(settings, name, value)
-    nothing = csc_array((len(cost), len(cost)))
-    found = clarabel.DefaultSolver(nothing, cost, csc_array(np.concatenate(slopes)), right, kinds, settings).solve()
-    x = np.array(found.x, dtype=float)
+    x = np.array(answered(cost, csc_array(np.concatenate(slopes)), right, kinds, _TIGHT).x, dtype=float)
     return x if np.all(np.isfinite(x)) else None
+
+
+def answered(cost: Array, rows: Any, right: Array, cones: Sequence[Any], settings: Mapping[str, Any]) -> Any:
+    """What Clarabel says of least cost' x with right - rows x in the cones."""
+    import clarabel
+    from scipy.sparse import csc_array
+
+    told = clarabel.DefaultSettings()
+    for name, value in settings.items():
+        setattr(told, name, value)
+    nothing = csc_array((len(cost), len(cost)))
+    return clarabel.DefaultSolver(nothing, cost, rows, right, cones, told).solve()
 
 
 @cache

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.prove.quadratics import column, triangle
+from laufruhe.prove.quadratics import answered, column, triangle
 from laufruhe.prove.spring_lines import Response, Springs
 
 Array = NDArray[np.float64]
@@ -197,13 +197,8 @@ def _proposed(squares: Sequence[Array], limits: Sequence[Held], numbers: int) ->
         rows.append(coo_array((block.ravel(), tuple(g.ravel() for g in grid)), shape=(len(i), ends[-1])))
         right.append(column(limit.constant()))
         cones.append(clarabel.PSDTriangleConeT(limit.size))
-    settings = clarabel.DefaultSettings()
-    for name, value in _SETTINGS.items():
-        setattr(settings, name, value)
     cost = np.concatenate([np.zeros(numbers), *map(column, squares)])
-    stated = csc_array(vstack(rows)), np.concatenate(right)
-    nothing = csc_array((ends[-1], ends[-1]))
-    found = clarabel.DefaultSolver(nothing, cost, *stated, cones, settings).solve()
+    found = answered(cost, csc_array(vstack(rows)), np.concatenate(right), cones, _SETTINGS)
     return _of_limits(np.nan_to_num(np.array(found.z)), limits), np.clip(np.nan_to_num(found.x[:numbers]), -1.0, 1.0)
 
 
