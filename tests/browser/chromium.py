@@ -1,0 +1,79 @@
+"""The distribution's Chromium, driven by Playwright, and what pages that it shows are asked."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+from urllib.parse import urlsplit
+
+from playwright.sync_api import Browser, Page, Route, WebSocketRoute, sync_playwright
+
+# an executable by its path goes before those that the distributions have
+CHOSEN = "LAUFRUHE_CHROMIUM"
+NAMES = ("chromium", "chromium-browser", "chromium-headless-shell", "google-chrome-stable", "google-chrome")
+MISSING = f"no Chromium on this machine: apt-get install chromium, or its path in {CHOSEN}"
+# nothing of these schemes leaves the page
+INNER = {"file", "data", "blob", "about"}
+LOOPBACK = "127.0.0.1"
+GRAVE = {"serious", "critical"}
+
+
+def executable() -> str | None:
+    """Path of the Chromium of this machine."""
+    found = (shutil.which(name) for name in (os.environ.get(CHOSEN, ""), *NAMES) if name)
+    return next((path for path in found if path), None)
+
+
+@contextmanager
+def launched() -> Iterator[Browser]:
+    """A headless Chromium. Playwright downloads none of its own."""
+    # a sandbox needs a user other than root
+    words = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=executable(), args=words)
+        yield browser
+        browser.close()
+
+
+def foreign(address: str) -> bool:
+    """Whether an address is neither of the page itself nor of this machine."""
+    parts = urlsplit(address)
+    return parts.scheme not in INNER and parts.hostname != LOOPBACK
+
+
+@contextmanager
+def watched(browser: Browser, **options: object) -> Iterator[tuple[Page, list[str]]]:
+    """A page that reaches files and 127.0.0.1 only, and the addresses that it was refused."""
+    refused: list[str] = []
+
+    def refuse(route: Route) -> None:
+        refused.append(route.request.url)
+        route.abort()
+
+    def close(route: WebSocketRoute) -> None:
+        refused.append(route.url)
+        route.close()
+
+    context = browser.new_context(service_workers="block", **options)  # type: ignore[arg-type]
+    context.route(foreign, refuse)
+    context.route_web_socket(foreign, close)
+    yield context.new_page(), refused
+    context.close()
+
+
+def violations(page: Page) -> list[dict[str, object]]:
+    """What axe finds wrong on the page as it is shown now."""
+    page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
+    return page.evaluate("() => axe.run().then(found => found.violations)")  # type: ignore[no-any-return]
+
+
+def serious(page: Page) -> list[str]:
+    """Serious and critical findings of axe: rule, what it asks, and the first elements that break it."""
+    return [
+        f"{found['id']}: {found['help']}; " + ", ".join(str(node["target"]) for node in found["nodes"][:5])  # type: ignore[index]
+        for found in violations(page)
+        if found["impact"] in GRAVE
+    ]
