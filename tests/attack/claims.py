@@ -199,8 +199,14 @@ def _judge_value(verdict: Verdict, result: Any, scene: Any, value: float, readin
         if told["limit"] == "natural frequencies" or told.get("name") != limit.name:
             continue
         own = scene.measure({**told, "quantity": told["limit"]})
-        if abs(own - limit.value) > 10 * reading * max(own, 1e-6 * number(told.get("max", told.get("min")))):
-            verdict.wrong.append(f"limit {limit.name} is said to be {limit.value:.9g} and is {own:.9g}")
+        allowed = (10 * reading + 1.5 * limit.error_estimate) * max(
+            own, 1e-6 * number(told.get("max", told.get("min")))
+        )
+        if abs(own - limit.value) > allowed:
+            verdict.wrong.append(
+                f"limit {limit.name} is said to be {limit.value:.9g} and is {own:.9g}, "
+                f"error estimate {limit.error_estimate:.1e}"
+            )
 
 
 def _rival(

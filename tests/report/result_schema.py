@@ -27,7 +27,8 @@ POINT = table(name=TEXT, speed=NUMBER, weight=NUMBER)
 POINT["properties"]["series"] = SERIES
 DECISION = table(value=NUMBER, unit=TEXT, lower=NUMBER, upper=NUMBER, at_bound={"type": "boolean"})
 CONSTRAINT = table(
-    name=TEXT, value=NUMBER, limit=NUMBER, unit=TEXT, active={"type": "boolean"}, shadow_price=MAYBE
+    name=TEXT, value=NUMBER, error_estimate=MAYBE, limit=NUMBER, unit=TEXT, active={"type": "boolean"},
+    shadow_price=MAYBE,
 )  # fmt: skip
 SCHEMA = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -50,6 +50,14 @@ def relative(bound: float, value: float) -> float:
     return bound / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
 
 
+def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
+    """What the samples of an evaluation miss of a measure at most [its unit] (F7, F8); nothing of what has none."""
+    if not measure.is_load:
+        return 0.0
+    shares = measure.shares([loads.point for loads in evaluation.loads])
+    return measure.norm.sampling_bound(signals(measure, evaluation), shares, evaluation.samples, finest)
+
+
 class Scale:
     """Objective of a design at the reference, and bounds beside it.
 
@@ -79,12 +87,7 @@ class Scale:
 
     def missed(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
         """What the samples of an evaluation miss of the objective at most (F7, F8)."""
-        steps = evaluation.samples
-        return sum(
-            term.weight
-            * term.measure.norm.sampling_bound(signals(term.measure, evaluation), self._shares(term), steps, finest)
-            for term in self.terms
-        )
+        return sum(term.weight * missed(term.measure, evaluation, finest) for term in self.terms)
 
     def _shares(self, term: Term) -> Array:
         """Weight of every operating point in a term, zero where it does not count."""

@@ -122,7 +122,7 @@ def _certificate(result: Result) -> Record:
 def _constraints(result: Result) -> list[Record]:
     return [
         {
-            **_of(limit, "name value limit side unit active"),
+            **_of(limit, "name value error_estimate limit side unit active"),
             "met": is_met(limit),
             "shadow_price": None if result.certificate is None else limit.shadow_price,
         }

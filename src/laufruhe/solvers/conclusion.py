@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.fidelity.error_bounds import missed, relative
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Limit, Side
@@ -218,7 +219,8 @@ def _limit_value(
     told = price * abs(found.edge) > _TOLD * value and found.excess >= -tolerance
     active = bool(found.excess >= -ACTIVE or told)
     price = 0.0 if not active or price * abs(found.edge) <= _FELT * value else price
-    return LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side)
+    error = relative(missed(limit.measure, evaluation), found.value)
+    return LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side, error)
 
 
 def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:

@@ -113,6 +113,8 @@ class LimitValue:
         Fall of the objective per unit by which the limit is relaxed; not a number where that is not known.
     side
         "at most" or "at least".
+    error_estimate
+        What samples over the cycle may have missed of the value, relative, not exceeded.
     """
 
     name: str
@@ -122,6 +124,7 @@ class LimitValue:
     active: bool
     shadow_price: float
     side: str = "at most"
+    error_estimate: float = 0.0
 
 
 @dataclass(frozen=True)

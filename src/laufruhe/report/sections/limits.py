@@ -10,6 +10,9 @@ from laufruhe.units import readable
 
 PRICES = "Shadow price: by how much the objective falls for each unit by which the limit is relaxed."
 
+TOLD = 1e-5
+"""Relative error of a value from which a reader is told."""
+
 
 def tables(result: Result) -> list[Grid]:
     """A row a limit."""
@@ -19,7 +22,13 @@ def tables(result: Result) -> list[Grid]:
     sides = {limit.side for limit in limits}
     head = ("limit", "value", sides.pop() if len(sides) == 1 else "bound", "state", "shadow price")
     title = "Limits" if changed(result) else "Limits, and the design as given"
-    return [Grid(title, head, rows, note=PRICES if any(limit.shadow_price for limit in limits) else "")]
+    notes = [PRICES] if any(limit.shadow_price for limit in limits) else []
+    notes += [
+        f"Samples over the cycle may have missed {100.0 * limit.error_estimate:.1g} % of '{limit.name}'."
+        for limit in limits
+        if limit.error_estimate > TOLD
+    ]
+    return [Grid(title, head, rows, note=" ".join(notes))]
 
 
 def _row(limit: LimitValue, unit: str, decided: bool) -> tuple[str, ...]:
