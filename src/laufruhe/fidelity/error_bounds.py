@@ -126,7 +126,7 @@ class Scale:
             for rotor in self.problem.engine.rotors
             if rotor.unbalance != 0 or rotor.name in self.open_rotors
         )
-        bases = [signal.reduced(ratios).base for signal in self.driving]
+        bases = [signal.repeats(ratios) for signal in self.driving]
         return int(min(bases) / self.problem.engine.cycle.base_order) if bases else 1
 
     @property

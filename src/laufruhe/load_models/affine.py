@@ -203,7 +203,7 @@ class AffineModel:
         """Of the wrench, and of loads inside the crankcase: a bearing feels each cylinder beside it alone."""
         inside = {measure.load for measure in self.problem.measures if measure.is_load and measure.load.is_inside}
         signals = [*(loads.wrench for loads in bare.loads), *(s for channel in inside for s in bare.signals(channel))]
-        return common_base([signal.reduced(tuple(orders)).base for signal in signals])
+        return common_base([signal.repeats(tuple(orders)) for signal in signals])
 
     @property
     def full_samples(self) -> int:
@@ -271,7 +271,7 @@ class AffineModel:
 
     def _own_base(self, signals: Sequence[Spectrum], samples: int) -> Fraction:
         """Lowest order of one load; that of all where its period holds no whole number of their steps."""
-        own = common_base([signal.reduced().base for signal in signals]) if self._once else self.base
+        own = common_base([signal.repeats() for signal in signals]) if self._once else self.base
         whole = all((steps * self.base / own).denominator == 1 for steps in (samples, self.full_samples))
         return own if whole else self.base
 

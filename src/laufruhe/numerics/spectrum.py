@@ -164,22 +164,20 @@ class Spectrum:
         corners = None if self.corners is None else self.corners.repeated(self.period, step)
         return type(self)(base, spread, corners)
 
-    def reduced(self, also: tuple[Fraction, ...] = ()) -> Self:
-        """The same signal over its own shortest period.
-
-        Parameters
-        ----------
-        also
-            Further orders that the period must hold.
-        """
-        used = np.flatnonzero(np.any(self.coefficients.reshape(len(self.coefficients), -1) != 0.0, axis=1))
-        orders = [int(j) * self.base for j in used if j > 0] + [order for order in also if order > 0]
-        if not orders:
-            return type(self)(Fraction(1), self.coefficients[:1])
-        return self.over(common_base(orders))
+    def repeats(self, also: tuple[Fraction, ...] = ()) -> Fraction:
+        """Lowest order of its own shortest period, which holds some further orders too."""
+        # real and imaginary parts are looked through in half the time of complex numbers
+        parts = np.ascontiguousarray(self.coefficients).view(float)
+        used = np.flatnonzero(parts.reshape(len(parts), -1).any(axis=1))
+        orders = [order for order in also if order > 0]
+        if step := int(np.gcd.reduce(used)):
+            orders.append(step * self.base)
+        return common_base(orders or [Fraction(1)])
 
     def over(self, base: Fraction) -> Self:
         """The same signal over another period of its own, that of the lowest order `base`."""
+        if base == self.base:
+            return self
         fine = self.rebased(_common(base, self.base))
         step = int(base / fine.base)
         corners = None if fine.corners is None else fine.corners.folded(fine.period / step, step)
@@ -191,20 +189,19 @@ class Spectrum:
         return self if count == len(self.coefficients) else type(self)(self.base, self.coefficients[:count])
 
     def __add__(self, other: Self) -> Self:
-        base = _common(self.base, other.base)
-        a, b = self.rebased(base), other.rebased(base)
-        count = max(len(a.coefficients), len(b.coefficients))
-        corners = joined([a.corners, b.corners])
-        return type(self)(base, a._padded(count) + b._padded(count), corners)
-
-    def _padded(self, count: int) -> NDArray[np.complex128]:
-        """So many coefficients, those that corners have among them."""
-        own = self.coefficients
-        out = np.zeros((count, *own.shape[1:]), dtype=complex)
-        if self.corners is not None and count > len(own):
-            out += self.corners.coefficients(count, float(self.base))
-        out[: len(own)] = own
-        return out
+        a, b = self, other
+        if a.base != b.base:
+            base = _common(a.base, b.base)
+            a, b = a.rebased(base), b.rebased(base)
+        if len(a.coefficients) < len(b.coefficients):
+            a, b = b, a
+        total = a.coefficients.astype(complex)
+        if b.corners is not None and len(a.coefficients) > len(b.coefficients):
+            # corners have orders beyond those that are listed
+            further = b.corners.coefficients(len(total), float(b.base))
+            total[len(b.coefficients) :] += further[len(b.coefficients) :]
+        total[: len(b.coefficients)] += b.coefficients
+        return type(self)(a.base, total, joined([a.corners, b.corners]))
 
 
 def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float64]:

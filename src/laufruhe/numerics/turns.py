@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,14 +130,16 @@ def star_sum(
     return _flushed(sums, np.abs(weights).sum(axis=0), len(turns))
 
 
-def cancelling_sum(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Sum over the first axis, zero where it is under the rounding of its own terms."""
-    size = np.abs(values.real) + np.abs(values.imag)
-    return _flushed(values.sum(axis=0), size.sum(axis=0), len(values))
+def cancelling_sums(values: NDArray[np.complex128], indices: Sequence[int]) -> NDArray[np.complex128]:
+    """Sums of the values (n, c) of each index, shape (largest + 1, c), zero under the rounding of their own terms."""
+    # every sum as a product with zeros and ones: a few values cost a few calls
+    members = (np.arange(max(indices) + 1)[:, None] == np.array(indices)).astype(float)
+    parts = np.ascontiguousarray(values).view(float)
+    size = members @ np.abs(parts)
+    return _flushed((members @ parts).view(complex), size[:, ::2] + size[:, 1::2], members.sum(axis=1, keepdims=True))
 
 
-def _flushed(sums: NDArray[np.complex128], magnitude: NDArray[np.float64], count: int) -> NDArray[np.complex128]:
-    floor = (count + 2) * _EPS * magnitude
-    real = np.where(np.abs(sums.real) <= floor, 0.0, sums.real)
-    imaginary = np.where(np.abs(sums.imag) <= floor, 0.0, sums.imag)
-    return np.asarray(real + 1j * imaginary)
+def _flushed(sums: NDArray[np.complex128], magnitude: NDArray[np.float64], count: Any) -> NDArray[np.complex128]:
+    parts = sums.view(float).reshape(*sums.shape, 2)
+    rounding = np.abs(parts) <= ((count + 2) * _EPS * magnitude)[..., None]
+    return np.asarray(np.where(rounding, 0.0, parts).view(complex)[..., 0])

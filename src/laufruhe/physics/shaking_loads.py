@@ -7,7 +7,6 @@ what the star cancels is zero and not a rounding.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.numerics.turns import cancelling_sum
+from laufruhe.numerics.turns import cancelling_sums
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
@@ -25,7 +24,7 @@ from laufruhe.physics.geared_inertia import geared_moment
 from laufruhe.physics.mechanism import Direction, Effect, mass_effects, rod_effects
 from laufruhe.physics.star_loads import order_index, square_of, star_loads
 from laufruhe.physics.uneven_speed import uneven_geared_loads, uneven_loads, uneven_rotor_loads
-from laufruhe.physics.wrench import plane_wrench
+from laufruhe.physics.wrench import plane_parts
 
 
 def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -89,14 +88,11 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
     -------
     Spectrum of shape (n, 6) [N, N m]; linear in the unbalances and their conjugates.
     """
-    wrenches: dict[int, list[NDArray[np.complex128]]] = defaultdict(list)
-    for rotor in rotors:
-        index = order_index(cycle, abs(rotor.shaft.ratio))
-        wrenches[index].append(rotor_wrench(rotor, speed))
-    out = np.zeros((max(wrenches, default=0) + 1, 6), dtype=complex)
-    for index, parts in wrenches.items():
-        out[index] = cancelling_sum(np.array(parts))
-    return Spectrum(cycle.base_order, out)
+    turning = tuple(rotors)
+    if not turning:
+        return Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
+    indices = [order_index(cycle, abs(rotor.shaft.ratio)) for rotor in turning]
+    return Spectrum(cycle.base_order, cancelling_sums(_rotor_wrenches(turning, speed), indices))
 
 
 def unit_star_load(engine: Engine, order: int, coefficient: complex, roll: bool) -> Spectrum:
@@ -131,11 +127,18 @@ def added_rotor_loads(
 
 def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
     """Coefficient of order |n| of one rotor's wrench, shape (6,) (L1)."""
-    shaft = rotor.shaft
-    forward = shaft.ratio > 0.0
-    vertical = rotor.unbalance if forward else rotor.unbalance.conjugate()
-    lateral = vertical * (-1j if forward else 1j)
-    return np.asarray((shaft.ratio * speed) ** 2 * plane_wrench(lateral, vertical, rotor.x, shaft))
+    return np.asarray(_rotor_wrenches((rotor,), speed)[0])
+
+
+def _rotor_wrenches(rotors: Sequence[Rotor], speed: float) -> NDArray[np.complex128]:
+    """Of each rotor, shape (rotors, 6)."""
+    wrenches = []
+    for rotor in rotors:
+        shaft = rotor.shaft
+        forward = shaft.ratio > 0.0
+        force = (shaft.ratio * speed) ** 2 * (rotor.unbalance if forward else rotor.unbalance.conjugate())
+        wrenches.append(plane_parts(force * (-1j if forward else 1j), force, rotor.x, shaft))
+    return np.array(wrenches, dtype=complex)
 
 
 def inertia_coefficients(

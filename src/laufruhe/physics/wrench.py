@@ -15,8 +15,13 @@ ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 
 def plane_wrench(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> NDArray[Any]:
     """Wrench of a force in the plane at x through a shaft's axis, shape (6, ...) of forces (...) (C2)."""
+    return np.array(plane_parts(lateral, vertical, x, shaft))
+
+
+def plane_parts(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> tuple[Any, Any, Any, Any, Any, Any]:
+    """The six parts of that wrench."""
     roll = shaft.y * vertical - shaft.z * lateral
-    return np.array([lateral - lateral, lateral, vertical, roll, -x * vertical, x * lateral])
+    return lateral - lateral, lateral, vertical, roll, -x * vertical, x * lateral
 
 
 def turning_parts(lateral: Any, vertical: Any) -> tuple[Any, Any]:

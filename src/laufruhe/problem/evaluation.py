@@ -78,6 +78,16 @@ class Evaluation:
             bends,
         )
 
+    def _repeated_rows(self, measure: Measure, samples: int) -> Rows:
+        """Rows that repeat over the cycle as often as its signals do, once: they have the same norm."""
+        if not measure.is_load:
+            return self.rows(measure)
+        signals = self.signals(measure.load)
+        if measure.norm.refinement == 1:
+            signals = [signal.series for signal in signals]
+        once, samples = _one_period(self.engine.cycle.base_order, signals, samples)
+        return load_rows(measure, [loads.point for loads in self.loads], once, self.engine, samples)
+
     def signals(self, channel: LoadChannel) -> list[Spectrum]:
         """What a channel measures at every operating point, shape (n, places, d)."""
         return [channel.signal(loads) for loads in self.loads]
@@ -88,7 +98,7 @@ class Evaluation:
             return measure.channel.values(measure, self)
         finer = 1 if measure.is_mass else measure.norm.refinement
         with np.errstate(invalid="ignore" if self.resonance else "warn"):
-            value = self.rows(measure, finer * self.samples).value
+            value = self._repeated_rows(measure, finer * self.samples).value
         return (value if math.isfinite(value) else math.inf,) if self.resonance else (value,)
 
     def value(self, measure: Measure) -> float:
@@ -205,7 +215,8 @@ def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE)
 def _measured(evaluation: Evaluation, signal: Spectrum) -> list[CycleMeasures]:
     if not np.all(np.isfinite(signal.coefficients)):
         return [CycleMeasures(math.inf, math.inf, math.inf)] * signal.coefficients.shape[1]
-    fine, coarse = (lengths(_one_period(evaluation, each)) for each in (signal, signal.series))
+    (once,), samples = _one_period(evaluation.engine.cycle.base_order, [signal], BETWEEN * evaluation.samples)
+    fine, coarse = (lengths(each.sample(samples)) for each in (once, once.series))
     most = np.maximum(fine.max(axis=0), lengths(signal.values(signal.bends)).max(axis=0, initial=0.0))
     return [
         replace(cycle_measures(own[:, None]), max=float(top))
@@ -213,10 +224,10 @@ def _measured(evaluation: Evaluation, signal: Spectrum) -> list[CycleMeasures]:
     ]
 
 
-def _one_period(evaluation: Evaluation, signal: Spectrum) -> Array:
-    """Values between the samples too, without the periods in which they repeat."""
-    base, once = evaluation.engine.cycle.base_order, signal.reduced()
-    periods = once.base / base
-    if periods.denominator != 1 or evaluation.samples % int(periods):
-        return over(base, [signal])[0].sample(BETWEEN * evaluation.samples)
-    return once.sample(BETWEEN * evaluation.samples // int(periods))
+def _one_period(base: Fraction, signals: Sequence[Spectrum], samples: int) -> tuple[list[Spectrum], int]:
+    """Signals over the period in which all repeat, and the samples of a cycle that fall into one."""
+    once = common_base([signal.repeats() for signal in signals])
+    periods = once / base
+    if periods.denominator != 1 or samples % int(periods):
+        return over(base, signals), samples
+    return [signal.over(once) for signal in signals], samples // int(periods)
