@@ -7,8 +7,6 @@ least sum on what is left bounds every design allowed.
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -16,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.budget import passed
-from laufruhe.numerics.progress import tell
+from laufruhe.prove.best_first import Box, Division, Parts, Waiting, halves, widest
 
 Array = NDArray[np.float64]
 
@@ -107,35 +104,44 @@ class Divided:
     complete: bool
 
 
+class _OneWayBoxes(Division[Box]):
+    """Boxes of what is open, and the best design found in them."""
+
+    what = "boxes"
+
+    def __init__(self, problem: OneWayProblem, tolerance: float) -> None:
+        self._problem, self._tolerance = problem, tolerance
+        self.best: Array | None = None
+
+    def look(self, part: Box) -> None:
+        """Designs on lines through a box."""
+        for x in _designs(self._problem, part.lower, part.upper):
+            if self._problem.value(x) < self.value:
+                self.value, self.best = self._problem.value(x), x
+
+    def is_done(self, one: Waiting[Box]) -> bool:
+        """Whether nothing in it is better by what the tolerance tells apart."""
+        return one.bound >= self.value - NEARLY * self._tolerance * abs(self.value)
+
+    def box(self, problem: OneWayProblem, lower: Array, upper: Array) -> tuple[float, Box] | None:
+        """A box without what breaks limits, and its least sum."""
+        kept = _cut(problem, lower, upper)
+        if kept is None:
+            return None
+        return self._problem.least(*kept), Box(*kept, widest(*kept, self._problem.upper - self._problem.lower))
+
+    def parts(self, taken: Sequence[Waiting[Box]]) -> Parts[Box]:
+        """Halves by the middle of the side that is longest beside its bounds."""
+        for half in halves(taken[0].part):
+            found = self.box(self._problem.under(self.value), *half)
+            yield found if found is not None and found[0] < self.value else None
+
+
 def divided(problem: OneWayProblem, tolerance: float, most: int = MOST_BOXES) -> Divided:
     """The best design to a relative tolerance, and the bound that shows it (T9)."""
-    best, found = math.inf, None
-    first = _cut(problem, problem.lower, problem.upper)
-    serial, looked = itertools.count(), 1
-    heap = [] if first is None else [(problem.least(*first), next(serial), *first)]
-    while heap:
-        bound, _, lower, upper = heapq.heappop(heap)
-        for x in _designs(problem, lower, upper):
-            if problem.value(x) < best:
-                best, found = problem.value(x), x
-        if bound >= best - NEARLY * tolerance * abs(best):
-            return Divided(found, min(bound, best), looked, True)
-        tell("boxes", looked, value=best, bound=bound)
-        if looked >= most or passed():
-            return Divided(found, min(bound, best), looked, False)
-        for half in _halves(problem, lower, upper):
-            looked += 1
-            kept = _cut(problem.under(best), *half)
-            if kept is not None and problem.least(*kept) < best:
-                heapq.heappush(heap, (problem.least(*kept), next(serial), *kept))
-    return Divided(found, best, looked, True)
-
-
-def _halves(problem: OneWayProblem, lower: Array, upper: Array) -> Sequence[tuple[Array, Array]]:
-    """By the middle of the side that is longest beside its bounds."""
-    k = int(np.argmax((upper - lower) / np.maximum(problem.upper - problem.lower, 1e-300)))
-    middle = 0.5 * (lower[k] + upper[k])
-    return (lower, _with(upper, k, middle)), (_with(lower, k, middle), upper)
+    boxes = _OneWayBoxes(problem, tolerance)
+    bound = boxes.divide(boxes.box(problem, problem.lower, problem.upper), most)
+    return Divided(boxes.best, min(bound, boxes.value), boxes.seen, boxes.complete)
 
 
 def _with(x: Array, k: int, value: float) -> Array:

@@ -9,7 +9,6 @@ or nothing is better than a design known, are cut off; what is left is halved.
 from __future__ import annotations
 
 import copy
-import heapq
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,10 +20,8 @@ from numpy.typing import NDArray
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.load_models.sized_model import MASSES, Piece, SizeModel
 from laufruhe.machine import Engine
-from laufruhe.numerics.budget import passed
-from laufruhe.numerics.progress import tell
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.prove.subdivision import Divided
+from laufruhe.prove.best_first import Box, Divided, Halving, halves, widest
 
 Array = NDArray[np.float64]
 Ways: TypeAlias = Array
@@ -32,7 +29,6 @@ Ways: TypeAlias = Array
 MOST_BOXES = 3000
 # a limit counts as broken beyond so much of it; halvings of a side that is cut, rounds of that, and bounds of a load
 SLACK, HALVINGS, ROUNDS, MOST_TOUCHED = 1e-9, 10, 3, 200
-NEARLY = 0.9
 
 
 class _Bundle:
@@ -230,22 +226,26 @@ def corner(ways: Ways, lower: Array, upper: Array) -> Array:
     return np.where(ways >= 0.0, lower, upper)
 
 
+class _Sizes(Halving):
+    """Halves of the longest side, each cut."""
+
+    what = "boxes of sizes"
+
+    def __init__(self, boxes: SizeBoxes, value: float, room: float) -> None:
+        super().__init__(value, room)
+        self._boxes, self._whole = boxes, boxes.model.upper - boxes.model.lower
+
+    def bounded(self, lower: Array, upper: Array) -> tuple[float, Box] | None:
+        """A box without what is cut off."""
+        kept = self._boxes.cut(lower, upper, self.enough)
+        return None if kept is None else (kept[2], Box(*kept[:2], widest(*kept[:2], self._whole)))
+
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
+        """Each half by itself."""
+        return [self.bounded(*half) for box in boxes for half in halves(box)]
+
+
 def divided_sizes(boxes: SizeBoxes, value: float, room: float, most: int = MOST_BOXES) -> Divided:
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (Z12)."""
-    model = boxes.model
-    enough = value - NEARLY * room if value < math.inf else math.inf
-    first = boxes.cut(model.lower, model.upper, enough)
-    heap = [] if first is None else [(first[2], 0, first[0], first[1])]
-    seen = 1
-    while heap and heap[0][0] < enough and seen < most and not passed():
-        bound, _, lower, upper = heapq.heappop(heap)
-        tell("boxes of sizes", seen, value=value, bound=bound)
-        k = int(np.argmax((upper - lower) / np.maximum(model.upper - model.lower, 1e-300)))
-        middle, here = 0.5 * (lower[k] + upper[k]), np.arange(len(lower)) == k
-        for low, high in ((lower, np.where(here, middle, upper)), (np.where(here, middle, lower), upper)):
-            seen += 1
-            kept = boxes.cut(low, high, enough)
-            if kept is not None:
-                heapq.heappush(heap, (max(kept[2], bound), seen, kept[0], kept[1]))
-    places = tuple(0.5 * (low + high) for _, _, low, high in heapq.nsmallest(3, heap))
-    return Divided(min(heap[0][0] if heap else enough, enough), seen, places)
+    division = _Sizes(boxes, value, room)
+    return division.run(division.bounded(boxes.model.lower, boxes.model.upper), most)

@@ -7,24 +7,21 @@ the least value on what is left bounds the objective of every design allowed.
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import NORMS
-from laufruhe.numerics.progress import tell
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, motion_indices
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided, divide
 from laufruhe.prove.box_norms import Under, root_under, under
 from laufruhe.prove.box_response import BoxModel, Expansion, Lines
 
@@ -39,29 +36,9 @@ WORK = 4e6
 MOST_BOXES = 20_000
 # numbers held at once
 HELD = 3e6
-MOST_PLACES = 3
 HALVINGS = 45
-# of the gap that counts as proven: what small orders may take of it, and what is left for roundings
-LEFT_OUT, NEARLY = 0.05, 0.9
-
-
-@dataclass(frozen=True, eq=False)
-class Divided:
-    """What dividing the bounds has proven.
-
-    Attributes
-    ----------
-    bound
-        No design allowed has a smaller objective; zero where nothing is known.
-    boxes
-        That were looked at.
-    places
-        Middles of the least of those that are left.
-    """
-
-    bound: float
-    boxes: int
-    places: tuple[Array, ...] = ()
+# of the gap that counts as proven, what small orders may take of it
+LEFT_OUT = 0.05
 
 
 def divides(problem: Problem) -> bool:
@@ -87,44 +64,6 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
     if not most or not search.is_sampled_fully:
         return Divided(0.0, 0)
     return divide(search, search.model.lower, search.model.upper, value, room, most)
-
-
-class Bounded(Protocol):
-    """What bounds boxes from below."""
-
-    what: str
-
-    @property
-    def at_once(self) -> int:
-        """Boxes of one round."""
-
-    def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
-
-
-def divide(search: Bounded, lower: Array, upper: Array, value: float, room: float, most: int) -> Divided:
-    """Halve boxes, the least first, until none may hold a design that is `room` better than `value`."""
-    enough = value - NEARLY * room if value < math.inf else math.inf
-    bounds, sides = search.bounds(lower[None], upper[None])
-    heap = [(float(bounds[0]), 0, lower, upper, int(sides[0]))]
-    seen = 1
-    while heap and heap[0][0] < enough and seen < most and not passed():
-        tell(search.what, seen, value=value, bound=heap[0][0])
-        halves: list[tuple[Array, Array, float]] = []
-        while heap and heap[0][0] < enough and len(halves) < search.at_once:
-            known, _, low, high, side = heapq.heappop(heap)
-            here = np.arange(len(low)) == side
-            middle = 0.5 * (low + high)
-            halves.append((low, np.where(here, middle, high), known))
-            halves.append((np.where(here, middle, low), high, known))
-        lows, highs = (np.array([half[k] for half in halves]) for k in (0, 1))
-        bounds, sides = search.bounds(lows, highs)
-        for (low, high, known), bound, side in zip(halves, bounds, sides, strict=True):
-            seen += 1
-            if max(known, float(bound)) < enough:
-                heapq.heappush(heap, (max(known, float(bound)), seen, low, high, int(side)))
-    left = tuple(0.5 * (low + high) for bound, _, low, high, _ in heapq.nsmallest(MOST_PLACES, heap) if bound < enough)
-    return Divided(min(heap[0][0] if heap else enough, enough), seen, left)
 
 
 class StiffnessBoxes:

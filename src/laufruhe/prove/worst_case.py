@@ -7,16 +7,13 @@ arcs, and what is left free is bounded from above. Every bound comes from rows o
 
 from __future__ import annotations
 
-import heapq
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.budget import passed
-from laufruhe.numerics.progress import tell
+from laufruhe.prove.best_first import Division, Parts, Waiting
 from laufruhe.prove.error_parts import ROUNDING, Block, Known, Terms, bounded
 
 Array = NDArray[np.float64]
@@ -70,32 +67,56 @@ def worst_case(
         Parts that the errors are divided into.
     """
     count = columns[-1].stop if columns else 0
-    start = np.zeros(count)
     best = max((_climbed(terms, columns, z) for z in _starts(columns, count, seed)), key=lambda found: found[0])
     if not count:
-        return WorstCase(start, best[0], best[0], 0)
+        return WorstCase(np.zeros(0), best[0], best[0], 0)
+    search = _Errors(terms, tolerance, best)
     whole = [Block(own, np.eye(own.stop - own.start)) for own in columns]
-    order = itertools.count()
-    known: Known = [{} for _ in terms]
-    first = bounded(terms, start, whole, best[0], known)
-    best = max(best, _climbed(terms, columns, first.errors), key=lambda found: found[0])
-    queue = [(-first.bound, next(order), start, whole, first.split)]
-    nodes = 1
-    while queue and -queue[0][0] > best[0] * (1.0 + tolerance) and nodes < most and not passed():
-        tell("boxes of errors", nodes)
-        above, _, centre, blocks, split = heapq.heappop(queue)
-        rest = [block for k, block in enumerate(blocks) if k != split]
-        for middle, free in blocks[split].parts(centre):
-            own = rest if free is None else [*rest, free]
-            part = bounded(terms, middle, own, best[0] * (1.0 + tolerance), known)
-            nodes += 1
-            best = max(best, (value_at(terms, part.errors), part.errors), key=lambda found: found[0])
+    first = bounded(terms, np.zeros(count), whole, best[0], search.known)
+    search.better(_climbed(terms, columns, first.errors))
+    bound = search.divide((-first.bound, _Part(np.zeros(count), whole, first.split)), most)
+    value, errors = search.best
+    return WorstCase(errors, value, max(value, -bound), search.seen)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Errors of which some are held: a centre, blocks that are free, and the one of them to part next."""
+
+    centre: Array
+    blocks: list[Block]
+    split: int
+
+
+class _Errors(Division[_Part]):
+    """Parts of all errors; the largest bound is the least of what is sought here, its negative."""
+
+    what, of_objective = "boxes of errors", False
+
+    def __init__(self, terms: Terms, tolerance: float, best: tuple[float, Array]) -> None:
+        self._terms, self._tolerance, self.best = terms, tolerance, best
+        self.known: Known = [{} for _ in terms]
+
+    def better(self, found: tuple[float, Array]) -> None:
+        """The worse of the worst errors so far and others."""
+        self.best = max(self.best, found, key=lambda each: each[0])
+
+    def is_done(self, one: Waiting[_Part]) -> bool:
+        """Whether no errors are worse by the tolerance."""
+        return -one.bound <= self.best[0] * (1.0 + self._tolerance)
+
+    def parts(self, taken: Sequence[Waiting[_Part]]) -> Parts[_Part]:
+        """One block held at either end, or its circle parted."""
+        ((above, _, own),) = taken
+        rest = [block for k, block in enumerate(own.blocks) if k != own.split]
+        for middle, free in own.blocks[own.split].parts(own.centre):
+            blocks = rest if free is None else [*rest, free]
+            part = bounded(self._terms, middle, blocks, self.best[0] * (1.0 + self._tolerance), self.known)
+            self.better((value_at(self._terms, part.errors), part.errors))
             # a part is never worse than the whole
             bound = min(part.bound, -above)
-            if own and bound > best[0] * (1.0 + ROUNDING):
-                heapq.heappush(queue, (-bound, next(order), middle, own, part.split))
-    bound = max(best[0], -queue[0][0] if queue else best[0])
-    return WorstCase(best[1], best[0], bound, nodes)
+            is_left = blocks and bound > self.best[0] * (1.0 + ROUNDING)
+            yield (-bound, _Part(middle, blocks, part.split)) if is_left else None
 
 
 def _starts(columns: Sequence[slice], count: int, seed: int) -> Array:

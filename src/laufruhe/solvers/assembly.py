@@ -7,8 +7,6 @@ that the bound is drawn to, step by step; every such assignment is an assembly t
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import math
 import time
 from collections.abc import Sequence
@@ -20,13 +18,13 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.load_models.built_engines import BuiltEngines, values_of
 from laufruhe.machine import Engine
-from laufruhe.numerics.budget import passed
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.assembly import Lot
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import AddedDrive, Error, PistonDrive, Tolerance, Tolerances
+from laufruhe.prove.best_first import Division, Parts, Waiting
 from laufruhe.prove.certificate import Proof, Reach, certified
 from laufruhe.prove.error_parts import Terms
 from laufruhe.prove.worst_case import value_at
@@ -71,7 +69,7 @@ def solve_assembly(problem: Problem) -> Result:
     value = objective_value(problem, final)
     certificate = certified(
         value, bound, nothing_of(problem), problem.tolerance, Reach.WHOLE, 0.0,
-        f"branch and bound over assignments, {search.nodes} parts bounded by dual rows",
+        f"branch and bound over assignments, {search.seen} parts bounded by dual rows",
     )  # fmt: skip
     limits = limit_values(problem, final)
     met = final.excess(problem.limits) <= KEPT
@@ -82,7 +80,7 @@ def solve_assembly(problem: Problem) -> Result:
         decisions=(), limits=limits, initial=initial, final=final,
         message="" if met else "the best assembly breaks a limit, and limits do not choose parts; relax it",
         error_estimate=error_of(problem, final), timing={"solve": time.perf_counter() - started},
-        assembly=search.told([part.name for part in problem.engine.slider_cranks]),
+        assembly=search.result([part.name for part in problem.engine.slider_cranks]),
     )  # fmt: skip
 
 
@@ -138,14 +136,16 @@ def _terms(problem: Problem) -> Terms:
     return tuple((weight, replace(norm, slope=norm.slope / PER_KILOGRAM)) for weight, norm in built.terms)
 
 
-class _Search:
+class _Search(Division[Chosen]):
     """Branch and bound over assemblies."""
+
+    what = "parts bounded"
 
     def __init__(self, terms: Terms, lots: Sequence[Lot], cylinders: int, tolerance: float) -> None:
         self.terms, self.lots, self.cylinders, self.tolerance = terms, lots, cylinders, tolerance
         self.more = [lot.differences for lot in lots]
         self.given: Chosen = tuple(tuple(range(cylinders)) for _ in lots)
-        self.best, self.value, self.nodes = self.given, self._value(self.given), 0
+        self.best, self.value = self.given, self._value(self.given)
         sizes = [sum(w * n.norm.value(n.grid, n.slope[..., k]) for w, n in terms) for k in range(2 * cylinders)]
         spread = [np.ptp(more, axis=0) for more in self.more]
         order = [
@@ -156,27 +156,28 @@ class _Search:
 
     def run(self) -> float:
         """The best assembly, and what none goes under."""
-        count = itertools.count()
         free: Chosen = tuple((-1,) * self.cylinders for _ in self.lots)
-        queue = [(self._bound(free), next(count), free)]
-        while queue and queue[0][0] < self.value * (1.0 - 0.5 * self.tolerance) and self.nodes < MOST_NODES:
-            if passed():
-                break
-            under, _, node = heapq.heappop(queue)
-            tell("parts bounded", self.nodes, value=self.value, bound=under)
-            lot, cylinder = next((at for at in self.order if node[at[0]][at[1]] < 0), (-1, -1))
-            if lot < 0:
+        return min(self.divide((self._bound(free), free), MOST_NODES), self._enough)
+
+    @property
+    def _enough(self) -> float:
+        return self.value * (1.0 - 0.5 * self.tolerance)
+
+    def is_done(self, one: Waiting[Chosen]) -> bool:
+        """Whether no assembly of it is better by half the tolerance."""
+        return one.bound >= self._enough
+
+    def parts(self, taken: Sequence[Waiting[Chosen]]) -> Parts[Chosen]:
+        """Every part that is left in the cylinder that counts most of those without one."""
+        ((under, _, node),) = taken
+        lot, cylinder = next((at for at in self.order if node[at[0]][at[1]] < 0), (-1, -1))
+        for part in range(len(self.more[lot])) if lot >= 0 else ():
+            if part in node[lot]:
                 continue
-            for part in range(len(self.more[lot])):
-                if part in node[lot]:
-                    continue
-                own = tuple(part if k == cylinder else old for k, old in enumerate(node[lot]))
-                child = (*node[:lot], own, *node[lot + 1 :])
-                bound = max(self._bound(child), under)
-                if bound < self.value * (1.0 - 0.5 * self.tolerance):
-                    heapq.heappush(queue, (bound, next(count), child))
-        least = self.value * (1.0 - 0.5 * self.tolerance)
-        return min(queue[0][0], self.value) if queue and queue[0][0] < least else least
+            own = tuple(part if k == cylinder else old for k, old in enumerate(node[lot]))
+            child = (*node[:lot], own, *node[lot + 1 :])
+            bound = max(self._bound(child), under)
+            yield (bound, child) if bound < self._enough else None
 
     def _mass(self, chosen: Chosen) -> Array:
         """What every cylinder has more: to and fro, then turning."""
@@ -193,7 +194,6 @@ class _Search:
 
     def _bound(self, node: Chosen) -> float:
         """What no assembly of a node goes under; those that come up are tried."""
-        self.nodes += 1
         if all(part >= 0 for parts in node for part in parts):
             return self._try(node)
         point, best = self._middle(node), -math.inf
@@ -206,7 +206,7 @@ class _Search:
             end = self._mass(corner)
             best = max(best, value + float(slope @ (end - point)))
             self._try(corner)
-            if best >= self.value * (1.0 - 0.5 * self.tolerance) or value - best <= 0.1 * self.tolerance * value:
+            if best >= self._enough or value - best <= 0.1 * self.tolerance * value:
                 break
             tried = [(value_at(self.terms, point + share * (end - point)), share) for share in LENGTHS]
             point = point + min(tried)[1] * (end - point)
@@ -239,7 +239,7 @@ class _Search:
             found.append(tuple(own))
         return tuple(found)
 
-    def told(self, names: Sequence[str]) -> AssemblyResult:
+    def result(self, names: Sequence[str]) -> AssemblyResult:
         """The best assembly cylinder by cylinder, beside others at random."""
         random = np.random.default_rng(0)
         others = [tuple(tuple(random.permutation(len(m))[: self.cylinders]) for m in self.more) for _ in range(RANDOM)]
@@ -251,7 +251,7 @@ class _Search:
         )  # fmt: skip
         return AssemblyResult(
             tuple(lot.kind for lot in self.lots), places,
-            math.prod(float(math.perm(len(m), self.cylinders)) for m in self.more), self.nodes,
+            math.prod(float(math.perm(len(m), self.cylinders)) for m in self.more), self.seen,
             tuple(float(q) for q in np.quantile(values, SHARES)), float(values.max()),
             value_at(self.terms, np.zeros(2 * self.cylinders)), RANDOM,
         )  # fmt: skip

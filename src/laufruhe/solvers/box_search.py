@@ -1,17 +1,15 @@
-"""Boxes of what is not convex, the least bound first: one loop for every method that divides them (P9)."""
+"""Boxes of what is not convex with a design from each, some worked out ahead by others (P9)."""
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import count
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.foresight import foresight
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.foresight import Foresight, foresight
+from laufruhe.prove.best_first import Division, Parts, Waiting
 from laufruhe.prove.certificate import gap_of
 
 # of the tolerance that counts as met
@@ -72,6 +70,42 @@ class Search(Protocol[B, F]):
         """Limits that were not met in boxes that another process divided."""
 
 
+class _Designed(Division[B], Generic[B, F]):
+    """Boxes of a search, and the best design found in them."""
+
+    def __init__(
+        self, search: Search[B, F], best: F, nothing: float, tolerance: float, what: str, ahead: Foresight[Any, Any]
+    ) -> None:  # fmt: skip
+        self.what, self.best, self.value = what, best, best.value
+        self._search, self._nothing, self._tolerance, self._ahead = search, nothing, tolerance, ahead
+
+    def is_done(self, one: Waiting[B]) -> bool:
+        """Whether it meets the best design."""
+        gap = gap_of(self.value, one.bound, self._nothing)
+        # a box that left nothing out has no better design, only a bound as near as its program came
+        return gap <= NEARLY * self._tolerance or (gap < np.inf and one.part.is_exact)
+
+    def parts(self, taken: Sequence[Waiting[B]]) -> Parts[B]:
+        """Parts of a box, worked out ahead where others divide boxes too."""
+        ((known, name, box),) = taken
+        search, step = self._search, (self._search, box, self.value)
+        if search.is_shared:
+            others = ((number, (search, part, self.value)) for _, number, part in self.coming(AHEAD))
+            self._ahead.likely([(name, step), *others])
+        parts, conflict = self._ahead.wanted(name, step)
+        search.told(conflict)
+        for part, found in parts:
+            left = None if part is None or part.bound >= self.value else (part.bound, part)
+            if left is not None and found is not None:
+                self.best = search.better(self.best, found)
+                self.value = self.best.value
+            yield left
+            if not search.is_shared and passed():
+                # what is left of the box is bounded by its own bound
+                yield known, box
+                return
+
+
 def divided(
     search: Search[B, F], root: B, best: F, nothing: float, tolerance: float, most: int, what: str
 ) -> tuple[F, float, int]:
@@ -90,32 +124,10 @@ def divided(
     -------
     The best design; what bounds the boxes that are left, infinite where none is; and how many there were.
     """
-    number, seen = count(), 1
-    heap = [(root.bound, next(number), root)]
     with foresight(_parted) as ahead:
-        while heap and seen < most and not passed():
-            gap = gap_of(best.value, heap[0][0], nothing)
-            # a box that left nothing out has no better design, only a bound as near as its program came
-            if gap <= NEARLY * tolerance or (gap < np.inf and heap[0][2].is_exact):
-                break
-            _, name, box = heapq.heappop(heap)
-            step = search, box, best.value
-            if search.is_shared:
-                others = heapq.nsmallest(AHEAD, heap)
-                ahead.likely([(name, step), *((other, (search, one, best.value)) for _, other, one in others)])
-            parts, conflict = ahead.wanted(name, step)
-            search.told(conflict)
-            for part, found in parts:
-                seen += 1
-                if part is not None and part.bound < best.value:
-                    heapq.heappush(heap, (part.bound, next(number), part))
-                    best = best if found is None else search.better(best, found)
-                if not search.is_shared and passed():
-                    # what is left of the box is bounded by its own bound
-                    heapq.heappush(heap, (box.bound, next(number), box))
-                    break
-            tell(what, seen, value=best.value, bound=heap[0][0] if heap else -np.inf)
-    return best, heap[0][0] if heap else np.inf, seen
+        boxes = _Designed(search, best, nothing, tolerance, what, ahead)
+        bound = boxes.divide((root.bound, root), most)
+    return boxes.best, bound, boxes.seen
 
 
 def _parted(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tuple[str, ...]]:

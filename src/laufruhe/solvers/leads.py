@@ -27,8 +27,8 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, load_rows
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import divide
 from laufruhe.prove.certificate import Reach, room_of
-from laufruhe.prove.subdivision import divide
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged
 from laufruhe.solvers.result import Result
 

@@ -20,9 +20,10 @@ from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, gap_of, room_of
 from laufruhe.prove.spring_search import spring_bound
-from laufruhe.prove.subdivision import Divided, divided_bound, divides
+from laufruhe.prove.subdivision import divided_bound, divides
 from laufruhe.prove.transmitted_bound import transmitted_bound
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, none_within
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts

@@ -12,8 +12,8 @@ from laufruhe.numerics.budget import passed
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided, divide
 from laufruhe.prove.certificate import Reach, room_of
-from laufruhe.prove.subdivision import Divided, divide
 from laufruhe.prove.twist_boxes import TwistBoxes
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged, none_within
 from laufruhe.solvers.local_programs import LocalProgram, looks, priced, searched

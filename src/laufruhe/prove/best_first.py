@@ -1,0 +1,223 @@
+"""Best first: what is open is divided, the part with the least bound first, until nothing better can be left.
+
+The one loop of all that is proven so (T9, Z12, P8, P13, S29, S30, V13, E38, R4 to R7): its order, its limits of time
+and parts, what it tells who waits, and its end. A method says what its parts are, and what bounds them.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.numerics.budget import passed
+from laufruhe.numerics.progress import tell
+
+Array = NDArray[np.float64]
+P = TypeVar("P")
+
+# of the difference that counts as none, what is left for roundings
+NEARLY = 0.9
+# boxes whose middles are told
+MOST_PLACES = 3
+
+
+class Waiting(NamedTuple, Generic[P]):
+    """A part, what no design in it goes under, and the place in which it came: of two alike the earlier goes first."""
+
+    bound: float
+    number: int
+    part: P
+
+
+Parts: TypeAlias = Iterable[tuple[float, P] | None]
+"""Parts with their bounds, None for each in which nothing better is left."""
+
+
+class Division(Generic[P]):
+    """Parts of what is open; a method says what they are, and what bounds them.
+
+    Attributes
+    ----------
+    what
+        Is divided, in words.
+    at_once
+        Parts that are divided in one round.
+    value
+        Objective of the best design known; infinite where none is.
+    of_objective
+        Whether bounds are of the objective, and told to who waits.
+    seen
+        Parts that were looked at.
+    waiting
+        Parts that are left.
+    complete
+        Whether it ended by itself, and not for want of time or parts.
+    """
+
+    what: str
+    at_once: int = 1
+    value: float = math.inf
+    of_objective: bool = True
+    seen: int
+    waiting: list[Waiting[P]]
+    complete: bool
+
+    def look(self, part: P) -> None:
+        """Seek a design in a part whose turn it is."""
+
+    def is_done(self, one: Waiting[P]) -> bool:
+        """Whether neither a part nor any with a higher bound need be divided."""
+        raise NotImplementedError
+
+    def parts(self, taken: Sequence[Waiting[P]]) -> Parts[P]:
+        """Parts that cover those taken."""
+        raise NotImplementedError
+
+    def coming(self, count: int) -> Sequence[Waiting[P]]:
+        """So many of the parts that wait, those that come next first."""
+        return heapq.nsmallest(count, self.waiting)
+
+    def divide(self, root: tuple[float, P] | None, most: int) -> float:
+        """Divide parts until the least bound is high enough, no part is left, or as often as is worth it.
+
+        Parameters
+        ----------
+        root
+            Bound of all that is open, and that; None where nothing in it is allowed.
+        most
+            Parts, the root one of them.
+
+        Returns
+        -------
+        The least bound of what is left, infinite where nothing is.
+        """
+        queue = self.waiting = [] if root is None else [Waiting(root[0], 0, root[1])]
+        self.seen, self.complete = 1, True
+        while queue:
+            self.look(queue[0].part)
+            if self.is_done(queue[0]):
+                break
+            self.complete = self.seen < most and not passed()
+            if not self.complete:
+                break
+            known = (self.value, queue[0].bound) if self.of_objective else (math.inf, -math.inf)
+            tell(self.what, self.seen, 0, *known)
+            taken = [heapq.heappop(queue)]
+            while queue and len(taken) < self.at_once and not self.is_done(queue[0]):
+                taken.append(heapq.heappop(queue))
+            for found in self.parts(taken):
+                self.seen += 1
+                if found is not None:
+                    heapq.heappush(queue, Waiting(found[0], self.seen, found[1]))
+        return queue[0].bound if queue else math.inf
+
+
+class Box(NamedTuple):
+    """Open numbers between bounds, and the side that is worth halving."""
+
+    lower: Array
+    upper: Array
+    side: int
+
+
+def halves(box: Box) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """A box cut in the middle of its side."""
+    here, middle = np.arange(len(box.lower)) == box.side, 0.5 * (box.lower + box.upper)
+    return (box.lower, np.where(here, middle, box.upper)), (np.where(here, middle, box.lower), box.upper)
+
+
+def widest(lower: Array, upper: Array, whole: Array) -> int:
+    """The side that is longest beside that of all that is open."""
+    return int(np.argmax((upper - lower) / np.maximum(whole, 1e-300)))
+
+
+@dataclass(frozen=True, eq=False)
+class Divided:
+    """What dividing the bounds of open numbers has proven.
+
+    Attributes
+    ----------
+    bound
+        No design allowed has a smaller objective; zero where nothing is known.
+    boxes
+        That were looked at.
+    places
+        Middles of the least of those that are left.
+    """
+
+    bound: float
+    boxes: int
+    places: tuple[Array, ...] = ()
+
+
+class Halving(Division[Box]):
+    """Boxes halved until none may hold a design that is `room` better than `value`."""
+
+    def __init__(self, value: float, room: float) -> None:
+        self.value = value
+        self.enough = value - NEARLY * room if value < math.inf else math.inf
+
+    def is_done(self, one: Waiting[Box]) -> bool:
+        """Whether no design in it is better by the room."""
+        return not one.bound < self.enough
+
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
+        """Halves of boxes and their own bounds; None for those that hold no design allowed."""
+        raise NotImplementedError
+
+    def parts(self, taken: Sequence[Waiting[Box]]) -> Parts[Box]:
+        """Halves, of which none has a bound under that of the whole."""
+        for k, found in enumerate(self.halved([one.part for one in taken])):
+            bound = math.inf if found is None else max(taken[k // 2].bound, found[0])
+            yield (bound, found[1]) if found is not None and bound < self.enough else None
+
+    def run(self, root: tuple[float, Box] | None, most: int) -> Divided:
+        """What is proven, and where the least of the boxes that are left are."""
+        bound = self.divide(root, most)
+        least = [one.part for one in self.coming(MOST_PLACES) if one.bound < self.enough]
+        places = tuple(0.5 * (box.lower + box.upper) for box in least)
+        return Divided(min(bound, self.enough), self.seen, places)
+
+
+class BoxBounds(Protocol):
+    """What bounds boxes from below, many at once."""
+
+    what: str
+
+    @property
+    def at_once(self) -> int:
+        """Boxes of one round."""
+
+    def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
+
+
+class _Bounded(Halving):
+    """Boxes with bounds found by someone else."""
+
+    def __init__(self, search: BoxBounds, value: float, room: float) -> None:
+        super().__init__(value, room)
+        # two halves make two boxes of a round
+        self._search, self.what, self.at_once = search, search.what, -(-search.at_once // 2)
+
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
+        """Of all boxes together."""
+        return [*self.bounded([half for box in boxes for half in halves(box)])]
+
+    def bounded(self, boxes: Sequence[tuple[Array, Array]]) -> list[tuple[float, Box]]:
+        """With their bounds."""
+        lower, upper = (np.array([box[k] for box in boxes]) for k in (0, 1))
+        found = zip(boxes, *self._search.bounds(lower, upper), strict=True)
+        return [(float(bound), Box(*box, int(side))) for box, bound, side in found]
+
+
+def divide(search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: int) -> Divided:
+    """Halve boxes, the least first, until none may hold a design that is `room` better than `value`."""
+    division = _Bounded(search, value, room)
+    return division.run(division.bounded([(lower, upper)])[0], most)
