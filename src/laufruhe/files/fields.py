@@ -256,7 +256,6 @@ OpenUnbalance: TypeAlias = Annotated[float | Open, Number("kg m", least=0.0, ope
 OpenMass: TypeAlias = Annotated[float | Open, Number("kg", least=0.0, openable=True)]
 LossFactor: TypeAlias = Annotated[float, Number("", least=0.0, most=10.0)]
 Stiffness: TypeAlias = Annotated[float, Number("N/m", least=0.0)]
-TorsionalStiffness: TypeAlias = Annotated[float, Number("N m/rad", above=0.0)]
 TorsionalDamping: TypeAlias = Annotated[float, Number("N m s/rad", least=0.0)]
 PositiveInertia: TypeAlias = Annotated[float, Number("kg m^2", above=0.0)]
 Inertias: TypeAlias = Annotated[list[float], OneOrEach(Annotated[float, Number("kg m^2", least=0.0)])]

@@ -28,7 +28,7 @@ class Foresight(Generic[T, A]):
         self._began = time.perf_counter()
         self._executor: Executor | None = None
         self._asked: dict[Hashable, Future[A]] = {}
-        self.foreseen = self.wasted = 0
+        self.foreseen = 0
 
     def likely(self, steps: Iterable[tuple[Hashable, T]]) -> None:
         """Steps that may be wanted next, the likeliest first; as many are begun as can be worked at once."""
@@ -61,7 +61,6 @@ class Foresight(Generic[T, A]):
 
     def forget(self) -> None:
         """What was foreseen and is not wanted any more."""
-        self.wasted += len(self._asked)
         for future in self._asked.values():
             future.cancel()
         self._asked.clear()

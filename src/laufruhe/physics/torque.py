@@ -1,4 +1,4 @@
-"""Torque of the crankshaft over the cycle, the energy that a flywheel has to store, and how large it must be (T1-T4).
+"""Torque of the crankshaft over the cycle, the energy that a flywheel has to store (T1-T3).
 
     T = -A (p - p_crankcase) ds/dphi - (1/2) w^2 dJ/dphi                     (T1; textbook eqs. 18 to 20)
 
@@ -9,12 +9,10 @@ smallest of its integral (T2; textbook 2.7, example 4).
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.crank_torque import crank_torque
@@ -24,7 +22,6 @@ from laufruhe.physics.reduced_inertia import turning_inertia
 
 FINE = 8
 """Times as many steps as the fidelity has, at which the work is compared."""
-_ROUNDS = 200
 
 
 @dataclass(frozen=True)
@@ -83,46 +80,3 @@ def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
         mean, mean * point.speed, float(values.min()), float(values.max()),
         work_stored(torque, FINE * fidelity.samples), uneven,
     )  # fmt: skip
-
-
-def least_inertia(
-    engine: Engine, point: OperatingPoint, degree: float, fidelity: Fidelity = EXACT, tolerance: float = 1e-9
-) -> float:
-    """Least inertia of all that turns with the crank [kg m2] that keeps the speed as even as asked (T4).
-
-    The degree of irregularity never rises with the inertia, so halving an interval finds it; the
-    speed is the exact one (F2-F4), pistons and rods storing energy of their own.
-
-    Parameters
-    ----------
-    degree
-        Largest less smallest speed over the mean, wanted: 1/60 for a mill, 1/300 for electric light.
-
-    Raises
-    ------
-    ModelError
-        If the degree is not positive, or no inertia reaches it.
-    """
-    if not degree > 0.0:
-        raise ModelError(f"a degree of irregularity of {degree:g} means no change of speed; give a positive one")
-
-    swing = swing_of(engine, point, replace(fidelity, crank_inertia=math.inf))
-
-    def keeps(inertia: float) -> bool:
-        return swing.irregularity(inertia) <= degree
-
-    stored = work_stored(crank_torque(engine, point, fidelity), FINE * fidelity.samples)
-    high = max(stored / (degree * point.speed**2), 1e-12)
-    for _ in range(_ROUNDS):
-        if keeps(high):
-            break
-        high *= 2.0
-    else:
-        raise ModelError(f"no flywheel keeps the speed of '{engine.name}' even to {degree:g} at {point.name}")
-    low = high
-    while low > 1e-12 and keeps(low):
-        high, low = low, 0.5 * low
-    while high - low > tolerance * high:
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if keeps(middle) else (middle, high)
-    return high

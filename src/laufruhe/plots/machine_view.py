@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle, Wedge
 from numpy.typing import NDArray
 
-from laufruhe.machine import Engine, Rotor, Shaft
+from laufruhe.machine import Engine, Rotor
 from laufruhe.machine.rotor import Role
 from laufruhe.plots.machine_parts import (
     IRON,
@@ -82,12 +82,6 @@ class Scene:
     def weights(self) -> list[Rotor]:
         """Unbalances that are there, but for the throws themselves."""
         return [rotor for rotor in self.engine.rotors if rotor.role is not Role.THROW and abs(rotor.unbalance) > 0.0]
-
-    @property
-    def balancers(self) -> list[Shaft]:
-        """Shafts beside the cranks."""
-        cranks = {part.shaft for part in self.engine.slider_cranks}
-        return [shaft for shaft in self.engine.shafts if shaft not in cranks]
 
     @property
     def is_flat(self) -> bool:

@@ -26,7 +26,6 @@ from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
-NO_MOUNTS = "an engine without mounts has no mount forces"
 BETWEEN = NORMS["maximum"].refinement
 """Times as many samples as are asked for, among which maxima of mounts are sought (M6)."""
 

@@ -154,7 +154,7 @@ class LocalOptimum:
         Objective at the last stage's parameters.
     constraints
         Values, shape (m,).
-    multipliers, bound_multipliers
+    multipliers
         In the program's own units, positive where an upper side holds (N2).
     kkt_residual
         Largest violation of N2 and of the limits, each over its own scale.
@@ -172,7 +172,6 @@ class LocalOptimum:
     value: float
     constraints: Array
     multipliers: Array
-    bound_multipliers: Array
     kkt_residual: float
     violation: float
     iterations: int
@@ -309,7 +308,6 @@ def _from_start(task: _Task, solver: Any, slopes: Any, k: int, point: Array) -> 
         value=float(f) * task.objective_scale,
         constraints=_flat(g) * task.constraint_scales,
         multipliers=m * task.objective_scale / task.constraint_scales,
-        bound_multipliers=b * task.objective_scale / task.scales,
         kkt_residual=residual,
         violation=violation,
         iterations=iterations,

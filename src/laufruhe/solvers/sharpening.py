@@ -40,8 +40,6 @@ class Optimum:
     ----------
     problem
         Rows on the grid that the bound holds on.
-    judge
-        Rows at the angles that its limits are judged at.
     excess
         Largest relative excess over a limit, sought between the angles too.
     nothing
@@ -53,7 +51,6 @@ class Optimum:
     x: Array
     bound: Bound
     problem: AffineProblem
-    judge: AffineProblem
     gap: float
     excess: float
     samples: int
@@ -81,7 +78,7 @@ def sharpened(model: AffineModel, rough: Optimum) -> Optimum:
     if gap >= rough.gap or excess > max(rough.excess, FEASIBLE):
         return rough
     then = " and Newton's method"
-    return replace(rough, x=x, bound=bound, problem=fine, judge=fine, gap=gap, excess=excess, then=then)
+    return replace(rough, x=x, bound=bound, problem=fine, gap=gap, excess=excess, then=then)
 
 
 def _is_smooth(problem: AffineProblem) -> bool:

@@ -142,7 +142,7 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float,
     bound = best_bound(averaged, x, on_grid(coarse, averaged, solution.multipliers))
     judge = model.at(fine.samples, finer=True) if _has_peaks(problem) else fine
     value = judge.objective(x)
-    return Optimum(x, bound, fine, judge, gap_of(value, bound.value, nothing), judge.excess(x), samples, nothing)
+    return Optimum(x, bound, fine, gap_of(value, bound.value, nothing), judge.excess(x), samples, nothing)
 
 
 def _has_peaks(problem: Problem) -> bool:
