@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from laufruhe.errors import Complaint, InputError, ModelError, wrong_call
 from laufruhe.files import edits
-from laufruhe.files.asked import Scene, limits_of, objectives_of
+from laufruhe.files.asked import limits_of, objectives_of
 from laufruhe.files.assembly import assembly_of
 from laufruhe.files.bearings import bearings_of
 from laufruhe.files.catalogue import with_catalogue
@@ -37,6 +37,7 @@ from laufruhe.files.piston_masses import check_factors, piston_masses
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.running_gear import size_decisions, weighed
+from laufruhe.files.scene import Scene
 from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbers
 from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Cycle, Engine, SliderCrank

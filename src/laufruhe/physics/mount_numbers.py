@@ -1,14 +1,15 @@
-"""Numbers of a block on its mounts that designers ask for (E7, E9, E11, E14)."""
+"""Numbers of a block on its mounts that designers ask for (E7, E9, E11, E14, E46, E47)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Mount
+from laufruhe.machine import Block, Mount
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import static_motion, torque_roll_axis, weight_wrench
@@ -42,25 +43,100 @@ def decoupling(energy: Any, motions: Sequence[int]) -> float:
     return float(min(energy[motion].max() for motion in motions))
 
 
-def torque_roll_rows(mounting: ElasticMounting) -> tuple[Array, Array]:
-    """What turning about the torque-roll axis would need to be a mode (E14).
+def decoupling_shortfall(energy: Any, motions: Sequence[int], wanted: float) -> float:
+    """Sum over motions of what is wanting to a share in the mode that is most its own (E47)."""
+    return float(sum(max(wanted - energy[motion].max(), 0.0) for motion in motions))
 
-    Returns
-    -------
-    Motion t about the axis in coordinates where the mass is one, shape (6,), and the
-    inverse root of the mass, shape (6, 6): the residual is |R K R' t / w^2 - t|.
+
+@dataclass(frozen=True, eq=False)
+class AxisResidual:
+    """What turning about the torque-roll axis lacks to be a mode, |left A right - s mass| with s between bounds.
+
+    A is the stiffness in coordinates in which the mass is one. The least s is known in closed form, so that the
+    residual is the distance of an affine function of A from a line: convex in stiffness.
+
+    Attributes
+    ----------
+    left
+        Shape (6, 6).
+    right, mass
+        Shape (6,).
+    least, most
+        Of s.
     """
-    motion = np.concatenate([np.zeros(3), torque_roll_axis(mounting.block)])
-    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
-    along = np.linalg.solve(root.T, motion)
-    return along / np.linalg.norm(along), root
+
+    left: Array
+    right: Array
+    mass: Array
+    least: float
+    most: float
+
+    def answer(self, matrix: Any) -> Any:
+        """left A right; of symbols as well."""
+        return self.left @ matrix @ self.right
+
+    def nearest(self, answer: Array) -> float:
+        """The s that leaves least."""
+        return float(np.clip(self.mass @ answer / (self.mass @ self.mass), self.least, self.most))
+
+    def rows(self, matrix: Array) -> Array:
+        """left A right - s mass at the best s, shape (6,)."""
+        answer = np.asarray(self.answer(matrix))
+        return answer - self.nearest(answer) * self.mass
+
+    def under(self, z: Array) -> tuple[Array, float]:
+        """y of length one at most, and c: y' left A right - c is nowhere over the residual (E19, E46)."""
+        y = z / max(float(np.linalg.norm(z)), 1.0)
+        along = float(y @ self.mass)
+        if self.most == np.inf and along > 0.0:
+            y = y - along / float(self.mass @ self.mass) * self.mass
+            along = 0.0
+        return y, along * (self.most if along > 0.0 else self.least)
 
 
-def torque_roll_residual(mounting: ElasticMounting, frequency: float) -> float:
-    """|R K R' t / w^2 - t|: zero where turning about the torque-roll axis is a mode at `frequency` [Hz] (E14)."""
-    along, root = torque_roll_rows(mounting)
-    square = (2.0 * np.pi * frequency) ** 2
-    return float(np.linalg.norm(root @ mounting.stiffness @ root.T @ along / square - along))
+Band: TypeAlias = tuple[float, float]
+"""Least and largest frequency that counts [Hz]."""
+
+
+def relative_residual(block: Block, band: Band) -> AxisResidual:
+    """|A t / w^2 - t|, t the turning of length one in coordinates in which the mass is one (E14)."""
+    root = np.linalg.cholesky(block.mass_matrix)
+    along = root.T @ _turning(block)
+    along = along / np.linalg.norm(along)
+    return AxisResidual(np.eye(6) / (2.0 * np.pi * band[0]) ** 2, along, along, 1.0, 1.0)
+
+
+def raw_residual(block: Block, band: Band) -> AxisResidual:
+    """|K q - w^2 M q|, q one radian about the torque-roll axis, in N and N m for each radian (E46)."""
+    root, motion = np.asarray(np.linalg.cholesky(block.mass_matrix), dtype=np.float64), _turning(block)
+    low, high = ((2.0 * np.pi * frequency) ** 2 for frequency in band)
+    return AxisResidual(root, root.T @ motion, block.mass_matrix @ motion, low, high)
+
+
+def _turning(block: Block) -> Array:
+    return np.asarray(np.concatenate([np.zeros(3), torque_roll_axis(block)]), dtype=np.float64)
+
+
+def mass_root(block: Block) -> Array:
+    """R with R M R' = 1: the transpose takes motion from coordinates in which the mass is one, shape (6, 6)."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(block.mass_matrix)))
+
+
+def residual_of(mounting: ElasticMounting, axis: AxisResidual) -> float:
+    """Of a block on its mounts."""
+    root = mass_root(mounting.block)
+    return float(np.linalg.norm(axis.rows(root @ mounting.stiffness @ root.T)))
+
+
+def torque_roll_answer(mounting: ElasticMounting) -> float:
+    """|K q|: what the mounts answer to turning about the torque-roll axis by one radian (E46)."""
+    return float(np.linalg.norm(mounting.stiffness @ _turning(mounting.block)))
+
+
+def torque_roll_frequency(mounting: ElasticMounting) -> float:
+    """At which turning about the torque-roll axis is nearest to a mode, in raw coordinates [Hz] (E46)."""
+    axis = raw_residual(mounting.block, (0.0, np.inf))
+    return float(np.sqrt(axis.nearest(mounting.stiffness @ _turning(mounting.block))) / (2.0 * np.pi))
 
 
 def total_stiffness(mounts: Sequence[Mount]) -> float:

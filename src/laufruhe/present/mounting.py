@@ -33,8 +33,9 @@ class MountingFacts:
         Of the centre of gravity under its own weight, and at every mount, downwards [m].
     torque_travel
         Largest displacement of any mount under the mean torque [m].
-    torque_roll_axis, torque_roll_coupling
-        Unit vector, and what is zero where turning about it is a mode (E8).
+    torque_roll_axis, torque_roll_coupling, torque_roll_frequency
+        Unit vector, what is zero where turning about it is a mode (E8), and the frequency of the mode that comes
+        nearest [Hz] (E46).
     """
 
     modes: Modes
@@ -45,6 +46,7 @@ class MountingFacts:
     torque_travel: float
     torque_roll_axis: Array
     torque_roll_coupling: float
+    torque_roll_frequency: float
 
 
 def is_elastic(result: Result) -> bool:
@@ -68,6 +70,7 @@ def facts_of(evaluation: Evaluation) -> MountingFacts:
         torque_travel=float(max(travels, default=0.0)),
         torque_roll_axis=torque_roll_axis(mounting.block),
         torque_roll_coupling=torque_roll_coupling(mounting.block, mounting.stiffness),
+        torque_roll_frequency=mount_numbers.torque_roll_frequency(mounting),
     )
 
 

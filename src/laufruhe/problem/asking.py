@@ -29,8 +29,12 @@ class Asked(Protocol):
         """Rotors, or shafts, that count."""
 
     @property
-    def frequency(self) -> float:
-        """Wanted about the torque-roll axis [Hz]."""
+    def frequency(self) -> tuple[float, float]:
+        """Least and largest wanted about the torque-roll axis [Hz]."""
+
+    @property
+    def wanted(self) -> float:
+        """Share of a motion that is enough."""
 
 
 class Answered(Protocol):

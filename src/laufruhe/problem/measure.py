@@ -46,7 +46,9 @@ class Measure:
     motions
         That are to have a mode of their own; all when None.
     frequency
-        Natural frequency about the torque-roll axis that is wanted [Hz].
+        Least and largest natural frequency about the torque-roll axis that is wanted [Hz].
+    wanted
+        Share of a motion in a mode of its own that is enough.
     """
 
     channel: Channel
@@ -57,7 +59,8 @@ class Measure:
     orders: tuple[float, ...] | None = None
     direction_weights: tuple[float, float, float] | None = None
     motions: tuple[str, ...] | None = None
-    frequency: float = 0.0
+    frequency: tuple[float, float] = (0.0, math.inf)
+    wanted: float = 1.0
 
     @property
     def name(self) -> str:

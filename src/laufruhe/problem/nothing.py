@@ -62,4 +62,4 @@ def _own(measure: Measure, engine: Engine) -> float:
     """Size of what is minimised that is no load: masses beside those that move, and what a channel says of itself."""
     if measure.is_mass:
         return sum(part.reciprocating_mass + part.rotating_mass for part in engine.slider_cranks)
-    return measure.channel.size
+    return measure.channel.size(engine)

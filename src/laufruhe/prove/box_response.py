@@ -11,8 +11,6 @@ travel of the mounts are linear in x times y, so they are known up to the second
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +18,6 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import ElasticMounting
-from laufruhe.physics.modes import weight_wrench
-from laufruhe.physics.mount_numbers import torque_roll_rows, total_stiffness
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, mounting_in
@@ -225,49 +221,6 @@ class BoxModel:
     def stiffness(self, x: Array) -> Array:
         """A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
         return self._at("stiffness", x)
-
-    def sag(self, x: Array) -> Array:
-        """At many designs, shape (boxes,); infinite where a mode is free (E9)."""
-        weight = weight_wrench(self.mounting(self.lower).block)
-        matrices, pull = self.stiffness(x), self.root @ weight
-        held = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
-        settled = np.linalg.solve(np.where(held[:, None, None], matrices, np.eye(6)), pull)
-        return np.where(held, settled @ pull / -weight[2], math.inf)
-
-    def torque_roll(self, frequency: float, lower: Array, upper: Array) -> Array:
-        """Least residual over boxes, shape (boxes,): its rows are linear in x (E14, E19)."""
-        along, _ = torque_roll_rows(self.mounting(self.lower))
-        square = (math.tau * frequency) ** 2
-        rows = self.stiffness(0.5 * (lower + upper)) @ along / square - along
-        size = np.linalg.norm(rows, axis=1)
-        unit = rows / np.where(size > 0.0, size, 1.0)[:, None]
-        bent = np.abs(unit @ (self._slopes["stiffness"] @ along / square).T)
-        return np.asarray(np.maximum(size - np.sum(bent * 0.5 * (upper - lower), axis=1), 0.0))
-
-    def share(self, motions: Sequence[int], lower: Array, upper: Array) -> Array:
-        """What the least share of these motions in a mode of their own is not over in boxes, shape (boxes,) (E7).
-
-        A box turns a mode by no more than the change of A over its distance from the others (Davis and Kahan).
-        """
-        squares, modes = np.linalg.eigh(self.stiffness(0.5 * (lower + upper)))
-        change = 0.5 * (upper - lower) @ np.linalg.norm(self._slopes["stiffness"], ord=2, axis=(1, 2))
-        apart = np.abs(squares[:, :, None] - squares[:, None, :]) + np.where(np.eye(6) > 0.0, np.inf, 0.0)
-        room = np.maximum(apart.min(axis=2) - 2.0 * change[:, None], 0.0)
-        turned = np.where(room > 0.0, change[:, None] / np.where(room > 0.0, room, 1.0), 1.0)
-        found = np.full(len(lower), np.inf)
-        for motion in motions:
-            shape, momentum = self.root[:, motion], np.linalg.inv(self.root)[motion]
-            shares = (shape @ modes) * (momentum @ modes)
-            size = np.linalg.norm(shape) * np.linalg.norm(momentum)
-            found = np.minimum(found, (shares + 2.0 * size * np.minimum(turned, 1.0)).max(axis=1))
-        return found
-
-    def total_stiffness(self, x: Array) -> Array:
-        """Sum over mounts and axes at many designs, shape (boxes,) [N/m]."""
-        decisions = self.problem.mount_decisions
-        gains = np.array([sum(drive.gain for drive in decision.mount_drives) for decision in decisions])
-        lowest = self.problem.design([float(v) for v in self.lower], self.problem.mount_decisions)
-        return np.asarray(total_stiffness(lowest.mounts) + (x - self.lower) @ gains)
 
     def _at(self, name: str, x: Array) -> Array:
         base: Array = getattr(self._base, name)

@@ -7,6 +7,7 @@ Then, x the stiffnesses and any of y, V >= 0 with trace one, z with |z| <= 1 giv
     lambda_max A >= <V, A(x)>                   highest natural frequency               (E17)
    -lambda_min A >= -<V, A(x)>                  lowest natural frequency                (E18)
     |A t / W2 - t| >= z' (A(x) t / W2 - t)      torque-roll residual                    (E19)
+    |K q - s M q|  >= z' K(x) q - max s z' M q  the same in raw coordinates, s open     (E46)
 
 with equality at the right y, V, z. Right sides are linear in x, so a weighted sum of them,
 limits included, is bounded over the box of x in closed form: a lower bound of the
@@ -21,6 +22,8 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from laufruhe.physics.mount_numbers import AxisResidual
 
 Array = NDArray[np.float64]
 
@@ -119,27 +122,21 @@ class Eigenvalue:
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """|A(x) t / square - t| (E19)."""
+    """What turning about the torque-roll axis lacks to be a mode (E19, E46)."""
 
     matrices: Matrices
-    along: Array
-    square: float
-
-    def rows(self, x: Array) -> Array:
-        """A(x) t / square - t."""
-        return np.asarray(self.matrices.at(x) @ self.along / self.square - self.along)
+    axis: AxisResidual
 
     def value(self, x: Array) -> float:
         """At x."""
-        return float(np.linalg.norm(self.rows(x)))
+        return float(np.linalg.norm(self.axis.rows(self.matrices.at(x))))
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
         """The linear function of a z of length one at most: the dual vector's, or along the residual."""
-        z = self.rows(x) if dual is None else dual
-        size = float(np.linalg.norm(z))
-        z = z / max(size, 1.0) if dual is not None else z / (size or 1.0)
-        constant, gradient = self.matrices.between(z, self.along)
-        return constant / self.square - float(z @ self.along), gradient / self.square
+        z = self.axis.rows(self.matrices.at(x)) if dual is None else dual
+        y, taken = self.axis.under(z / (float(np.linalg.norm(z)) or 1.0) if dual is None else z)
+        constant, gradient = self.matrices.between(self.axis.left.T @ y, self.axis.right)
+        return constant - taken, gradient
 
 
 @dataclass(frozen=True, eq=False)

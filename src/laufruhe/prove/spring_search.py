@@ -12,10 +12,11 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divide
 from laufruhe.prove.box_norms import counted_rows, line_weights
+from laufruhe.prove.box_numbers import SLACK
 from laufruhe.prove.box_response import BoxModel, Lines
 from laufruhe.prove.spring_bound import Held, Limited, least_squares, spring_sides, stiffness_limit
 from laufruhe.prove.spring_lines import Middle, Response, aligned, middle_of, response, springs_of
-from laufruhe.prove.subdivision import SLACK, StiffnessBoxes
+from laufruhe.prove.subdivision import StiffnessBoxes
 from laufruhe.prove.transmitted_bound import limited_stiffness
 
 Array = NDArray[np.float64]

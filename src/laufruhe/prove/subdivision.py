@@ -7,9 +7,7 @@ the least value on what is left bounds the objective of every design allowed.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import TypeAlias
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,19 +15,17 @@ from numpy.typing import NDArray
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
-from laufruhe.problem.channels import Channel, motion_indices
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divide
 from laufruhe.prove.box_norms import Under, root_under, under
+from laufruhe.prove.box_numbers import RANGES, SLACK, breaks
 from laufruhe.prove.box_response import BoxModel, Expansion, Lines
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# designs count as allowed when they break a limit by less
-SLACK = 1e-6
 # open numbers that are divided without being asked for, and what all boxes may cost together
 MOST_OPEN = 4
 WORK = 4e6
@@ -235,35 +231,3 @@ def _pull(at: Expansion) -> Array:
 def _known(bound: Array) -> Array:
     """Zero where an expansion does not end: no norm goes under it."""
     return np.maximum(np.where(np.isfinite(bound), bound, 0.0), 0.0)
-
-
-def _frequencies(model: BoxModel, x: Array) -> Array:
-    """Natural frequencies at designs, shape (boxes, 6) [Hz]."""
-    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(model.stiffness(x)), 0.0)) / math.tau)
-
-
-Ranges: TypeAlias = Callable[[BoxModel, Measure, Array, Array], tuple[Array | float, Array | float]]
-RANGES: Mapping[Channel, Ranges] = {
-    channels.SAG: lambda model, _, lower, upper: (model.sag(upper), model.sag(lower)),
-    channels.TOTAL_STIFFNESS: lambda model, _, lower, upper: (
-        model.total_stiffness(lower), model.total_stiffness(upper)
-    ),
-    channels.TORQUE_ROLL: lambda model, m, lower, upper: (model.torque_roll(m.frequency, lower, upper), math.inf),
-    channels.DECOUPLING: lambda model, m, lower, upper: (-math.inf, model.share(motion_indices(m), lower, upper)),
-    channels.FREQUENCIES: lambda model, _, lower, upper: (
-        _frequencies(model, lower)[:, -1], _frequencies(model, upper)[:, 0]
-    ),
-}  # fmt: skip
-"""Of a number of the mounts on boxes, what it is not under and what it is not over: more stiffness lowers sag
-and raises every frequency (E39). Of several numbers the last is not under the one, the first not over the other."""
-
-
-def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:
-    """Whether a limit is broken all over a box (E39)."""
-    least, most = RANGES[limit.measure.channel](model, limit.measure, lower, upper)
-    out = np.zeros(len(lower), dtype=bool) | (least > limit.maximum * (1.0 + SLACK))
-    out |= most < limit.minimum * (1.0 - SLACK)
-    if limit.outside is not None:
-        a, b = limit.outside[0] * (1.0 + SLACK), limit.outside[1] * (1.0 - SLACK)
-        out |= np.any((_frequencies(model, lower) > a) & (_frequencies(model, upper) < b), axis=1)
-    return np.asarray(out)

@@ -37,7 +37,7 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.subdivision import SLACK
+from laufruhe.prove.box_numbers import SLACK
 from laufruhe.prove.twist_coordinates import TwistCoordinates
 
 Array = NDArray[np.float64]

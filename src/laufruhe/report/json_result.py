@@ -222,7 +222,7 @@ def _modes(design: Evaluation) -> Record:
         "energy": facts.modes.energy.T.tolist(),
         "shapes": facts.modes.shapes.T.tolist(),
         **_of(facts, "main_orders=orders static_sag=sag mount_sag mean_torque_travel=torque_travel"),
-        **_of(facts, "torque_roll_axis torque_roll_coupling"),
+        **_of(facts, "torque_roll_axis torque_roll_coupling torque_roll_frequency"),
     }
 
 

@@ -11,6 +11,7 @@ import cvxpy as cp
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.physics.mount_numbers import AxisResidual
 from laufruhe.prove.convex_functions import (
     Compliance,
     ConvexDuals,
@@ -105,11 +106,22 @@ class _Stated:
         if isinstance(function, Compliance):
             return (function.factor / self.unit) * cp.matrix_frac(function.load, self.matrix), None
         if isinstance(function, Residual):
-            top = cp.Variable()
-            cone = cp.SOC(top, (self.unit / function.square) * (self.matrix @ function.along) - function.along)
-            self.held.append(cone)
-            return top, cone
+            return self._residual(function.axis)
         raise TypeError(f"{type(function).__name__} is limited, not minimised")
+
+    def _residual(self, axis: AxisResidual) -> tuple[Any, Any]:
+        """The length of its rows, counted in what the mounts answer at the middle; the square may be open."""
+        answer = axis.answer(self.program.matrices.at(0.5 * (self.program.lower + self.program.upper)))
+        unit = float(np.linalg.norm(answer)) or 1.0
+        one = unit / float(np.linalg.norm(axis.mass))
+        top, square = cp.Variable(), cp.Variable()
+        self.held.append(square >= axis.least / one)
+        if axis.most < np.inf:
+            self.held.append(square <= axis.most / one)
+        rows = (self.unit / unit) * (axis.left @ self.matrix @ axis.right) - square * (one / unit) * axis.mass
+        cone = cp.SOC(top, rows)
+        self.held.append(cone)
+        return unit * top, cone
 
     def _limited(self, function: ConvexFunction, maximum: float, missed: Any) -> tuple[Any, float]:
         """The constraint, and what its dual is to be multiplied by."""

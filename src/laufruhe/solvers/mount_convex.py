@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import weight_wrench
-from laufruhe.physics.mount_numbers import torque_roll_rows
+from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import STIFFNESS, Decision
@@ -38,7 +38,7 @@ from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
 
-CONVEX = (channels.SAG, channels.TORQUE_ROLL, channels.TOTAL_STIFFNESS)
+CONVEX = (channels.SAG, channels.TORQUE_ROLL, channels.RAW_TORQUE_ROLL, channels.TOTAL_STIFFNESS)
 
 
 def is_convex(problem: Problem) -> bool:
@@ -66,7 +66,7 @@ def convex_program(problem: Problem) -> ConvexProgram:
     lower, upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
     start = np.array([d.start_number for d in decisions])
     given = mounting_in(problem.design(start.tolist()))
-    _, root = torque_roll_rows(given)
+    root = mass_root(given.block)
     slopes = np.array([root @ _slope(given, decision) @ root.T for decision in decisions]).reshape(-1, 6, 6)
     base = root @ given.stiffness @ root.T - np.tensordot(start, slopes, axes=1)
     matrices = Matrices(base, slopes)
@@ -86,12 +86,11 @@ def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
 
 
 def _function(quantity: Measure, matrices: Matrices, mounting: ElasticMounting, problem: Problem) -> ConvexFunction:
-    along, root = torque_roll_rows(mounting)
     if quantity.channel is channels.SAG:
         weight = weight_wrench(mounting.block)
-        return Compliance(matrices, root @ weight, 1.0 / -weight[2])
-    if quantity.channel is channels.TORQUE_ROLL:
-        return Residual(matrices, along, (math.tau * quantity.frequency) ** 2)
+        return Compliance(matrices, mass_root(mounting.block) @ weight, 1.0 / -weight[2])
+    if quantity.channel.of_axis is not None:
+        return Residual(matrices, quantity.channel.of_axis(mounting.block, quantity.frequency))
     gradient = np.array([sum(drive.gain for drive in d.mount_drives) for d in problem.decisions])
     given = sum(sum(row[STIFFNESS]) for row in problem.mount_numbers)
     return Linear(given - float(gradient @ [d.start_number for d in problem.decisions]), gradient)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import casadi as ca
@@ -12,14 +13,14 @@ from scipy.optimize import linear_sum_assignment
 
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.problem import channels
-from laufruhe.problem.channels import motion_indices
-from laufruhe.problem.measure import Limit, Side
+from laufruhe.problem.channels import Channel, motion_indices
+from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.gathered import Gathered
 
 Array = NDArray[np.float64]
 
-OF_MODES = (channels.FREQUENCIES, channels.DECOUPLING)
+OF_MODES = (channels.FREQUENCIES, channels.DECOUPLING, channels.DECOUPLING_SHORTFALL)
 
 
 class ModeVariables:
@@ -32,7 +33,8 @@ class ModeVariables:
     """
 
     def __init__(self, problem: Problem, held: Gathered) -> None:
-        self.asked = any(limit.measure.channel in OF_MODES for limit in problem.limits)
+        asked = (*(limit.measure for limit in problem.limits), *(term.measure for term in problem.objective))
+        self.asked = any(measure.channel in OF_MODES for measure in asked)
         self._held, self._bands = held, list[tuple[Limit, int]]()
         self._vectors, self._squares = ca.MX.sym("V", 36 * self.asked), ca.MX.sym("l", 6 * self.asked)
 
@@ -55,21 +57,35 @@ class ModeVariables:
 
     def limit(self, limit: Limit) -> bool:
         """Hold a limit; whether it is one on modes."""
-        if limit.measure.channel not in OF_MODES:
-            return False
-        if limit.measure.motions is not None or limit.measure.channel.unit == "":
-            self._share(limit)
-        else:
-            self._frequencies(limit)
-        return True
+        hold = self._limits.get(limit.measure.channel)
+        if hold is not None:
+            hold(limit)
+        return hold is not None
 
-    def _share(self, limit: Limit) -> None:
+    @property
+    def _limits(self) -> Mapping[Channel, Callable[[Limit], None]]:
+        return {channels.DECOUPLING: self._least_shares, channels.FREQUENCIES: self._frequencies}
+
+    def _shares(self, measure: Measure) -> list[Any]:
         """Of motion j in column j: the columns are set to their motions at the start (E24)."""
         v = ca.reshape(self._vectors, 6, 6)
         shapes, momenta = ca.DM(self._root.T) @ v, ca.DM(np.linalg.inv(self._root)) @ v
-        for j in motion_indices(limit.measure):
+        return [shapes[j, j] * momenta[j, j] for j in motion_indices(measure)]
+
+    def _least_shares(self, limit: Limit) -> None:
+        for share in self._shares(limit.measure):
             least = (limit, "at least"), 1.0
-            self._held.add(shapes[j, j] * momenta[j, j], max(limit.minimum, 0.0), np.inf, limit.name, least)
+            self._held.add(share, max(limit.minimum, 0.0), np.inf, limit.name, least)
+
+    def shortfall(self, measure: Measure) -> Any:
+        """Sum of variables, each over nothing and over what is wanting to a share (E47)."""
+        found, held = ca.MX(0.0), self._held.named(measure.name)
+        for share in self._shares(measure):
+            # where a search starts, modes are not known yet: it starts at all that is wanted
+            top = held.head(ca.MX(measure.wanted))
+            held.hold(measure.wanted - share - top)
+            found += top
+        return found
 
     def _frequencies(self, limit: Limit) -> None:
         """Each side over its own square, whose slope over the edge is two over the edge; a band as E23."""

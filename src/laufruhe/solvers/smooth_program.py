@@ -33,7 +33,7 @@ from laufruhe.load_models.uneven_model import UnevenModel, rides_of
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import Grid, softened_lengths
 from laufruhe.physics.modes import weight_wrench
-from laufruhe.physics.mount_numbers import torque_roll_rows
+from laufruhe.physics.mount_numbers import AxisResidual, mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
@@ -99,7 +99,7 @@ class SmoothProgram:
         self._points: list[PointResponse] = []
         if problem.asks_mounts:
             self._mounting = mounting_in(problem.engine)
-            self._along, self._root = torque_roll_rows(self._mounting)
+            self._root = mass_root(self._mounting.block)
             self._mounts = symbolic_mounts(problem, self._mounting.block, self._d)
             self._points = self._responses()
             self._modes.hold(self._mounts.stiffness, self._root, self._mounting)
@@ -226,10 +226,10 @@ class SmoothProgram:
             load = ca.DM(self._root @ weight)
             settled, _ = elimination()(mounts.stiffness, ca.MX(6, 6), load, ca.DM.zeros(6))
             return ca.dot(load, settled) / -weight[2]
-        if quantity.channel is channels.TORQUE_ROLL:
-            square = (math.tau * quantity.frequency) ** 2
-            rows = mounts.stiffness @ ca.DM(self._along) / square - ca.DM(self._along)
-            return softened_lengths(rows.T, self._e)
+        if quantity.channel.of_axis is not None:
+            return self._residual(quantity.channel.of_axis(self._mounting.block, quantity.frequency))
+        if quantity.channel is channels.DECOUPLING_SHORTFALL:
+            return self._modes.shortfall(quantity)
         if quantity.channel is channels.TOTAL_STIFFNESS:
             numbers = self.problem.numbers([self._d[k] for k in range(self._count)], self._decisions)
             rows = numbers.mounts or [list(mount.stiffness) for mount in self._mounting.mounts]
@@ -244,6 +244,15 @@ class SmoothProgram:
         for force, firm in pairs:
             self._held.add(force / firm - top * top, -np.inf, 0.0, quantity.name)
         return top
+
+    def _residual(self, axis: AxisResidual) -> Any:
+        """Of turning about the torque-roll axis, in what the mounts as given answer to it; the best square is known."""
+        given = axis.answer(self._root @ self._mounting.stiffness @ self._root.T)
+        unit = float(np.linalg.norm(given)) or 1.0
+        answer, mass = ca.DM(axis.left) @ self._mounts.stiffness @ ca.DM(axis.right), ca.DM(axis.mass)
+        best = ca.fmax(ca.dot(mass, answer) / ca.dot(mass, mass), axis.least)
+        rows = answer - (ca.fmin(best, axis.most) if axis.most < math.inf else best) * mass
+        return unit * softened_lengths(rows.T / unit, self._e)
 
     def _limit_mounts(self, limit: Limit) -> None:
         quantity = limit.measure

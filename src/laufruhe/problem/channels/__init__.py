@@ -14,7 +14,6 @@ from dataclasses import replace
 from laufruhe.machine import Engine, Role
 from laufruhe.machine.clearances import Span, distances, reaches
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics import mount_numbers
 from laufruhe.physics.bearing_loads import (
     bearing_factors,
     crank_pin_factors,
@@ -25,9 +24,6 @@ from laufruhe.physics.bearing_loads import (
     piston_pin_forces,
 )
 from laufruhe.physics.crank_torque import crank_torque
-from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
-from laufruhe.physics.modes import MOTIONS
-from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.apexes import OF_APEXES
 from laufruhe.problem.channels.flywheel import OF_FLYWHEEL
@@ -49,17 +45,38 @@ from laufruhe.problem.channels.kinds import (
     SizeChannel,
     of_what_moves,
 )
+from laufruhe.problem.channels.mounting import (
+    DECOUPLING,
+    DECOUPLING_SHORTFALL,
+    FREQUENCIES,
+    OF_MOUNTING,
+    RAW_TORQUE_ROLL,
+    SAG,
+    TORQUE_ROLL,
+    TOTAL_STIFFNESS,
+    TRANSMISSIBILITY,
+    motion_indices,
+    mounting_in,
+)
 from laufruhe.problem.channels.runs import OF_RUNS, RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.problem.channels.sizes import OF_SIZES, names_of_bearings, names_of_cylinders, sized
 from laufruhe.problem.channels.torsional import TORSIONAL
 from laufruhe.problem.loads import PointLoads
 
 __all__ = [
+    "DECOUPLING",
+    "DECOUPLING_SHORTFALL",
+    "FREQUENCIES",
     "OF_MOUNTS",
     "ON_BLOCK",
+    "RAW_TORQUE_ROLL",
     "RUN_FORCE",
     "RUN_TRAVEL",
     "RUN_TWIST",
+    "SAG",
+    "TORQUE_ROLL",
+    "TOTAL_STIFFNESS",
+    "TRANSMISSIBILITY",
     "Channel",
     "LoadChannel",
     "MassChannel",
@@ -68,6 +85,8 @@ __all__ = [
     "NumberChannel",
     "PlaceChannel",
     "SizeChannel",
+    "motion_indices",
+    "mounting_in",
 ]
 
 
@@ -98,38 +117,6 @@ def _inside(
 
 def _names_of_mounts(engine: Engine) -> Sequence[str]:
     return [mount.name for mount in engine.mounts]
-
-
-def mounting_in(engine: Engine) -> ElasticMounting:
-    """The elastic mounting of an engine that has one."""
-    if engine.block is None:
-        raise ValueError("this engine has no block, so its mounts are rigid")
-    return elastic_mounting(engine.block, engine.mounts)
-
-
-def _of_mounting(number: Callable[[ElasticMounting, Asked], float | Sequence[float]]) -> Callable[
-    [Asked, Answered], Sequence[float]
-]:  # fmt: skip
-    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
-        found = number(mounting_in(evaluation.engine), measure)
-        return (found,) if isinstance(found, float) else found
-
-    return values
-
-
-def _transmissibility(measure: Asked, evaluation: Answered) -> Sequence[float]:
-    firm = rigid_mounting(evaluation.engine.mounts)
-    ratios = [
-        mount_numbers.transmitted(loads.mount_forces, firm.forces(loads.wrench), measure.orders)
-        for loads in evaluation.loads
-        if (measure.points is None or loads.point.name in measure.points) and loads.mount_forces is not None
-    ]
-    return (max(ratios, default=0.0),)
-
-
-def motion_indices(measure: Asked) -> tuple[int, ...]:
-    """Of the motions that are to have a mode of their own."""
-    return tuple(MOTIONS.index(name) for name in measure.motions or MOTIONS)
 
 
 def _of_places(name: str, sides: tuple[str, ...], span: Callable[[Asked, Engine, Engine], Sequence[Span]]) -> Channel:
@@ -189,26 +176,6 @@ COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTER
 BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
 ADDED_MASS = MassChannel("added mass", "kg", roles=(Role.COUNTERWEIGHT, Role.BALANCER))
 
-TRANSMISSIBILITY = MountChannel("transmissibility", "", ON_BLOCK, values=_transmissibility, of_loads=True)
-SAG = MountChannel(
-    "static sag", "m", sides=("min", "max"), values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting))
-)
-FREQUENCIES = MountChannel(
-    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False,
-    values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
-)  # fmt: skip
-DECOUPLING = MountChannel(
-    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False,
-    values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
-)  # fmt: skip
-TORQUE_ROLL = MountChannel(
-    "torque-roll residual", "", ("frequency",), size=1.0,
-    values=_of_mounting(lambda mounting, m: mount_numbers.torque_roll_residual(mounting, m.frequency)),
-)  # fmt: skip
-TOTAL_STIFFNESS = MountChannel(
-    "total stiffness", "N/m", sides=("min", "max"),
-    values=_of_mounting(lambda mounting, _: mount_numbers.total_stiffness(mounting.mounts)),
-)  # fmt: skip
 SHAFT_DISTANCE = _of_places("shaft distance", ("min", "max"), lambda m, a, b: distances(m.rotors, a, b, False))
 SHAFT_CLEARANCE = _of_places("shaft clearance", ("min",), lambda m, a, b: distances(m.rotors, a, b, True))
 ENVELOPE_RADIUS = _of_places("envelope radius", ("max",), lambda m, a, b: reaches(m.rotors, a, b))
@@ -219,7 +186,7 @@ CHANNELS: Mapping[str, Channel] = {
         MOUNT_FORCE, MOUNT_TRAVEL, SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT, SURGING_FORCE, SWAYING_COUPLE,
         HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
         SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
-        ADDED_MASS, TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, TORQUE_ROLL, TOTAL_STIFFNESS,
-        *OF_RUNS, *OF_APEXES, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES, *TORSIONAL,
+        ADDED_MASS, *OF_MOUNTING, *OF_RUNS, *OF_APEXES, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,
+        *TORSIONAL,
     )
 }  # fmt: skip

@@ -10,11 +10,12 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Engine, Flywheel, OperatingPoint, Role
+from laufruhe.machine import Block, Engine, Flywheel, OperatingPoint, Role
 from laufruhe.machine.clearances import Span
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.linear_run import Response
+from laufruhe.physics.mount_numbers import AxisResidual, Band
 from laufruhe.physics.strength import Factor
 from laufruhe.physics.torsion import Factors, unit_factors
 from laufruhe.problem.asking import Answered, Asked
@@ -88,7 +89,7 @@ class Channel:
     of_loads
         Whether it depends on what excites the block.
     size
-        Of what cancels in it where it is zero; zero where loads, masses or nothing do.
+        Of an engine, of what cancels in it where it is zero; zero where loads, masses or nothing do.
     rises
         Whether it never falls where a number of the flywheel grows, if it is of that; else it never rises.
     of_wheel
@@ -99,6 +100,10 @@ class Channel:
         Whether the torque of the crank is in it, which other decisions than the flywheel move too.
     of_engine
         The value as a function of an engine, if it is of its sizes alone and goes one way with each of them.
+    of_axis
+        What turning about the torque-roll axis lacks to be a mode, if it is of that.
+    open_frequency
+        Whether the frequency wanted may lie anywhere in a band.
     of_modes
         Whether it is of natural frequencies of the crankshaft, which rise with stiffness and fall with inertia.
     span
@@ -111,7 +116,7 @@ class Channel:
     needs: Needs = Needs.NOTHING
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
-    size: float = 0.0
+    size: Callable[[Engine], float] = lambda _: 0.0
     of_loads: bool = False
     rises: bool = True
     of_wheel: Callable[[Asked, Answered], OfWheel] | None = None
@@ -119,6 +124,8 @@ class Channel:
     of_engine: Callable[[Engine], float] | None = None
     of_torque: bool = False
     of_modes: bool = False
+    of_axis: Callable[[Block, Band], AxisResidual] | None = None
+    open_frequency: bool = False
     span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False

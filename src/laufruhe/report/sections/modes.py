@@ -53,7 +53,8 @@ def _mounts(result: Result, facts: MountingFacts) -> Grid:
         f"The centre of gravity sags {figure(facts.sag, 'm')}; the mean torque moves a mount by at most "
         f"{figure(facts.torque_travel, 'm', scale=facts.sag)}. "
         "Travel: the largest at the slowest operating point. "
-        f"Torque-roll axis ({axis}), coupling {facts.torque_roll_coupling:.3f}."
+        f"Torque-roll axis ({axis}), coupling {facts.torque_roll_coupling:.3f}, "
+        f"nearest to a mode at {facts.torque_roll_frequency:.3g} Hz."
     )
     head = ("mount", "place [mm]", "stiffness along own axes [N/mm]", "loss factor", "sag [mm]",
             f"travel at {points[slowest].name} [mm]")  # fmt: skip

@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
-from laufruhe.files.asked import QuantityName, QuantityTable, Scene
+from laufruhe.files.asked import QuantityName
+from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.problem.problem import Problem

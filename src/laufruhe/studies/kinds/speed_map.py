@@ -14,8 +14,9 @@ from pydantic import Field, model_validator
 
 from laufruhe.errors import InputError
 from laufruhe.files import fields as f
-from laufruhe.files.asked import QuantityName, QuantityTable, Scene
+from laufruhe.files.asked import QuantityName
 from laufruhe.files.complaints import Refused, measured, nearest
+from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import order_amplitude

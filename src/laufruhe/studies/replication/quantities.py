@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from laufruhe.files.asked import QuantityTable, Scene
+from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.modes import MOTIONS

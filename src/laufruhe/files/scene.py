@@ -1,0 +1,197 @@
+"""What measures of a problem file may refer to, and the keys that narrow them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeVar
+
+from laufruhe.errors import ModelError
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused, nearest
+from laufruhe.files.fields import Open, Table
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.machine.clearances import shafts_of
+from laufruhe.problem.channels import Channel, LoadChannel, Needs
+from laufruhe.problem.measure import MEASURES, Measure, counted_rotors, radius_of
+
+T = TypeVar("T")
+Motion = Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]
+_NEEDS = {
+    Needs.MOUNTS: ("needs mounts", "add [mounts], or ask for a shaking force"),
+    Needs.ELASTIC: ("needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]'),
+    Needs.BEARINGS: ("needs main bearings", "list them in [[main_bearings]]"),
+    Needs.TORSION: ("needs the discs and shafts of the crankshaft", "add [torsion]"),
+    Needs.DIAMETERS: ("needs the diameter of a shaft", "give one in [torsion]"),
+    Needs.FLYWHEEL: (
+        "needs a flywheel",
+        "add [flywheel] with an inertia or a rim, [torsion], or fidelity.crank_inertia",
+    ),
+    Needs.ROTORS: ("needs the rotors of a rotary engine", 'take layout = "rotary"'),
+    Needs.RIM: ("needs the rim of a flywheel", "add [flywheel.rim]"),
+    Needs.RUN: ("needs elastic mounts that an engine is run up on", "add [run_up] and [mounts] of kind elastic"),
+    Needs.ARMS: ("needs the arms of a flywheel", "add [flywheel.rim.arms]"),
+}
+PLACES = {
+    "mounts": "mount",
+    "bearings": "main bearing",
+    "cylinders": "cylinder",
+    "sections": "shaft section",
+    "webs": "web",
+}
+_KEYS = ("operating_points", "orders", *PLACES, "direction_weights", "motions", "frequency", "wanted", "of")
+_ROUNDING = 1e-9
+
+
+class QuantityTable(Table):
+    """What part of a quantity counts."""
+
+    mounts: list[str] | None = None
+    bearings: list[str] | None = None
+    cylinders: list[str] | None = None
+    sections: list[str] | None = f.told(
+        "Sections of the crankshaft that count, named after the discs that they join; all by default."
+    )
+    webs: list[str] | None = f.told(
+        "Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ..."
+    )
+    operating_points: list[str] | None = None
+    orders: list[f.NonNegative] | None = None
+    direction_weights: f.Three[f.NonNegative] | None = None
+    motions: list[Motion] | None = f.told("Motions that should have a mode of their own; all by default.")
+    wanted: f.Part | None = f.told("Share of a motion in a mode of its own that is enough; 1 by default.")
+    frequency: f.OpenFrequency | None = f.told(
+        "Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out."
+    )
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What measures may refer to."""
+
+    engine: Engine
+    points: tuple[OperatingPoint, ...]
+
+    def measure(self, name: str, table: QuantityTable, where: str) -> Measure:
+        """The measure that a name and its keys mean for this engine."""
+        if name not in MEASURES:
+            raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
+        channel, norm = MEASURES[name]
+        at, of = where.rsplit(".", 1)[0], getattr(table, "of", None)
+        if not self._has(channel.needs):
+            raise Refused(where, name, *_NEEDS[channel.needs])
+        self._check_keys(channel, table, at)
+        weights = table.direction_weights
+        found = Measure(
+            channel, norm, self._places(channel, table, at), as_tuple(table.operating_points), as_tuple(of),
+            as_tuple(table.orders), None if weights is None else (weights[0], weights[1], weights[2]),
+            as_tuple(table.motions), _band(table.frequency), 1.0 if table.wanted is None else table.wanted,
+        )  # fmt: skip
+        if found.is_mass:
+            self._counts(found, of, at)
+        if channel.is_placing:
+            shafts = shafts_of(self.engine)
+            _known(of, shafts, f"{at}.of", "shaft")
+            if not shafts:
+                raise Refused(f"{at}", name, "counts balancer shafts, and there are none", "add one, or leave it out")
+        return found
+
+    def _has(self, needs: Needs) -> bool:
+        """Whether the engine has what a channel needs."""
+        engine, chain, wheel = self.engine, self.engine.torsion, self.engine.flywheel
+        rim = wheel.rim if wheel else None
+        has = {
+            Needs.NOTHING: True,
+            Needs.MOUNTS: bool(engine.mounts),
+            Needs.ELASTIC: engine.block is not None,
+            Needs.BEARINGS: bool(engine.bearings),
+            Needs.TORSION: chain is not None,
+            Needs.DIAMETERS: chain is not None and any(s.diameter is not None for s in chain.sections),
+            Needs.FLYWHEEL: wheel is not None or chain is not None,
+            Needs.RIM: rim is not None,
+            Needs.RUN: engine.run is not None,
+            Needs.ROTORS: any(not part.has_rod for part in engine.slider_cranks),
+            Needs.ARMS: rim is not None and rim.arms is not None,
+        }
+        return has[needs]
+
+    def _check_keys(self, channel: Channel, table: QuantityTable, at: str) -> None:
+        """Refuse keys that mean nothing for a channel, and names of what is not there."""
+        of = getattr(table, "of", None)
+        for key in _KEYS:
+            if getattr(table, key, None) == []:
+                raise Refused(f"{at}.{key}", [], "is empty", "leave it out to count all")
+            if getattr(table, key, None) is not None and key not in channel.keys:
+                raise Refused(f"{at}.{key}", of if key == "of" else None, _stray(key, channel), "leave it out")
+        points = [point.name for point in self.points]
+        _known(table.operating_points, points, f"{at}.operating_points", "operating point")
+        if "frequency" in channel.keys and not channel.open_frequency:
+            remedy = "say which natural frequency about the axis is wanted"
+            if table.frequency is None:
+                raise Refused(f"{at}.frequency", None, "is missing", remedy)
+            if isinstance(table.frequency, Open):
+                rule = f"is open, and {channel} is of one frequency"
+                raise Refused(f"{at}.frequency", None, rule, f"{remedy}, or ask for the raw torque-roll residual")
+        self._orders(table.orders, f"{at}.orders")
+
+    def _places(self, channel: Channel, table: QuantityTable, at: str) -> tuple[str, ...] | None:
+        """Names of the places that count; all where none are named."""
+        for key, what in PLACES.items():
+            if isinstance(channel, LoadChannel) and key in channel.keys:
+                names = getattr(table, key)
+                _known(names, channel.places(self.engine), f"{at}.{key}", what)
+                return as_tuple(names)
+        return None
+
+    def _orders(self, orders: list[float] | None, where: str) -> None:
+        """Refuse what no load can have: all that turns returns within the cycle (C6)."""
+        base = self.engine.cycle.base_order
+        for order in orders or ():
+            nearby = float(round(order / base) * base)
+            if abs(order - nearby) > _ROUNDING:
+                rule = f"holds {order:.10g}, and the orders of its cycle are multiples of {base}"
+                raise Refused(where, orders, rule, f"did you mean {nearby:g}?")
+
+    def _counts(self, measure: Measure, of: list[str] | None, at: str) -> None:
+        """Refuse masses of nothing, and of what has no radius."""
+        rotors = self.engine.rotors
+        _known(of, [rotor.name for rotor in rotors], f"{at}.of", "counterweight or balancer")
+        counted = counted_rotors(measure, rotors)
+        if not counted:
+            raise Refused(f"{at}", measure.name, "counts nothing in this engine", "add what it counts, or leave it out")
+        for rotor in counted:
+            try:
+                radius_of(rotor)
+            except ModelError:
+                rule = f"counts the mass of '{rotor.name}', which has no radius"
+                raise Refused(f"{at}", measure.name, rule, "give it one") from None
+
+
+def _stray(key: str, channel: Channel) -> str:
+    """Why a key means nothing for a channel."""
+    if key == "of":
+        return "is for masses and places of shafts only"
+    if channel.is_mass:
+        return "means nothing for a mass"
+    if channel.is_load and key in PLACES:
+        return f"means nothing for a {channel}, which has no {PLACES[key]} of its own"
+    if channel.is_load and key == "direction_weights":
+        return f"is for forces and travels at places, not for a {channel}"
+    return f"means nothing for {channel}" if channel.is_mounting else f"means nothing for a {channel}"
+
+
+def _known(names: list[str] | None, known: Sequence[str], where: str, what: str) -> None:
+    for name in names or ():
+        if name not in known:
+            raise Refused(where, name, f"is no {what} here", nearest(name, list(known)) if known else "add it")
+
+
+def as_tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
+    """Entries of a list; all count where there is none."""
+    return None if entries is None else tuple(entries)
+
+
+def _band(frequency: float | Open | None) -> tuple[float, float]:
+    """Frequencies that count; all where none is named."""
+    return (0.0, math.inf) if frequency is None else Open.of(frequency).bounds

@@ -1,0 +1,93 @@
+"""Numbers of a block on its mounts (E7, E9, E11, E14, E46, E47)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from laufruhe.machine import Block, Engine
+from laufruhe.physics import mount_numbers
+from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
+from laufruhe.physics.modes import MOTIONS
+from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.channels.kinds import ON_BLOCK, MountChannel
+
+
+def mounting_in(engine: Engine) -> ElasticMounting:
+    """The elastic mounting of an engine that has one."""
+    if engine.block is None:
+        raise ValueError("this engine has no block, so its mounts are rigid")
+    return elastic_mounting(engine.block, engine.mounts)
+
+
+def _of_mounting(number: Callable[[ElasticMounting, Asked], float | Sequence[float]]) -> Callable[
+    [Asked, Answered], Sequence[float]
+]:  # fmt: skip
+    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+        found = number(mounting_in(evaluation.engine), measure)
+        return (found,) if isinstance(found, float) else found
+
+    return values
+
+
+def _transmissibility(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    firm = rigid_mounting(evaluation.engine.mounts)
+    ratios = [
+        mount_numbers.transmitted(loads.mount_forces, firm.forces(loads.wrench), measure.orders)
+        for loads in evaluation.loads
+        if (measure.points is None or loads.point.name in measure.points) and loads.mount_forces is not None
+    ]
+    return (max(ratios, default=0.0),)
+
+
+def motion_indices(measure: Asked) -> tuple[int, ...]:
+    """Of the motions that are to have a mode of their own."""
+    return tuple(MOTIONS.index(name) for name in measure.motions or MOTIONS)
+
+
+def _of_axis(
+    name: str, unit: str, residual: Callable[[Block, mount_numbers.Band], mount_numbers.AxisResidual],
+    size: Callable[[Engine], float],
+) -> MountChannel:  # fmt: skip
+    """What is least where turning about the torque-roll axis is a mode."""
+
+    def value(mounting: ElasticMounting, measure: Asked) -> float:
+        return mount_numbers.residual_of(mounting, residual(mounting.block, measure.frequency))
+
+    return MountChannel(name, unit, ("frequency",), values=_of_mounting(value), size=size, of_axis=residual)
+
+
+TRANSMISSIBILITY = MountChannel("transmissibility", "", ON_BLOCK, values=_transmissibility, of_loads=True)
+SAG = MountChannel(
+    "static sag", "m", sides=("min", "max"), values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting))
+)
+FREQUENCIES = MountChannel(
+    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False,
+    values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
+)  # fmt: skip
+DECOUPLING = MountChannel(
+    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False,
+    values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
+)  # fmt: skip
+DECOUPLING_SHORTFALL = MountChannel(
+    "decoupling shortfall", "", ("motions", "wanted"), size=lambda _: 1.0,
+    values=_of_mounting(
+        lambda mounting, m: mount_numbers.decoupling_shortfall(mounting.modes.energy, motion_indices(m), m.wanted)
+    ),
+)  # fmt: skip
+TORQUE_ROLL = _of_axis("torque-roll residual", "", mount_numbers.relative_residual, lambda _: 1.0)
+RAW_TORQUE_ROLL = replace(
+    _of_axis(
+        "raw torque-roll residual", "N m/rad", mount_numbers.raw_residual,
+        lambda engine: mount_numbers.torque_roll_answer(mounting_in(engine)),
+    ),
+    open_frequency=True,
+)  # fmt: skip
+TOTAL_STIFFNESS = MountChannel(
+    "total stiffness", "N/m", sides=("min", "max"),
+    values=_of_mounting(lambda mounting, _: mount_numbers.total_stiffness(mounting.mounts)),
+)  # fmt: skip
+OF_MOUNTING = (
+    TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, DECOUPLING_SHORTFALL, TORQUE_ROLL, RAW_TORQUE_ROLL, TOTAL_STIFFNESS,
+)  # fmt: skip

@@ -1,0 +1,173 @@
+"""Raw torque-roll residual and decoupling shortfall: closed forms, bounded least squares, brute force, refusals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+from scipy.optimize import lsq_linear, minimize_scalar
+
+from laufruhe.errors import InputError
+from laufruhe.machine import Block
+from laufruhe.physics.mount_numbers import decoupling_shortfall, raw_residual, residual_of, torque_roll_frequency
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.prove.box_numbers import RANGES
+from laufruhe.prove.box_response import BoxModel
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
+from mounts.powertrain import powertrain, random_mounting
+
+TILTED = BLOCK + 'inertia_products = ["2 kg m^2", "-3 kg m^2", "1 kg m^2"]\n'
+RAW = '[objective]\nminimise = "raw torque-roll residual"\n'
+SHORT = '[objective]\nminimise = "decoupling shortfall"\nmotions = ["bounce", "roll", "pitch"]\n'
+ANY = (0.0, math.inf)
+
+
+def _given(mounting):
+    """K, M and the turning of one radian about I^-1 e, from their definitions."""
+    block = mounting.block
+    axis = np.linalg.solve(np.array(block.inertia) - block.turning_inertia * np.diag([1.0, 0.0, 0.0]), [1.0, 0.0, 0.0])
+    return mounting.stiffness, block.mass_matrix, np.concatenate([np.zeros(3), axis / np.linalg.norm(axis)])
+
+
+@pytest.mark.parametrize("band", [ANY, (4.0, 9.0), (30.0, 40.0), (7.0, 7.0)])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_the_best_square_of_given_stiffness_is_that_of_a_search(seed, band):
+    mounting = random_mounting(seed)
+    k, m, q = _given(mounting)
+    low, high = ((math.tau * f) ** 2 for f in (band[0], min(band[1], 200.0)))
+    least = minimize_scalar(lambda s: np.linalg.norm(k @ q - s * (m @ q)), bounds=(low, high), method="bounded").fun
+    least = min(least, *(float(np.linalg.norm(k @ q - s * (m @ q))) for s in (low, high)))
+    assert residual_of(mounting, raw_residual(mounting.block, band)) == pytest.approx(least, rel=1e-6)
+
+
+def test_a_block_that_turns_about_its_axis_in_a_mode_leaves_nothing():
+    # springs along a body's own axes, all as far from them: K and M share their eigenvectors
+    mounting = powertrain()
+    block = Block(140.0, ((4.0, 0.0, 0.0), (0.0, 8.0, 0.0), (0.0, 0.0, 7.0)))
+    places = [(x, y, z) for x in (-0.3, 0.3) for y in (-0.2, 0.2) for z in (-0.1, 0.1)]
+    mounts = tuple(replace(mounting.mounts[0], name=str(k), position=p) for k, p in enumerate(places))
+    even = replace(mounting, block=block, mounts=mounts)
+    k, m, q = _given(even)
+    square = float(q @ k @ q) / float(q @ m @ q)
+    assert residual_of(even, raw_residual(block, ANY)) < 1e-9 * np.linalg.norm(k @ q)
+    assert torque_roll_frequency(even) == pytest.approx(math.sqrt(square) / math.tau, rel=1e-12)
+    assert min(abs(np.sqrt(eigh(k, m)[0]) / math.tau - torque_roll_frequency(even))) < 1e-9
+
+
+def _joint_least_squares(problem, low, high):
+    """Least |K(x) q - s M q| over x and s in their bounds: one bounded least-squares problem of SciPy."""
+    decisions = problem.decisions
+
+    def rows(x):
+        k, _, q = _given(mounting_in(problem.design(list(x))))
+        return k @ q
+
+    unit, zero = 1e5, rows([0.0] * len(decisions))
+    slopes = np.array([(rows([unit * (j == k) for k in range(len(decisions))]) - zero) for j in range(len(decisions))])
+    _, m, q = _given(mounting_in(problem.engine))
+    columns = np.column_stack([slopes.T, -1e4 * (m @ q)])
+    lower = [*(d.lower / unit for d in decisions), low / 1e4]
+    upper = [*(d.upper / unit for d in decisions), high / 1e4]
+    found = lsq_linear(columns, -zero, bounds=(lower, upper), tol=1e-14)
+    return math.sqrt(2.0 * found.cost)
+
+
+@pytest.mark.parametrize(
+    ("asked", "band"),
+    [("", (1e-9, 1e3)), ('frequency = "9 Hz"', (9.0, 9.0 + 1e-9)),
+     ('frequency = { between = ["12 Hz", "14 Hz"] }', (12.0, 14.0))],
+)  # fmt: skip
+def test_open_stiffness_and_frequency_together_are_a_least_squares_problem(tmp_path, asked, band):
+    text = MOUNTS.replace('"120 N/mm", "120 N/mm"', '{ between = ["90 N/mm", "300 N/mm"] }, "120 N/mm"', 1)
+    problem = problem_of(tmp_path, ENGINE, TILTED, text, RAW + asked)
+    result = solve(problem)
+    low, high = ((math.tau * f) ** 2 for f in band)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value == pytest.approx(_joint_least_squares(problem, low, high), rel=1e-5)
+
+
+def test_a_wider_band_is_never_worse(tmp_path):
+    found = []
+    for low, high in ((13.0, 13.1), (12.0, 14.0), (8.0, 20.0)):
+        asked = RAW + f'frequency = {{ between = ["{low} Hz", "{high} Hz"] }}'
+        found.append(solve(problem_of(tmp_path, ENGINE, TILTED, MOUNTS, asked)).objective.value)
+    assert found[0] >= found[1] * (1.0 - 1e-9) >= found[2] * (1.0 - 1e-9)
+
+
+@pytest.mark.parametrize(
+    "asked", [RAW, RAW + 'frequency = { between = ["6 Hz", "9 Hz"] }', SHORT, SHORT + "wanted = 0.9"]
+)
+def test_no_design_of_a_box_is_under_its_bound(tmp_path, asked):
+    problem = problem_of(tmp_path, ENGINE, TILTED, MOUNTS, asked)
+    measure, generator = problem.objective[0].measure, np.random.default_rng(3)
+    model = BoxModel(problem, evaluate_start(problem))
+    told = 0
+    for size in (1.0, 0.05, 2e-4):
+        middle = model.lower + generator.random(2) * (model.upper - model.lower)
+        half = 0.5 * size * (model.upper - model.lower)
+        lower, upper = np.maximum(middle - half, model.lower), np.minimum(middle + half, model.upper)
+        (least,), _ = RANGES[measure.channel](model, measure, lower[None], upper[None])
+        drawn = lower + generator.random((40, 2)) * (upper - lower)
+        values = [evaluate(problem, problem.design(list(x))).value(measure) for x in drawn]
+        assert least <= min(values) * (1.0 + 1e-9)
+        told += least > 0.5 * min(values)
+    assert told
+
+
+def _share(problem, x):
+    """Shares of motions from SciPy's generalised eigenproblem."""
+    k, m, _ = _given(mounting_in(problem.design(list(x))))
+    shapes = eigh(k, m)[1]
+    return shapes * (m @ shapes)
+
+
+@pytest.fixture(scope="module")
+def decoupled(tmp_path_factory):
+    limits = '[[constraints]]\nlimit = "natural frequencies"\nmin = "3.5 Hz"\n[search]\nstarts = 4\nboxes = 30000\n'
+    problem = problem_of(tmp_path_factory.mktemp("short"), ENGINE, TILTED, MOUNTS, SHORT + limits)
+    return problem, solve(problem)
+
+
+def test_the_least_shortfall_is_that_of_a_grid(decoupled):
+    problem, result = decoupled
+    grid = np.geomspace(2e4, 4e6, 60)
+    values = np.full((60, 60), np.inf)
+    for i, a in enumerate(grid):
+        for j, b in enumerate(grid):
+            energy = _share(problem, [a, b])
+            values[i, j] = sum(max(1.0 - energy[motion].max(), 0.0) for motion in (2, 3, 4))
+    assert result.objective.value <= values.min() * (1.0 + 1e-6)
+    assert result.objective.value == pytest.approx(values.min(), rel=0.05)
+    assert result.certificate.lower_bound <= result.objective.value * (1.0 + 1e-9)
+
+
+def test_the_shortfall_is_what_shares_lack(decoupled):
+    problem, result = decoupled
+    found = [decision.value for decision in result.decisions]
+    energy = _share(problem, found)
+    assert result.objective.value == pytest.approx(decoupling_shortfall(energy, (2, 3, 4), 1.0), rel=1e-6)
+    assert decoupling_shortfall(energy, (2, 3, 4), 0.0) == 0.0
+    assert decoupling_shortfall(energy, (2, 3), 0.9) <= decoupling_shortfall(energy, (2, 3, 4), 0.9)
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ('[objective]\nminimise = "torque-roll residual"\n', "objective.frequency: is missing"),
+        ('[objective]\nminimise = "torque-roll residual"\nfrequency = { between = ["6 Hz", "9 Hz"] }', "is open, and"),
+        (RAW + 'motions = ["roll"]', "objective.motions"),
+        (RAW + 'frequency = { between = ["9 Hz", "6 Hz"] }', "reversed"),
+        (SHORT + "wanted = 1.5", "objective.wanted"),
+        (SHORT + '[[constraints]]\nlimit = "decoupling shortfall"\nmin = 0.1', "cannot stand beside"),
+    ],
+)
+def test_what_means_nothing_is_refused_in_a_line(tmp_path, asked, told):
+    with pytest.raises(InputError, match=told.replace(".", r"\.")):
+        problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked)
