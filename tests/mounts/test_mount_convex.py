@@ -59,8 +59,12 @@ def test_bounded_least_squares_agrees_with_scipy(tmp_path):
     result, program = solve_mounts(problem), convex_program(problem)
     (_, residual), = program.terms  # fmt: skip
     zero, unit = np.zeros(len(program.lower)), 1e5
-    rows = np.column_stack([residual.rows(unit * e) - residual.rows(zero) for e in np.eye(len(zero))])
-    other = lsq_linear(rows, -residual.rows(zero), (program.lower / unit, program.upper / unit), tol=1e-14)
+
+    def rows_at(x):
+        return residual.axis.rows(residual.matrices.at(x))
+
+    rows = np.column_stack([rows_at(unit * e) - rows_at(zero) for e in np.eye(len(zero))])
+    other = lsq_linear(rows, -rows_at(zero), (program.lower / unit, program.upper / unit), tol=1e-14)
     assert result.objective.value == pytest.approx(np.sqrt(2.0 * other.cost), rel=1e-8)
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value > 1e-3

@@ -13,7 +13,7 @@ from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.fields import Open, Table
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.clearances import shafts_of
-from laufruhe.problem.channels import Channel, LoadChannel, Needs
+from laufruhe.problem.channels import Channel, Needs
 from laufruhe.problem.measure import MEASURES, Measure, counted_rotors, radius_of
 
 T = TypeVar("T")
@@ -138,7 +138,7 @@ class Scene:
     def _places(self, channel: Channel, table: QuantityTable, at: str) -> tuple[str, ...] | None:
         """Names of the places that count; all where none are named."""
         for key, what in PLACES.items():
-            if isinstance(channel, LoadChannel) and key in channel.keys:
+            if key in channel.keys:
                 names = getattr(table, key)
                 _known(names, channel.places(self.engine), f"{at}.{key}", what)
                 return as_tuple(names)

@@ -106,6 +106,8 @@ class Channel:
         Whether the frequency wanted may lie anywhere in a band.
     of_modes
         Whether it is of natural frequencies of the crankshaft, which rise with stiffness and fall with inertia.
+    places
+        Names of the places that it is measured at, by which a file may narrow it; none where that is the block.
     span
         Least and largest of its numbers while shafts stand between their places in two engines, if it is of these.
     """
@@ -126,6 +128,7 @@ class Channel:
     of_modes: bool = False
     of_axis: Callable[[Block, Band], AxisResidual] | None = None
     open_frequency: bool = False
+    places: Callable[[Engine], Sequence[str]] = lambda _: ()
     span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
@@ -179,8 +182,6 @@ class LoadChannel(Channel):
         Whether the roll moment is in it: gas gives no force (eq. 1).
     lever
         Power of a throw's place that its load grows with; None where loads do not add up by places alone.
-    places
-        Names of the places of its signal, by which a file may narrow it; none where that is the block.
     is_inside
         Whether it acts inside the crankcase, so that neither the block nor its mounts feel it.
     adds_up
@@ -197,7 +198,6 @@ class LoadChannel(Channel):
     part: slice | None = None
     feels_gas: bool = True
     lever: int | None = None
-    places: Callable[[Engine], Sequence[str]] = lambda _: ()
     is_inside: bool = False
     adds_up: bool = False
     factors: Factors = unit_factors
