@@ -46,7 +46,7 @@ def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
     path, out = written(tmp_path, scenes.TIGHT), tmp_path / "trade"
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(out), "--json", str(tmp_path / "trade.json")])
     assert answer.exit_code == 0, answer.output
-    assert {p.name for p in out.iterdir()} == {".laufruhe.json", "scene.md", "scene.png"}
+    assert {p.name for p in out.iterdir()} == {".laufruhe.json", "scene.html", "scene.md", "scene.png"}
     (data,) = json.loads((tmp_path / "trade.json").read_text(encoding="utf-8"))
     assert len(data["rows"]) >= 10
     assert data["rigid_part"]["error"] < 2e-15
@@ -78,7 +78,8 @@ def test_trade_of_a_question_about_modes(tmp_path: Path) -> None:
     assert max(abs(row["regret"]) for row in data["rows"]) < 1e-6
     assert data["uneven_speed"] is None
     # all dots would lie on one line
-    assert {p.name for p in (tmp_path / "trade").iterdir()} == {".laufruhe.json", "powertrain-torque-roll.md"}
+    pages = {f"powertrain-torque-roll.{end}" for end in ("html", "md")}
+    assert {p.name for p in (tmp_path / "trade").iterdir()} == {".laufruhe.json", *pages}
 
 
 @pytest.mark.slow

@@ -22,6 +22,8 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report import explain, files
 from laufruhe.report import trade as report
+from laufruhe.report.markdown import rendered
+from laufruhe.report.web_page import as_html
 from laufruhe.studies.trade import Trade, seconds, trade
 
 
@@ -58,7 +60,7 @@ def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
 
 def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[str, Callable[[], str]]:
     """Pages and pictures of every problem, an index of them all; returns the index, and what makes JSON."""
-    from laufruhe.plots.style import save
+    from laufruhe.plots.style import as_svg, save
     from laufruhe.plots.trade import figure, has_picture
 
     problems = [_with_objective(path) for path in paths]
@@ -70,13 +72,17 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     found: dict[int, Trade] = {}
     for k, one in _measured(paths, problems, say):
         problem, path, found[k] = problems[k], paths[k], one
-        names = (f"{problem.name}.md", f"{problem.name}.png")
-        with files.staged(files.Set(folder, "--out", "trade", names, adds=True)) as stage:
-            drawn = has_picture(one)
-            if drawn:
-                save(figure(one), stage / names[1])
+        page, picture, shown = (f"{problem.name}.{end}" for end in ("md", "png", "html"))
+        with files.staged(files.Set(folder, "--out", "trade", (page, picture, shown), adds=True)) as stage:
+            pictures = {}
+            if has_picture(one):
+                drawn = figure(one)
+                save(drawn, stage / picture)
+                pictures[problem.name] = as_svg(drawn)
             command = shlex.join(["laufruhe", "trade", str(path)])
-            files.write(stage / names[0], report.as_page(one, names[1] if drawn else None, command))
+            document = report.trade_document(one, next(iter(pictures), None), command)
+            files.write(stage / page, rendered(document, ".png"))
+            files.write(stage / shown, as_html(document, pictures))
     trades = [found[k] for k in range(len(problems))]
     index = report.index(trades)
     if len(trades) > 1:

@@ -8,7 +8,8 @@ from dataclasses import asdict
 
 from laufruhe.fidelity.knobs import NO_GAS, RIGID, TWO_ORDER
 from laufruhe.present.numbers import DASH
-from laufruhe.report.grid import escaped, piped
+from laufruhe.report.document import Block, Code, Document, Illustration, Paragraph
+from laufruhe.report.grid import Grid, piped
 from laufruhe.report.strict_json import strict
 from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade, is_local
 
@@ -23,36 +24,40 @@ HEAD = (
     "fidelity", "error", "error estimate", "another design", "gradient", "solve", "first design", "memory",
     "regret",
 )  # fmt: skip
+COLUMNS = (
+    "**Another design**: objective of a further design of a prepared problem. **Gradient**: with its derivatives by "
+    "all decisions. **Solve**: optimum at this fidelity's own angles, with all preparation. **First design**: "
+    "objective with all preparation. **Regret**: by how much the exact objective of the design found exceeds that of "
+    "the best design."
+)
 INDEX = (
     "problem", "value within 0.1 %", "per design", "decision within 0.1 %", "per solve", "error of two-order",
     "of no gas", "of auto 0.001", "regret of two-order", "of auto 0.001", "uneven speed",
 )  # fmt: skip
 
 
-def as_page(found: Trade, picture: str | None, command: str) -> str:
-    """Table, picture if there is one, and the choice for one problem."""
+def trade_document(found: Trade, picture: str | None, command: str) -> Document:
+    """Table, picture if there is one, by its name, and the choice for one problem."""
     problem, part = found.problem, found.rigid_part
     optimum = "" if math.isnan(found.optimum) else f", of its optimum {found.optimum:.6g}"
-    sections = [
-        f"# Speed against accuracy: {escaped(problem.title)}",
-        f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
-        f"(SI). Double precision against 50 digits, from the kinematics of every cylinder to the vectors of the "
-        f"{' and '.join(part.covered)}: relative error {max(part.error, 1e-17):.0e}.",
-        f"**Take** {advice(found)}",
-        f"![Time against error of every fidelity; colour is regret]({picture})"
+    blocks: list[Block] = [
+        Paragraph(
+            f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
+            f"(SI). Double precision against 50 digits, from the kinematics of every cylinder to the vectors of the "
+            f"{' and '.join(part.covered)}: relative error {max(part.error, 1e-17):.0e}."
+        ),
+        Paragraph(f"**Take** {advice(found)}", marked=True),
+        Illustration(picture, "Time against error of every fidelity; colour is regret", is_captioned=False)
         if picture
-        else "What is asked depends on no load, so every fidelity gives the same number.",
-        piped(HEAD, [_cells(row) for row in found.rows]),
-        *([] if found.whole else ["Stopped at the time limit: fidelities beyond the last row were not measured."]),
-        "*Another design*: objective of a further design of a prepared problem. *Gradient*: with its derivatives by "
-        "all decisions. *Solve*: optimum at this fidelity's own angles, with all preparation. *First design*: "
-        "objective with all preparation. "
-        "*Regret*: by how much the exact objective of the design found exceeds that of the best design."
-        + (LOCAL if is_local(problem) else MOVED if problem.phasing and problem.phasing.continuous else ""),
-        *_beyond(found),
-        f"```sh\n{command}\n```",
+        else Paragraph("What is asked depends on no load, so every fidelity gives the same number."),
+        Grid("", HEAD, [_cells(row) for row in found.rows]),
     ]
-    return "\n\n".join(sections) + "\n"
+    if not found.whole:
+        blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
+    moved = MOVED if problem.phasing and problem.phasing.continuous else ""
+    blocks.append(Paragraph(COLUMNS + (LOCAL if is_local(problem) else moved), marked=True))
+    blocks.extend(Paragraph(line) for line in _beyond(found))
+    return Document(f"Speed against accuracy: {problem.title}", (*blocks, Code(command)))
 
 
 def _beyond(found: Trade) -> list[str]:

@@ -1,0 +1,90 @@
+"""Reports and the documentation in a browser: read by weak eyes, by ear, in the dark and on paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page
+
+from browser import pages
+from browser.chromium import serious
+
+pytestmark = pytest.mark.slow
+
+# of paper inside its margins of 15 mm [CSS pixels]: A4 upright, and lying for wide tables
+UPRIGHT, LYING = 680, 1009
+BEYOND = f"""() => [...document.querySelectorAll("main *")].flatMap(element => {{
+    const edge = element.closest(".wide") ? {LYING} : {UPRIGHT};
+    const right = element.getBoundingClientRect().right;
+    return right > edge + 1 ? [`${{element.tagName}} ${{right}} ${{element.textContent.slice(0, 60)}}`] : [];
+}})"""
+COLOURS = """selector => {
+    const colour = text => text.match(/[\\d.]+/g).map(Number);
+    const linear = v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+    const lit = rgb => [0.2126, 0.7152, 0.0722].reduce((sum, share, k) => sum + share * linear(rgb[k] / 255), 0);
+    return [...document.querySelectorAll(selector)].map(element => {
+        const own = getComputedStyle(element);
+        return [lit(colour(own.color)), lit(colour(getComputedStyle(document.body).backgroundColor))];
+    });
+}"""
+
+
+@pytest.fixture(params=pages.MAKERS)
+def shown(request: pytest.FixtureRequest, page: Page) -> Page:
+    """A page of every kind that commands make."""
+    page.goto(pages.made(request.param).as_uri())
+    return page
+
+
+def test_reports_have_no_serious_finding(shown: Page) -> None:
+    for scheme in ("light", "dark"):
+        shown.emulate_media(color_scheme=scheme)
+        assert serious(shown) == [], scheme
+
+
+def test_reports_fit_on_paper(shown: Page) -> None:
+    shown.set_viewport_size({"width": UPRIGHT, "height": 1000})
+    shown.emulate_media(media="print")
+    assert shown.evaluate(BEYOND) == []
+
+
+def test_paper_is_white_and_its_letters_dark(shown: Page) -> None:
+    """Also where the screen is dark."""
+    shown.emulate_media(media="print", color_scheme="dark")
+    seen = shown.evaluate(COLOURS, "h1, h2, p, a, th, td, figcaption")
+    assert seen
+    for ink, paper in seen:
+        assert paper == 1.0
+        assert (paper + 0.05) / (ink + 0.05) >= 7.0
+    assert shown.evaluate("() => [...document.images].map(image => getComputedStyle(image).filter)") == ["none"] * len(
+        shown.locator("img").all()
+    )
+
+
+def test_the_dark_page_is_dark(shown: Page) -> None:
+    shown.emulate_media(color_scheme="dark")
+    for ink, ground in shown.evaluate(COLOURS, "h1, p, a"):
+        assert (ink + 0.05) / (ground + 0.05) >= 4.5
+
+
+def test_a_phone_moves_nothing_but_tables_and_pictures(shown: Page) -> None:
+    shown.set_viewport_size({"width": 390, "height": 800})
+    assert shown.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_wide_tables_lie_on_paper_of_their_own(page: Page, tmp_path: Path) -> None:
+    page.goto(pages.made("everything").as_uri())
+    sheet = page.pdf(prefer_css_page_size=True)
+    boxes = {part.split(b"]")[0].strip() for part in sheet.split(b"/MediaBox [")[1:]}
+    sizes = {tuple(float(number) > 700 for number in box.split()[2:]) for box in boxes}
+    assert sizes == {(False, True), (True, False)}
+
+
+@pytest.mark.parametrize("name", pages.SITE)
+def test_the_documentation_has_no_serious_finding(name: str, page: Page) -> None:
+    pytest.importorskip("furo", reason="the tools of the documentation are not installed")
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        page.goto((pages.site() / f"{name}.html").as_uri())
+        assert serious(page) == [], scheme
