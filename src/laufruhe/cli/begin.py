@@ -16,6 +16,7 @@ from laufruhe.errors import Complaint, InputError
 from laufruhe.files import drafts, ready
 from laufruhe.files.catalogue import CatalogueEngine, engine_named, engines
 from laufruhe.files.complaints import Refused, nearest
+from laufruhe.files.toml_text import toml_value
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.report import files
 
@@ -170,5 +171,5 @@ def _described_one(found: CatalogueEngine) -> str:
     lines = [found.name, f"Source: {found.source}.", f"Displacement, as published: {found.displacement}."]
     lines += [found.note] if found.note else []
     for key, value in found.engine.items():
-        lines.append(f"    {key} = {drafts.toml_value(value)}" + ("   # assumed" if key in found.assumed else ""))
+        lines.append(f"    {key} = {toml_value(value)}" + ("   # assumed" if key in found.assumed else ""))
     return "\n".join(lines) + "\n"

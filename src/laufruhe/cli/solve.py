@@ -16,6 +16,7 @@ from laufruhe.cli.check import doubt
 from laufruhe.cli.screen import DONE, FAILED, Watched, above_zero, complain, is_quiet, json_file, progress
 from laufruhe.errors import SolverError
 from laufruhe.files.reader import load
+from laufruhe.live import live_model
 from laufruhe.numerics.progress import Listener
 from laufruhe.problem.problem import Problem
 from laufruhe.report import files
@@ -116,7 +117,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         result = replace(result, timing={**result.timing, **seconds})
         document = result_document(result, list(pictures), request.command)
         files.write(stage / files.REPORT, rendered(document, f".{request.kinds[0]}" if request.kinds else ""))
-        files.write(stage / files.PAGE, as_html(document, pictures))
+        files.write(stage / files.PAGE, as_html(document, pictures, live_model(problem, result)))
         for place in filter(None, (stage / files.RESULT, copy)):
             files.write(place, as_json(result, request.series))
     return result, folder

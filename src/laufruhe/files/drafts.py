@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from laufruhe import units
-from laufruhe.files.catalogue import CatalogueEngine, engine_named, shown
+from laufruhe.files.catalogue import CatalogueEngine, engine_named
 from laufruhe.files.reader import load_tables
 from laufruhe.files.ready import schema_line
+from laufruhe.files.toml_text import toml_value
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -168,13 +167,3 @@ def _open(moment: float) -> list[str]:
     size = f"{10.0 ** math.ceil(math.log10(moment)):.6g}" if moment else "1"
     upper = next(f"{step * float(size) / 10.0:.6g}" for step in (1, 2, 5, 10) if step * float(size) / 10.0 >= moment)
     return [f'unbalance = {{ between = ["0 kg m", "{upper} kg m"] }}', "angle = { between = [0, 360] }"]
-
-
-def toml_value(value: Any) -> str:
-    """A value as a TOML file has it."""
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return f'"{escaped}"'
-    if isinstance(value, list):
-        return f"[{', '.join(map(toml_value, value))}]"
-    return np.format_float_positional(value, trim="-") if isinstance(value, float) else shown(value)

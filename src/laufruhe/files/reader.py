@@ -130,6 +130,11 @@ class _Origin:
     tables: Mapping[str, Any]
     path: Path
 
+    @property
+    def file(self) -> tuple[Mapping[str, Any], Path]:
+        """Tables as they were read, and where they stand."""
+        return self.tables, self.path
+
     def with_values(self, values: Mapping[str, Any]) -> Problem:
         """Numbers at other values."""
         return self._edited(*(partial(edits.with_value, name=name, value=value) for name, value in values.items()))

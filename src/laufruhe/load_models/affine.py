@@ -240,6 +240,11 @@ class AffineModel:
             for loads, by in zip(self.bare.loads, self._slopes, strict=True)
         ]
 
+    def spectra(self, channel: LoadChannel) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
+        """Per operating point what a channel measures of the bare design, and of one unit of every column."""
+        own = self.bare.signals(channel)
+        return [(bare, tuple(map(channel.signal, by))) for bare, by in zip(own, self._slopes, strict=True)]
+
     def norm(self, measure: Measure, samples: int, averaged: bool = False) -> AffineNorm:
         """A measure at `samples` steps over the common period, a mean averaged about them where asked."""
         channel, known = measure.channel, self.problem.known_rows.get(measure)
@@ -255,8 +260,9 @@ class AffineModel:
             slopes = [mass_rows(measure, _only(self.bare.engine, change.rotors)).vectors for change in self._changes]
             return _stacked(bare, slopes, self._keep_all)
         averaged = averaged and measure.norm.averages
-        own = self.bare.signals(channel)
-        alone = [[channel.signal(by[k]) for by in self._slopes] for k in range(len(self._changes))]
+        pairs = self.spectra(channel)
+        own = [bare for bare, _ in pairs]
+        alone = [[by[k] for _, by in pairs] for k in range(len(self._changes))]
         base = self._own_base([*own, *(signal for by in alone for signal in by)], samples)
         samples = int(samples * self.base / base)
         # what is open does not bend, but has to be known at the same angles

@@ -63,11 +63,9 @@ class Corners:
 
     def values(self, angles: Array, period: float, derivative: int = 0) -> Array:
         """Sum of f_m times the jumps, or a derivative of it, shape (len(angles), ...)."""
-        k, degrees = self.jumps.shape[:2]
-        powers = [m - derivative for m in range(degrees)]
-        table: Array = np.array([period**m * _kernel(m, degrees + 2) for m in powers])
-        # of every power one row a corner
-        weights = np.einsum("mp,kmd->pkd", table, self.jumps.reshape(k, degrees, -1))
+        k = len(self.jumps)
+        weights = self.pieces(period, derivative)
+        weights = weights.reshape(*weights.shape[:2], -1)
         out = np.empty((len(angles), weights.shape[2]))
         step = max(_BLOCK // k, 1)
         for start in range(0, len(angles), step):
@@ -78,6 +76,14 @@ class Corners:
                 found = found + power @ own
             out[start : start + step] = found
         return out.reshape(len(angles), *self.jumps.shape[2:])
+
+    def pieces(self, period: float, derivative: int = 0) -> Array:
+        """Factors of the powers of phi / P - 1/2 after every corner, shape (powers, k, ...)."""
+        k, degrees = self.jumps.shape[:2]
+        powers = [m - derivative for m in range(degrees)]
+        table: Array = np.array([period**m * _kernel(m, degrees + 2) for m in powers])
+        found = np.einsum("mp,kmd->pkd", table, self.jumps.reshape(k, degrees, -1))
+        return np.asarray(found.reshape(-1, k, *self.jumps.shape[2:]))
 
     def coefficients(self, count: int, base: float) -> NDArray[np.complex128]:
         """Orders 0, b, ... (count - 1) b, shape (count, ...); none at order zero."""

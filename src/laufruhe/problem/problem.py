@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -42,6 +43,10 @@ class Search:
 
 class Origin(Protocol):
     """The file of a problem, in which numbers may be changed by name."""
+
+    @property
+    def file(self) -> tuple[Mapping[str, Any], Path]:
+        """Tables as they were read, and where they stand."""
 
     def with_values(self, values: Mapping[str, Any]) -> Problem:
         """Numbers at other values."""

@@ -5,22 +5,38 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.resources import files
 
 from markupsafe import Markup, escape
 
+from laufruhe.live import LiveModel, page_assets
 from laufruhe.report.document import Document
 
 PAGE = "page.html"
+HEADING = "Move the decisions"
 
 
-def as_html(document: Document, pictures: Mapping[str, str]) -> str:
+@dataclass(frozen=True)
+class _Live:
+    """What the template puts in the place of a live model; no script where nothing moves."""
+
+    heading: str
+    sentences: tuple[str, ...]
+    model: Markup
+    style: Markup
+    script: Markup
+
+
+def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | None = None) -> str:
     """A report as HTML.
 
     Parameters
     ----------
     pictures
         SVG by name; they stand in the page, which loads nothing.
+    live
+        What lets a reader move decisions.
     """
     import jinja2
 
@@ -28,7 +44,18 @@ def as_html(document: Document, pictures: Mapping[str, str]) -> str:
     environment.filters["marked"] = _marked
     template = environment.from_string((files("laufruhe.report") / PAGE).read_text(encoding="utf-8"))
     inline = {name: _inline(svg) for name, svg in pictures.items()}
-    return template.render(document=document, pictures=inline) + "\n"
+    return template.render(document=document, pictures=inline, live=_live(live)) + "\n"
+
+
+def _live(model: LiveModel | None) -> _Live | None:
+    if model is None or not (model.sliders or model.unmoved):
+        return None
+    why = model.why_not or model.too_large
+    if why:
+        return _Live(HEADING, (why, *model.told), Markup(""), Markup(""), Markup(""))
+    assets = page_assets()
+    # of our own making, and JSON without an opening bracket
+    return _Live(HEADING, (), *(Markup(text) for text in (model.as_json(), assets["live.css"], assets["live.js"])))
 
 
 def _inline(svg: str) -> str:

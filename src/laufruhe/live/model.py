@@ -1,0 +1,225 @@
+"""What a page needs to show any design of a problem by itself: loads that are affine in what is open (P1).
+
+The numbers are those of `AffineModel`, the norms are named, and the page takes them as results do. What no such
+map says is named, never left out without a word.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.live.parts import Curve, Design, LiveModel, Proved, Shown, Slider
+from laufruhe.live.saving import saved
+from laufruhe.live.signals import Signal, signal_of
+from laufruhe.load_models.affine import AffineModel
+from laufruhe.numerics.norms import MEAN
+from laufruhe.present.measures import places_of
+from laufruhe.problem.channels import CHANNELS
+from laufruhe.problem.decision import Decision, Domain, Kind
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.solvers.conclusion import angle_name
+from laufruhe.solvers.result import Result
+
+Array = NDArray[np.float64]
+
+ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
+HOW = "laufruhe page {file} moves it"
+OBJECTIVE = "objective"
+
+
+def live_model(problem: Problem, result: Result) -> LiveModel:
+    """The page's model of a problem.
+
+    Parameters
+    ----------
+    problem
+        As it was read.
+    result
+        Of it, solved or evaluated: what is not affine stays as it is there.
+    """
+    file = f"{problem.name}.toml"
+    bare = LiveModel(
+        problem.name, problem.title, file, tuple(point.name for point in problem.points), problem.engine.cycle.turns,
+        objective=result.problem.objective_name, unit=result.problem.objective_unit or "",
+    )  # fmt: skip
+    values = _decided(result)
+    moving = _moving(result.problem, values)
+    still = tuple((d.name, _stays(d, file)) for d in result.problem.decisions if not d.is_affine)
+    if result.problem.phasing is not None:
+        still = (*((name, _star(file)) for name in result.problem.phasing.open_names), *still)
+    if not moving.decisions:
+        return replace(bare, unmoved=still, why_not="Nothing is open here that the loads are affine in.")
+    try:
+        found = _filled(replace(bare, unmoved=still), moving, result, values)
+    except ModelError as error:
+        return replace(bare, unmoved=still, why_not=f"The loads cannot be shown while decisions move: {error}.")
+    return replace(found, save=saved(problem, result, moving, values))
+
+
+def _decided(result: Result) -> dict[str, Value]:
+    """Values of all decisions in the design of a result, by name."""
+    shown = {entry.name: entry.value for entry in result.decisions}
+    found: dict[str, Value] = {}
+    for decision in result.problem.decisions:
+        if decision.name not in shown:
+            found[decision.name] = decision.start
+        elif decision.is_affine and decision.set.width > 1:
+            found[decision.name] = shown[decision.name] * cmath.exp(1j * shown[angle_name(decision)])
+        else:
+            unit = decision.set.directions[0]
+            found[decision.name] = shown[decision.name] * (unit if decision.is_affine else 1.0)
+    return found
+
+
+def _moving(problem: Problem, values: Mapping[str, Value]) -> Problem:
+    """The drawing, all but what loads are affine in fixed as it was decided."""
+    fixed = [decision for decision in problem.decisions if not decision.is_affine]
+    engine = problem.design([values[decision.name] for decision in fixed], fixed)
+    return replace(problem, phasing=None, over=None, engine=engine, decisions=problem.unbalances)
+
+
+def _filled(bare: LiveModel, moving: Problem, result: Result, values: Mapping[str, Value]) -> LiveModel:
+    model = AffineModel(moving)
+    collected = _Collected(model, {decision.kind for decision in moving.decisions}, bare.file)
+    curves = _curves(collected, result)
+    measures = collected.measures()
+    start = _vector(model.domains, [decision.start for decision in moving.decisions])
+    designs = [("given", start)]
+    if result.decisions:
+        designs.append(("optimum", _vector(model.domains, [values[d.name] for d in moving.decisions])))
+    designs.append(("between", _between(model.domains)))
+    return replace(
+        bare,
+        sliders=tuple(map(_slider, model.domains)),
+        signals=tuple(collected.signals.values()),
+        curves=curves,
+        measures=measures,
+        designs=tuple(_design(name, x, moving, model.domains, collected.asked) for name, x in designs),
+        proved=_proved(result),
+        unmoved=(*bare.unmoved, *collected.unmoved),
+    )
+
+
+class _Collected:
+    """Signals of a problem, each once, and what of its measures they say."""
+
+    def __init__(self, model: AffineModel, kinds: set[Kind], file: str) -> None:
+        self.model, self.kinds, self.file = model, kinds, file
+        self.signals: dict[Measure, Signal] = {}
+        self.unmoved: list[tuple[str, str]] = []
+        self.asked: list[Measure] = []
+
+    def signal(self, measure: Measure) -> int:
+        """Number of the signal whose norm a measure is; one for all norms."""
+        key = replace(measure, norm=MEAN)
+        if key not in self.signals:
+            self.signals[key] = signal_of(self.model, key)
+        return list(self.signals).index(key)
+
+    def measures(self) -> tuple[Shown, ...]:
+        """Terms of the objective, of later ones, and limits."""
+        problem, found = self.model.problem, []
+        for term in problem.objective:
+            found += self._shown(term.measure, OBJECTIVE, term.measure.name, weight=term.weight)
+        for rank in problem.ranks[1:]:
+            for term in rank.terms:
+                found += self._shown(term.measure, "rank", term.measure.name)
+        for limit in problem.limits:
+            found += self._shown(limit.measure, "limit", limit.name, limit)
+        return tuple(found)
+
+    def _shown(
+        self, measure: Measure, role: str, name: str, limit: Limit | None = None, weight: float = 1.0
+    ) -> list[Shown]:
+        stays = not measure.channel.is_moved_by(self.kinds)
+        is_affine = measure.is_mass or (measure.is_load and not measure.channel.feels_inertia)
+        if not stays and not is_affine:
+            self.unmoved.append((name, f"no affine map of what is open says it; {HOW.format(file=self.file)}"))
+            return []
+        self.asked.append(measure)
+        base = Shown(role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit))
+        if not stays:
+            return [replace(base, signal=self.signal(measure))]
+        if limit is None:
+            return [replace(base, value=self.model.bare.value(measure))]
+        found = self.model.bare.standing(limit)
+        return [replace(base, sides=((found.side, found.edge),), value=found.value, met=found.excess <= 1e-6)]
+
+
+def _sides(limit: Limit | None) -> tuple[tuple[str, float], ...]:
+    if limit is None:
+        return ()
+    sides = (("at least", limit.minimum), ("at most", limit.maximum))
+    return tuple((sense, edge) for sense, edge in sides if math.isfinite(edge))
+
+
+def _curves(collected: _Collected, result: Result) -> tuple[Curve, ...]:
+    """Forces on mounts and bearings, and what the block feels."""
+    forces = [(places.title, places.channel) for places in places_of(result) if places.channel.feels_unbalances]
+    block = [(name.capitalize(), CHANNELS[name]) for name in ON_BLOCK]
+    found = []
+    for title, channel in (*forces, *block):
+        found.append(Curve(title, collected.signal(Measure(channel))))
+    return tuple(found)
+
+
+def _slider(domain: Domain) -> Slider:
+    decision, own = domain.decision, domain.set
+    return Slider(
+        decision.name, decision.unit, domain.start, domain.width, own.lower, own.upper, own.angles,
+        angle_name(decision),
+    )  # fmt: skip
+
+
+def _vector(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
+    return np.concatenate([domain.columns_of(value) for domain, value in zip(domains, values, strict=True)])
+
+
+def _between(domains: Sequence[Domain]) -> Array:
+    """Somewhere inside, in no special place."""
+    parts = []
+    for k, domain in enumerate(domains):
+        low, high = domain.set.lower, domain.set.upper
+        size = low + (0.31 + 0.37 * ((0.618 * k) % 1.0)) * (high - low)
+        first, last = domain.set.angles
+        angle = first + 0.41 * (last - first)
+        parts.append(np.array([size * math.cos(angle), size * math.sin(angle)] if domain.width > 1 else [size]))
+    return np.concatenate(parts)
+
+
+def _design(name: str, x: Array, moving: Problem, domains: Sequence[Domain], asked: Sequence[Measure]) -> Design:
+    """A design as `evaluate` finds it."""
+    found = evaluate(moving, moving.design([domain.complex_value(x) for domain in domains]))
+    return Design(name, tuple(map(float, x)), tuple(float(found.value(measure)) for measure in asked))
+
+
+def _proved(result: Result) -> Proved | None:
+    """Of the objective as it is shown; None where something else was bounded."""
+    if result.problem.over is not None or not result.decisions:
+        return None
+    if result.ranks:
+        first = result.ranks[0]
+        return Proved(first.least, first.lower_bound, first.gap, str(first.proof))
+    certificate, objective = result.certificate, result.objective
+    if certificate is None or objective is None:
+        return None
+    return Proved(objective.value, certificate.lower_bound, certificate.gap, str(certificate.kind))
+
+
+def _stays(decision: Decision, file: str) -> str:
+    """Why a decision has no slider."""
+    return f"loads are not affine in it, so it stays as it was decided; {HOW.format(file=file)}"
+
+
+def _star(file: str) -> str:
+    return f"stars are chosen and not slid, so the one decided stays; {HOW.format(file=file)}"

@@ -1,0 +1,102 @@
+// Sliders, and the measures beside them. They show a state, and tell what was typed or slid.
+
+const STEPS = 1000;
+
+/** A range and a number field of one value. */
+class Slider {
+  constructor(field, marks, told) {
+    this.field = field;
+    const { name, unit, lower, upper } = field, id = `live-${name.replace(/[^\w-]/g, "-")}`;
+    const step = ((upper - lower) * unit.factor) / STEPS || 1;
+    this.range = element("input", { type: "range", id, min: lower * unit.factor, max: upper * unit.factor, step: "any", "data-decision": name });
+    this.number = element("input", { type: "number", min: lower * unit.factor, max: upper * unit.factor, step: "any", "data-number": name, "aria-label": `${name} in ${unit.shown || "its own unit"}` });
+    this.range.addEventListener("keydown", (event) => this.key(event, step, told));
+    this.range.addEventListener("input", () => told(name, this.range.valueAsNumber / unit.factor, false));
+    this.range.addEventListener("change", () => told(name, this.range.valueAsNumber / unit.factor, true));
+    this.number.addEventListener("change", () => this.typed(told));
+    const rail = element("div", { class: "live-rail" }, this.range);
+    for (const [kind, value] of marks) rail.append(this.mark(kind, value));
+    const ends = element("span", { class: "live-ends" }, `${trimmed(lower * unit.factor)} to ${trimmed(upper * unit.factor)} ${unit.shown}`.trimEnd());
+    this.root = element("div", { class: "live-slider" },
+      element("label", { for: id }, name, ends), rail, element("span", { class: "live-typed" }, this.number, element("span", { "aria-hidden": "true" }, unit.shown)));
+  }
+
+  /** Where a known design stands. */
+  mark(kind, value) {
+    const { lower, upper } = this.field, made = element("i", { class: `live-mark ${kind}`, "aria-hidden": "true" });
+    made.style.left = `${(100 * (value - lower)) / (upper - lower || 1)}%`;
+    return made;
+  }
+
+  /** Arrows move by a thousandth of the range, pages by a twentieth. */
+  key(event, step, told) {
+    const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 50, PageDown: -50 }[event.key];
+    if (!by || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    const { name, unit, lower, upper } = this.field;
+    const value = Math.min(Math.max(this.value + (by * (event.shiftKey ? 10 : 1) * step) / unit.factor, lower), upper);
+    told(name, value, true);
+  }
+
+  typed(told) {
+    const value = this.number.valueAsNumber / this.field.unit.factor;
+    if (!Number.isFinite(value)) { this.show(this.value); return; }
+    told(this.field.name, Math.min(Math.max(value, this.field.lower), this.field.upper), true);
+  }
+
+  show(value) {
+    const { unit } = this.field;
+    this.value = value;
+    this.range.value = value * unit.factor;
+    this.range.setAttribute("aria-valuetext", figure(value, unit));
+    if (document.activeElement !== this.number || this.number.value !== "") this.number.value = trimmed(value * unit.factor, 5);
+  }
+}
+
+/** Rows of limits: value, edge, and how much of the room is used. */
+class Limits {
+  constructor(measures) {
+    this.rows = measures.map((measure) => this.row(measure));
+    const head = element("tr", {}, ...["limit", "value", "", "use"].map((text) => element("th", { scope: "col" }, text)));
+    this.root = element("table", { class: "live-limits" }, element("thead", {}, head), element("tbody", {}, ...this.rows.map((row) => row.root)));
+    this.root.hidden = measures.length === 0;
+  }
+
+  row(measure) {
+    const value = element("td", {}), edge = element("td", { class: "edge" }), bar = element("i"), met = element("span", { class: "live-met" });
+    const root = element("tr", { "data-measure": measure.name }, element("th", { scope: "row" }, measure.name), value, edge,
+      element("td", {}, element("span", { class: "live-gauge", "aria-hidden": "true" }, bar), met));
+    return { measure, root, value, edge, bar, met };
+  }
+
+  update(found) {
+    this.rows.forEach((row, k) => {
+      const { value, met, side } = found[k], { measure, root } = row;
+      root.setAttribute("data-value", value);
+      root.setAttribute("data-met", met);
+      row.value.textContent = figure(value, measure);
+      row.edge.textContent = side ? `${side[0]} ${figure(side[1], measure)}` : "";
+      row.bar.style.width = `${side && side[1] ? Math.min(100, (100 * value) / side[1]) : 0}%`;
+      row.met.textContent = met ? (measure.signal === null ? "kept, stays" : "kept") : "broken";
+    });
+  }
+}
+
+/** A button. */
+function button(what, text, title, pressed) {
+  const made = element("button", { type: "button", "data-do": what, title }, text);
+  made.addEventListener("click", pressed);
+  return made;
+}
+
+/** One of several to choose from. */
+function choice(name, texts, chosen) {
+  const list = texts.map((text, k) => {
+    const input = element("input", { type: "radio", name, value: k, ...(k === 0 ? { checked: true } : {}) });
+    input.addEventListener("change", () => chosen(k));
+    return element("label", {}, input, element("span", {}, text));
+  });
+  const made = element("div", { class: "live-choice", role: "radiogroup", "aria-label": name }, ...list);
+  made.hidden = texts.length < 2;
+  return made;
+}

@@ -1,0 +1,55 @@
+// SVG and HTML elements, axes and lines.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** An element with attributes and children. */
+function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) if (value !== false) made.setAttribute(key, value === true ? "" : value);
+  made.append(...children);
+  return made;
+}
+
+/** An SVG element. */
+function drawn(name, attributes = {}, ...children) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+}
+
+/** A picture that readers aloud know by its label. */
+function picture(width, height, label) {
+  return drawn("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label });
+}
+
+/** A text of a picture. */
+function label(x, y, text, anchor = "middle", kind = "tick") {
+  return drawn("text", { x, y, "text-anchor": anchor, class: kind }, String(text));
+}
+
+/** A path through points: x and y of every index. */
+function pathOf(count, x, y, isClosed = false) {
+  let text = "";
+  for (let i = 0; i < count; i++) text += `${i ? "L" : "M"}${x(i).toFixed(1)} ${y(i).toFixed(1)}`;
+  return isClosed && count ? `${text}Z` : text;
+}
+
+/** So many even steps of a longer row, for drawing. */
+function thinned(length, most) {
+  return Math.max(1, Math.ceil(length / most));
+}
+
+/** Colour of a place. */
+function colour(k) {
+  return `s${k % 8}`;
+}
+
+/** A scale that grows with what is drawn, and shrinks only when it is far too large. */
+class Scale {
+  constructor() { this.top = 0; }
+  of(value) {
+    if (value > this.top || value < 0.3 * this.top) this.top = roundUp(value);
+    return this.top;
+  }
+}

@@ -1,0 +1,112 @@
+// Norms of rows, by the names of problem files. Each takes what `rowsAt` gives, and says one number.
+
+/** Sum of a function over all lengths of a point. */
+function total(point, of) {
+  let sum = 0;
+  for (const { lengths } of point.groups) for (let i = 0; i < lengths.length; i++) sum += of(lengths[i]);
+  return sum;
+}
+
+/** Number of rows of a point. */
+function size(point) {
+  return point.groups.reduce((sum, group) => sum + group.lengths.length, 0);
+}
+
+/** Sum over all rows, each by its weight: masses add up, loads are averaged. */
+function weighted(rows, of) {
+  return rows.points.reduce((sum, point) => {
+    if (point.share === 0) return sum;
+    return sum + (rows.adds ? total(point, of) : (point.share / size(point)) * total(point, of));
+  }, 0);
+}
+
+/** Points that count. */
+function counted(rows) {
+  return rows.points.filter((point) => point.share > 0);
+}
+
+/** The largest of numbers; nothing of none. */
+function largest(numbers) {
+  let most = 0;
+  for (const value of numbers) if (value > most) most = value;
+  return most;
+}
+
+/** Twice the radius of the smallest ball that holds a signal. */
+function diameter({ rows }) {
+  const used = rows.filter((row) => row.some((value) => value !== 0));
+  if (used.length === 0) return 0;
+  if (used.length === 1) {
+    let low = Infinity, high = -Infinity;
+    for (const value of used[0]) { if (value < low) low = value; if (value > high) high = value; }
+    return high - low;
+  }
+  return 2 * ballOf(Array.from(used[0], (_, i) => used.map((row) => row[i])));
+}
+
+const distance = (a, b) => Math.hypot(...a.map((value, k) => value - b[k]));
+
+/** Radius of the smallest ball: the farthest point joins those that hold it, until none is outside. */
+function ballOf(points) {
+  let held = [points[0]], ball = { centre: points[0], radius: 0 };
+  for (let round = 0; round < points.length; round++) {
+    const far = points.reduce((best, point) => (distance(point, ball.centre) > distance(best, ball.centre) ? point : best));
+    if (distance(far, ball.centre) <= ball.radius * (1 + 1e-13) || held.includes(far)) break;
+    [held, ball] = ballOfFew([...held, far]);
+  }
+  return ball.radius;
+}
+
+/** The smallest ball of a handful: that of a subset, centred between its points, which holds all. */
+function ballOfFew(few) {
+  let best = null;
+  for (let mask = 1; mask < 1 << few.length; mask++) {
+    const chosen = few.filter((_, k) => mask & (1 << k));
+    if (chosen.length < 2 || chosen.length > few[0].length + 1) continue;
+    const centre = centreOf(chosen);
+    if (!centre) continue;
+    const radius = Math.max(...chosen.map((point) => distance(point, centre)));
+    const outside = Math.max(...few.map((point) => distance(point, centre)));
+    if (outside <= radius * (1 + 1e-12) && (!best || radius < best[1].radius)) {
+      best = [chosen, { centre, radius: Math.max(radius, outside) }];
+    }
+  }
+  return best ?? [few, { centre: few[0], radius: Math.max(...few.map((point) => distance(point, few[0]))) }];
+}
+
+/** The point as far from each of these, in the plane that they span; null where it is not between them. */
+function centreOf(points) {
+  const apart = points.slice(1).map((point) => point.map((value, k) => value - points[0][k]));
+  const dot = (a, b) => a.reduce((sum, value, k) => sum + value * b[k], 0);
+  const shares = solved(apart.map((a) => apart.map((b) => 2 * dot(a, b))), apart.map((a) => dot(a, a)));
+  if (!shares) return null;
+  const first = 1 - shares.reduce((a, b) => a + b, 0);
+  if (Math.min(first, ...shares) < -1e-9) return null;
+  return points[0].map((value, k) => value + apart.reduce((sum, a, j) => sum + shares[j] * a[k], 0));
+}
+
+/** A small system of equations by elimination; null where it is singular. */
+function solved(matrix, right) {
+  const rows = matrix.map((row, k) => [...row, right[k]]), n = rows.length;
+  for (let k = 0; k < n; k++) {
+    const pivot = rows.slice(k).reduce((best, row) => (Math.abs(row[k]) > Math.abs(best[k]) ? row : best));
+    if (Math.abs(pivot[k]) < 1e-300) return null;
+    rows.splice(rows.indexOf(pivot), 1);
+    rows.splice(k, 0, pivot);
+    for (let j = 0; j < n; j++) {
+      if (j === k) continue;
+      const factor = rows[j][k] / pivot[k];
+      for (let i = k; i <= n; i++) rows[j][i] -= factor * pivot[i];
+    }
+  }
+  return rows.map((row, k) => row[n] / row[k]);
+}
+
+/** @type {Record<string, (rows: object) => number>} */
+const NORMS = {
+  mean: (rows) => weighted(rows, (length) => length),
+  rms: (rows) => Math.sqrt(weighted(rows, (length) => length * length)),
+  maximum: (rows) => largest(counted(rows).flatMap((point) => point.groups.map((group) => largest(group.lengths)))),
+  "peak to peak": (rows) => largest(counted(rows).flatMap((point) => point.groups.map(diameter))),
+  "worst mean": (rows) => largest(counted(rows).map((point) => total(point, (length) => length) / size(point))),
+};

@@ -1,0 +1,42 @@
+// Numbers as the report prints them.
+
+/** To `digits` figures, without an exponent where it can be read without. */
+function number(value, digits = 4) {
+  if (value === null || !Number.isFinite(value)) return "-";
+  if (value === 0) return "0";
+  const figures = (given) => Math.floor(Math.log10(Math.abs(Number(given.toExponential(digits - 1)))));
+  const first = Math.floor(Math.log10(Math.abs(value)));
+  if (first < -4 || first > 6) return exponential(value, digits);
+  return value.toFixed(Math.max(digits - 1 - figures(value), 0));
+}
+
+/** 1.234e-05, as the report writes it. */
+function exponential(value, digits) {
+  const [mantissa, power] = value.toExponential(digits - 1).split("e");
+  return `${mantissa}e${power[0]}${power.slice(1).padStart(2, "0")}`;
+}
+
+/** A number without zeros that say nothing. */
+function trimmed(value, digits = 4) {
+  const text = number(value, digits);
+  return text.includes(".") && !text.includes("e") ? text.replace(/0+$/, "").replace(/\.$/, "") : text;
+}
+
+/** A value in the unit that is shown; what is a rounding of `scale` is zero. */
+function figure(value, unit, digits = 4, scale = 0) {
+  const shown = Math.abs(value) <= 1e-9 * scale ? 0 : value * unit.factor;
+  return `${number(shown, digits)} ${unit.shown}`.trimEnd();
+}
+
+/** A share with its sign: +1.2 %. */
+function percent(share) {
+  const text = (100 * share).toFixed(Math.abs(share) < 0.0995 ? 2 : 1);
+  return `${share >= 0 ? "+" : "−"}${text.replace("-", "")} %`;
+}
+
+/** Ends of an axis, a round number of 1, 1.5, 2, 3, 5 or 7 that is not under a value. */
+function roundUp(value) {
+  if (!(value > 0)) return 1;
+  const power = 10 ** Math.floor(Math.log10(value));
+  return [1, 1.5, 2, 3, 5, 7, 10].find((step) => step * power >= value * 1.000001) * power;
+}

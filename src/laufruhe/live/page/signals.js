@@ -1,0 +1,267 @@
+// Loads over the cycle: constant + slope x, order by order, at the same angles at which results are measured.
+
+const TURN = 2 * Math.PI;
+
+/**
+ * Numbers of a model, deflated as float64.
+ * @param {string} text base64
+ * @returns {Promise<Float64Array>}
+ */
+async function inflated(text) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Float64Array(await new Response(stream).arrayBuffer());
+}
+
+/** An array of the block by its place and shape. */
+function arrayOf(block, [start, shape]) {
+  return { values: block.subarray(start, start + shape.reduce((a, b) => a * b, 1)), shape };
+}
+
+/** Orders and their coefficients, (orders, places, d, ..., 2). */
+function wavesOf(block, waves) {
+  const { values, shape } = arrayOf(block, waves.coefficients);
+  return { orders: arrayOf(block, waves.orders).values, values, shape };
+}
+
+/**
+ * A signal with its numbers.
+ * @returns what JSON tells of it, the numbers of every point, and its counts of places, components and columns
+ */
+function decoded(signal, block) {
+  const points = signal.points.map((point) => ({
+    share: point.share,
+    series: wavesOf(block, point.series),
+    slope: wavesOf(block, point.slope),
+    bends: point.bends && {
+      smooth: wavesOf(block, point.bends.smooth),
+      corners: arrayOf(block, point.bends.corners).values,
+      pieces: arrayOf(block, point.bends.pieces),
+      at: arrayOf(block, point.bends.at).values,
+    },
+  }));
+  const [, places, parts, columns] = points[0].slope.shape;
+  return { ...signal, points, places: signal.places, count: places, parts, columns, grids: new Map() };
+}
+
+/** Sum over j of c_j e^(2 pi i j k / n), the real part, for all k. */
+function summed(orders, coefficient, n) {
+  const re = new Float64Array(n), im = new Float64Array(n);
+  let any = false;
+  for (let j = 0; j < orders.length; j++) {
+    const [a, b] = coefficient(j);
+    if (a === 0 && b === 0) continue;
+    any = true;
+    re[orders[j] % n] += a;
+    im[orders[j] % n] += b;
+  }
+  return any ? transformed(re, im)[0] : null;
+}
+
+/** Discrete Fourier transform with e^(+), of any length, by the smallest factors first. */
+function transformed(re, im) {
+  const n = re.length, p = factorOf(n);
+  if (n === 1) return [re, im];
+  const m = n / p, parts = [];
+  for (let q = 0; q < p; q++) {
+    const a = new Float64Array(m), b = new Float64Array(m);
+    for (let k = 0, from = q; k < m; k++, from += p) { a[k] = re[from]; b[k] = im[from]; }
+    parts.push(m === 1 ? [a, b] : transformed(a, b));
+  }
+  return joined(parts, n, m);
+}
+
+/** Parts of a transform put together. */
+function joined(parts, n, m) {
+  const { cosine, sine } = tableOf(n);
+  const re = new Float64Array(n), im = new Float64Array(n);
+  for (let k = 0; k < n; k++) {
+    let a = 0, b = 0;
+    for (let q = 0; q < parts.length; q++) {
+      const [x, y] = parts[q], at = k % m, turn = (q * k) % n;
+      a += x[at] * cosine[turn] - y[at] * sine[turn];
+      b += x[at] * sine[turn] + y[at] * cosine[turn];
+    }
+    re[k] = a;
+    im[k] = b;
+  }
+  return [re, im];
+}
+
+/** The smallest factor of a whole number. */
+function factorOf(n) {
+  for (let p = 2; p * p <= n; p++) if (n % p === 0) return p;
+  return n;
+}
+
+const tables = new Map();
+
+/** Cosine and sine of k turns over n. */
+function tableOf(n) {
+  if (!tables.has(n)) {
+    const cosine = new Float64Array(n), sine = new Float64Array(n);
+    for (let k = 0; k < n; k++) { cosine[k] = Math.cos((TURN * k) / n); sine[k] = Math.sin((TURN * k) / n); }
+    tables.set(n, { cosine, sine });
+  }
+  return tables.get(n);
+}
+
+/**
+ * The rows of a signal at so many times its steps and, between these, where peaks may stand.
+ * @returns per point the constant by place and component (null where it is nothing), and waves of the slope
+ */
+function gridOf(signal, times) {
+  const key = signal.adds ? 1 : times;
+  if (!signal.grids.has(key)) {
+    const steps = signal.samples * key;
+    signal.grids.set(key, { steps, points: signal.points.map((point) => pointGrid(signal, point, steps, key > 1)) });
+  }
+  return signal.grids.get(key);
+}
+
+function pointGrid(signal, point, steps, isFine) {
+  const bends = isFine ? point.bends : null;
+  const between = bends ? bends.at : new Float64Array(0);
+  const length = steps + between.length;
+  const constant = [];
+  for (let place = 0; place < signal.count; place++) {
+    for (let part = 0; part < signal.parts; part++) {
+      constant.push(constantOf(signal, point, bends, place * signal.parts + part, steps, between));
+    }
+  }
+  const waves = Array.from(point.slope.orders, (order) => waveOf(order, signal.base, steps, between));
+  return { share: point.share, length, constant, waves, point };
+}
+
+/** One component without the columns, at equal steps and at the angles between. */
+function constantOf(signal, point, bends, at, steps, between) {
+  const waves = bends ? bends.smooth : point.series;
+  const stride = signal.count * signal.parts;
+  const coefficient = (j) => [waves.values[2 * (j * stride + at)], waves.values[2 * (j * stride + at) + 1]];
+  const own = summed(waves.orders, coefficient, steps);
+  if (!own && !bends) return null;
+  const out = new Float64Array(steps + between.length);
+  if (own) out.set(own);
+  for (let k = 0; k < between.length; k++) {
+    for (let j = 0; j < waves.orders.length; j++) {
+      const angle = waves.orders[j] * signal.base * between[k], [a, b] = coefficient(j);
+      out[steps + k] += a * Math.cos(angle) - b * Math.sin(angle);
+    }
+  }
+  if (bends) addCorners(out, signal, bends, at, steps, between);
+  return out;
+}
+
+/** Adds the pieces of polynomials between the corners (L5a). */
+function addCorners(out, signal, bends, at, steps, between) {
+  const period = TURN / signal.base, [powers, corners] = bends.pieces.shape, stride = signal.count * signal.parts;
+  const piece = (power, k) => bends.pieces.values[(power * corners + k) * stride + at];
+  for (let k = 0; k < corners; k++) {
+    const factors = Array.from({ length: powers }, (_, power) => piece(power, k));
+    if (factors.every((factor) => factor === 0)) continue;
+    for (let i = 0; i < out.length; i++) {
+      const angle = i < steps ? (period * i) / steps : between[i - steps];
+      const turns = (angle - bends.corners[k]) / period, x = turns - Math.floor(turns) - 0.5;
+      let value = 0;
+      for (let power = powers - 1; power >= 0; power--) value = value * x + factors[power];
+      out[i] += value;
+    }
+  }
+}
+
+/** Cosine and sine of one order at equal steps and at the angles between. */
+function waveOf(order, base, steps, between) {
+  const { cosine, sine } = tableOf(steps), length = steps + between.length;
+  const out = { cosine: new Float64Array(length), sine: new Float64Array(length) };
+  for (let i = 0, at = 0; i < steps; i++, at = (at + order) % steps) {
+    out.cosine[i] = cosine[at];
+    out.sine[i] = sine[at];
+  }
+  for (let k = 0; k < between.length; k++) {
+    out.cosine[steps + k] = Math.cos(order * base * between[k]);
+    out.sine[steps + k] = Math.sin(order * base * between[k]);
+  }
+  return out;
+}
+
+/** Coefficient of one order of the slope times x: real and imaginary part of a component. */
+function slopeAt(signal, point, j, at, x) {
+  const { values } = point.slope;
+  let from = 2 * (j * signal.count * signal.parts + at) * signal.columns, a = 0, b = 0;
+  for (let column = 0; column < signal.columns; column++, from += 2) {
+    a += values[from] * x[column];
+    b += values[from + 1] * x[column];
+  }
+  return [a, b];
+}
+
+/** One component of a point's rows at x, written into `out`; false where it is nothing. */
+function component(signal, own, at, x, out) {
+  const constant = own.constant[at];
+  let any = constant !== null;
+  if (constant) out.set(constant); else out.fill(0);
+  for (let j = 0; j < own.waves.length; j++) {
+    const [a, b] = slopeAt(signal, own.point, j, at, x);
+    if (a === 0 && b === 0) continue;
+    const { cosine, sine } = own.waves[j];
+    any = true;
+    for (let i = 0; i < own.length; i++) out[i] += a * cosine[i] - b * sine[i];
+  }
+  return any;
+}
+
+/**
+ * Rows of a signal at x.
+ * @returns {{adds: boolean, points: {share: number, groups: {lengths: Float64Array, rows: Float64Array[]}[]}[]}}
+ */
+function rowsAt(signal, times, x) {
+  const grid = gridOf(signal, times);
+  const points = grid.points.map((own) => {
+    const groups = [];
+    for (let place = 0; place < signal.count; place++) groups.push(groupAt(signal, own, place, x));
+    return { share: own.share, groups };
+  });
+  return { adds: signal.adds, steps: grid.steps, points };
+}
+
+function groupAt(signal, own, place, x) {
+  const lengths = new Float64Array(own.length), rows = [];
+  for (let part = 0; part < signal.parts; part++) {
+    const row = new Float64Array(own.length);
+    const any = component(signal, own, place * signal.parts + part, x, row);
+    rows.push(row);
+    if (any) for (let i = 0; i < own.length; i++) lengths[i] += row[i] * row[i];
+  }
+  for (let i = 0; i < own.length; i++) lengths[i] = Math.sqrt(lengths[i]);
+  return { lengths, rows };
+}
+
+/**
+ * Amplitude of every order at a place, the long half axis of the ellipse that the vector turns on (M5).
+ * @returns {Map<number, number>} by order of crank speed
+ */
+function amplitudesAt(signal, point, place, x) {
+  const sums = new Map();
+  const add = (order, part, a, b) => {
+    if (!sums.has(order)) sums.set(order, new Float64Array(2 * signal.parts));
+    sums.get(order)[2 * part] += a;
+    sums.get(order)[2 * part + 1] += b;
+  };
+  const stride = signal.count * signal.parts;
+  for (let part = 0; part < signal.parts; part++) {
+    const at = place * signal.parts + part, { series, slope } = point;
+    series.orders.forEach((order, j) => add(order, part, series.values[2 * (j * stride + at)], series.values[2 * (j * stride + at) + 1]));
+    slope.orders.forEach((order, j) => add(order, part, ...slopeAt(signal, point, j, at, x)));
+  }
+  return new Map([...sums].map(([order, c]) => [order * signal.base, longAxis(c)]));
+}
+
+function longAxis(c) {
+  let total = 0, re = 0, im = 0;
+  for (let k = 0; k < c.length; k += 2) {
+    total += c[k] * c[k] + c[k + 1] * c[k + 1];
+    re += c[k] * c[k] - c[k + 1] * c[k + 1];
+    im += 2 * c[k] * c[k + 1];
+  }
+  return Math.sqrt(0.5 * (total + Math.hypot(re, im)));
+}

@@ -1,0 +1,206 @@
+"""What a live model is made of, and its JSON (docs/how-to/live-page.md)."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from laufruhe.live.packing import Block, packed, with_unit
+from laufruhe.live.saving import Saved
+from laufruhe.live.signals import Signal
+
+VERSION = 1
+MOST_MB = 2.0
+"""Of the numbers of a page, compressed."""
+
+
+@dataclass(frozen=True)
+class Slider:
+    """An open number that loads are affine in.
+
+    Attributes
+    ----------
+    name, unit
+        As results show it; SI.
+    column, width
+        Of the decision vector: one real number, or the two of a size and an angle.
+    lower, upper
+        Of the size.
+    angles
+        Bounds of the angle [rad], where that is open.
+    angle
+        What results call it.
+    """
+
+    name: str
+    unit: str
+    column: int
+    width: int
+    lower: float
+    upper: float
+    angles: tuple[float, float]
+    angle: str
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A measure that follows the sliders, or stays.
+
+    Attributes
+    ----------
+    role
+        `objective` for a term of it, `rank` for one of a later objective, or `limit`.
+    signal
+        Number of its signal; None of what stays as it is.
+    norm, refinement
+        Name, and times as many steps.
+    weight
+        In the objective.
+    sides
+        Sense and edge of a limit, "at most" or "at least" [SI].
+    value
+        Of what stays.
+    met
+        Whether what stays keeps the limit.
+    """
+
+    role: str
+    name: str
+    unit: str
+    norm: str
+    refinement: int
+    signal: int | None
+    weight: float = 1.0
+    sides: tuple[tuple[str, float], ...] = ()
+    value: float = 0.0
+    met: bool = True
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A signal that is drawn."""
+
+    title: str
+    signal: int
+
+
+@dataclass(frozen=True)
+class Design:
+    """Values of the decision vector, and every measure that the exact model finds for it."""
+
+    name: str
+    x: tuple[float, ...]
+    measured: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Proved:
+    """What was proven of the objective [SI]."""
+
+    value: float
+    bound: float
+    gap: float
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class LiveModel:
+    """A problem as a page shows it.
+
+    Attributes
+    ----------
+    points
+        Names of the operating points.
+    turns
+        Of the crank in a cycle.
+    designs
+        As given, as decided where that is another, and one between the bounds that checks the page's own sums.
+    unmoved
+        What is open or asked and does not follow the sliders: a name, and why.
+    why_not
+        Why there are no sliders; empty where there are.
+    """
+
+    name: str
+    title: str
+    file: str
+    points: tuple[str, ...]
+    turns: int
+    sliders: tuple[Slider, ...] = ()
+    signals: tuple[Signal, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    measures: tuple[Shown, ...] = ()
+    designs: tuple[Design, ...] = ()
+    objective: str = ""
+    unit: str = ""
+    proved: Proved | None = None
+    unmoved: tuple[tuple[str, str], ...] = ()
+    save: Saved = Saved()
+    why_not: str = ""
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What does not follow sliders, in sentences."""
+        reasons = dict.fromkeys(why for _, why in self.unmoved)
+        names = {why: ", ".join(name for name, own in self.unmoved if own == why) for why in reasons}
+        return tuple(f"{names[why]}: {why}." for why in reasons)
+
+    @property
+    def too_large(self) -> str:
+        """Why no page carries it; empty where one does."""
+        size = len(self._packed[1]) / 1e6
+        if size <= MOST_MB:
+            return ""
+        return f"The loads of this problem take {size:.1f} MB, and a page carries {MOST_MB:g} MB of them at the most."
+
+    @cached_property
+    def _packed(self) -> tuple[list[dict[str, Any]], str]:
+        """Signals, and the numbers that they point to."""
+        block = Block()
+        return [packed(signal, block) for signal in self.signals], block.text()
+
+    def as_json(self) -> str:
+        """What `show` of the page takes; safe inside an HTML element."""
+        signals, data = self._packed
+        plain = {
+            "version": VERSION,
+            "name": self.name,
+            "title": self.title,
+            "file": self.file,
+            "points": self.points,
+            "turns": self.turns,
+            "sliders": [_slider(slider) for slider in self.sliders],
+            "signals": signals,
+            "curves": [_curve(curve) for curve in self.curves],
+            "measures": [_measure(measure) for measure in self.measures],
+            "designs": {design.name: _design(design) for design in self.designs},
+            "objective": {"name": self.objective, **with_unit(self.unit)},
+            "proved": asdict(self.proved) if self.proved else None,
+            "unmoved": [{"name": name, "why": why} for name, why in self.unmoved],
+            "whyNot": self.why_not,
+            "save": {"text": self.save.text, "numbers": self.save.numbers, "note": self.save.note},
+            "data": data,
+        }
+        return json.dumps(plain, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
+
+
+def _slider(slider: Slider) -> dict[str, Any]:
+    own = {"name": slider.name, "column": slider.column, "width": slider.width, "lower": slider.lower}
+    return {**own, "upper": slider.upper, "angles": slider.angles, "angle": slider.angle, **with_unit(slider.unit)}
+
+
+def _curve(curve: Curve) -> dict[str, Any]:
+    return {"title": curve.title, "signal": curve.signal}
+
+
+def _measure(shown: Shown) -> dict[str, Any]:
+    return {**asdict(shown), **with_unit(shown.unit)}
+
+
+def _design(design: Design) -> dict[str, Any]:
+    # on a resonance there is no number
+    return {"x": design.x, "measured": [value if np.isfinite(value) else None for value in design.measured]}

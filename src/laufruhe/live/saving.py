@@ -1,0 +1,149 @@
+"""The problem file of what a page shows: all decided, the numbers of the sliders to be filled in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from laufruhe.errors import InputError
+from laufruhe.files import edits
+from laufruhe.files.complaints import Refused
+from laufruhe.files.reader import given, load_tables
+from laufruhe.files.toml_text import toml_text
+from laufruhe.machine import Engine
+from laufruhe.problem.decision import Decision
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.solvers.conclusion import angle_name
+from laufruhe.solvers.result import Result
+
+SEARCHED = ("phasing", "robust", "search", "assembly")
+"""Tables that say how something open is decided."""
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A problem file with places for numbers.
+
+    Attributes
+    ----------
+    text
+        TOML, each place a text "@name@"; empty where there is none.
+    numbers
+        Of every place: its mark, the name that results show, and the SI unit that it is written in.
+    note
+        What the file needs beside it, or why there is none.
+    """
+
+    text: str = ""
+    numbers: tuple[tuple[str, str, str], ...] = ()
+    note: str = "The problem was made in code, so there is no file to save."
+
+
+def saved(problem: Problem, result: Result, moving: Problem, values: Mapping[str, Value]) -> Saved:
+    """The file of a design whose moving decisions are to be filled in; none that does not read as that design."""
+    if problem.origin is None:
+        return Saved()
+    tables, path = problem.origin.file
+    marks = _marks(moving.decisions)
+    try:
+        tables = _fixed(dict(tables), result, values)
+        for mark, name, _ in marks:
+            tables = edits.fixed(tables, name, mark)
+        text = toml_text({key: table for key, table in tables.items() if key not in SEARCHED})
+        filled = _filled(text, marks, moving)
+        read = load_tables(given(filled)[0], path)
+    except (Refused, InputError) as error:
+        return Saved(note=f"This design cannot be written as a problem file: {error}.")
+    if not _alike(read.engine, moving.engine) or read.fidelity != moving.fidelity:
+        return Saved(note="This design cannot be written as a problem file that is evaluated alike.")
+    beside = sorted({text for text in _texts(tables) if text.endswith(".csv")})
+    note = f"Save it beside {' and '.join(beside)}." if beside else ""
+    return Saved(text, marks, note)
+
+
+def _marks(decisions: Sequence[Decision]) -> tuple[tuple[str, str, str], ...]:
+    found = []
+    for decision in decisions:
+        found.append((f"@{decision.name}@", decision.name, decision.unit))
+        if decision.set.width > 1:
+            name = angle_name(decision)
+            found.append((f"@{name}@", name, "rad"))
+    return tuple(found)
+
+
+def _filled(text: str, marks: Sequence[tuple[str, str, str]], moving: Problem) -> str:
+    """With the values that the moving decisions start from."""
+    numbers: dict[str, float] = {}
+    for decision in moving.decisions:
+        numbers[decision.name], numbers[angle_name(decision)] = decision.set.split(decision.start)
+    for mark, name, unit in marks:
+        text = text.replace(toml_text({"k": mark})[4:-1], written(numbers[name], unit))
+    return text
+
+
+def written(value: float, unit: str) -> str:
+    """A number as a problem file has it, in full precision."""
+    if unit in ("", "rad"):
+        return repr(math.degrees(value) if unit else float(value))
+    return f'"{float(value)!r} {unit}"'
+
+
+def _fixed(tables: dict[str, Any], result: Result, values: Mapping[str, Value]) -> dict[str, Any]:
+    """What has no slider, as it was decided."""
+    for decision in result.problem.decisions:
+        if not decision.is_affine:
+            number = float(values[decision.name].real)
+            text = number if decision.unit == "" else f"{number!r} {decision.unit}"
+            tables = edits.fixed(tables, decision.name, math.degrees(number) if decision.unit == "rad" else text)
+    return tables if result.problem.phasing is None else _with_star(tables, result)
+
+
+def _with_star(tables: dict[str, Any], result: Result) -> dict[str, Any]:
+    """Throws, firing order and shafts of a star."""
+    decided = {entry.name: entry.value for entry in result.decisions}
+    engine = dict(tables["engine"])
+    throws = [math.degrees(decided[name]) for k in range(len(decided)) if (name := f"throw {k + 1}") in decided]
+    if throws and "throws" in engine:
+        engine["throws"] = throws
+    for key, name in (("bank_angle", "bank angle"), ("split_pin_angle", "split pin angle")):
+        if name in decided:
+            engine[key] = math.degrees(decided[name])
+    parts = result.final.engine.cylinders
+    if throws or engine.get("firing_order") == "open":
+        engine["firing_order"] = [k + 1 for k in sorted(range(len(parts)), key=lambda k: parts[k].firing_angle)]
+    shafts = [
+        {key: value for key, value in shaft.items() if key != "optional"}
+        for shaft in tables.get("balancer_shafts", ())
+        if decided.get(f"{shaft.get('name')} built", 1.0)
+    ]
+    return {**tables, "engine": engine, **({"balancer_shafts": shafts} if shafts else {})}
+
+
+def _alike(one: Engine, other: Engine) -> bool:
+    """Whether two engines have the same masses, throws, firings, rotors and mounts, but for roundings."""
+    left, right = _numbers(one), _numbers(other)
+    return left.shape == right.shape and bool(np.all(np.abs(left - right) <= SAME * (1.0 + np.abs(left))))
+
+
+def _numbers(engine: Engine) -> np.ndarray:
+    parts = [
+        (np.cos(p.throw), np.sin(p.throw), np.cos(0.5 * p.firing_angle), np.sin(0.5 * p.firing_angle), p.x,
+         p.reciprocating_mass)
+        for p in engine.slider_cranks
+    ]  # fmt: skip
+    rotors = [(r.unbalance.real, r.unbalance.imag, r.shaft.ratio, *r.place) for r in engine.rotors]
+    mounts = [(*mount.position, *mount.stiffness) for mount in engine.mounts]
+    return np.array([number for row in (*parts, *rotors, *mounts) for number in row])
+
+
+def _texts(node: Any) -> list[str]:
+    if isinstance(node, str):
+        return [node]
+    inner = node.values() if isinstance(node, Mapping) else node if isinstance(node, list) else ()
+    return [text for each in inner for text in _texts(each)]

@@ -1,0 +1,160 @@
+"""Loads of a design as numbers that a page adds up: constant + slope x per order, and where they bend (P1, L5a)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.affine import AffineModel
+from laufruhe.numerics.norms import NORMS
+from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.problem.channels import LoadChannel
+from laufruhe.problem.evaluation import over
+from laufruhe.problem.measure import Measure, bends_of, selected
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+PEAK = NORMS["maximum"]
+NOTHING = 1e-16
+"""Share of the largest order under which one is left out: less than a rounding of the sum."""
+
+
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """Coefficients of the orders that are not nothing, multiples `orders` of the lowest, shape (orders, ...)."""
+
+    orders: NDArray[np.intp]
+    coefficients: ComplexArray
+
+    @classmethod
+    def of(cls, coefficients: ComplexArray) -> Waves:
+        """Of a whole series, shape (n, ...)."""
+        size = np.abs(coefficients).reshape(len(coefficients), -1).max(axis=1, initial=0.0)
+        used = np.flatnonzero(size > NOTHING * size.max(initial=0.0))
+        return cls(used, coefficients[used])
+
+
+@dataclass(frozen=True, eq=False)
+class Bends:
+    """What a signal has beyond a smooth series: pieces of polynomials between its corners (L5a).
+
+    Attributes
+    ----------
+    smooth
+        The series without corners.
+    corners
+        Angles [rad], shape (k,).
+    pieces
+        Of every power of the share of the period after a corner, less one half: shape (powers, k, places, d).
+    at
+        Angles at which a peak may stand [rad].
+    """
+
+    smooth: Waves
+    corners: Array
+    pieces: Array
+    at: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PointSignal:
+    """At one operating point.
+
+    Attributes
+    ----------
+    share
+        Weight in a mean over operating points.
+    series
+        Of the design with every column at zero, shape (orders, places, d).
+    bends
+        Its corners; None where it has none.
+    slope
+        Of one unit of every column, shape (orders, places, d, columns).
+    """
+
+    share: float
+    series: Waves
+    bends: Bends | None
+    slope: Waves
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """One load over one period, affine in the decision vector.
+
+    Attributes
+    ----------
+    name, unit
+        Of the channel; SI.
+    places
+        Names along the second axis.
+    base
+        Lowest order.
+    samples
+        Steps over the period at which means are taken; a peak is sought among so many times as its norm refines.
+    adds
+        Whether its rows are masses that are added up, and no steps of a load.
+    """
+
+    name: str
+    unit: str
+    places: tuple[str, ...]
+    base: float
+    samples: int
+    points: tuple[PointSignal, ...]
+    adds: bool = False
+
+
+def signal_of(model: AffineModel, measure: Measure) -> Signal:
+    """The rows whose norm a measure is; `ModelError` where what is open bends them."""
+    return _of_load(model, measure) if measure.is_load else _of_masses(model, measure)
+
+
+def _of_load(model: AffineModel, measure: Measure) -> Signal:
+    problem, channel = model.problem, measure.load
+    pairs = model.spectra(channel)
+    every = [signal for own, by in pairs for signal in (own, *by)]
+    # the period of one evaluation, in whose steps its means and peaks are sought
+    base = common_base([problem.engine.cycle.base_order, *(signal.base for signal in every)])
+    bare = over(base, [own for own, _ in pairs])
+    # those of every norm: a mean has no need of them
+    bends = bends_of(replace(measure, norm=PEAK), bare, problem.engine)
+    shares = measure.shares(problem.points)
+    points = []
+    for own, (_, by), share, at in zip(bare, pairs, shares, bends, strict=True):
+        columns = [selected(measure, signal.rebased(base), problem.engine) for signal in by]
+        if any(column.corners is not None for column in columns):
+            raise ModelError(f"{channel} bends with what is open")
+        points.append(_point(float(share), selected(measure, own, problem.engine), columns, at, channel))
+    names = channel.places(problem.engine)
+    places = tuple(names[k] for k in measure.places(names)) or ("block",)
+    return Signal(channel.name, channel.unit, places, float(base), problem.fidelity.samples, tuple(points))
+
+
+def _point(
+    share: float, own: Spectrum, columns: Sequence[Spectrum], at: Array, channel: LoadChannel
+) -> PointSignal:  # fmt: skip
+    shape = own.coefficients.shape[1:]
+    most = max((len(column.coefficients) for column in columns), default=1)
+    slope = np.zeros((most, *shape, len(columns)), dtype=complex)
+    for k, column in enumerate(columns):
+        slope[: len(column.coefficients), ..., k] = column.coefficients
+    bends = None
+    if own.corners is not None:
+        bends = Bends(Waves.of(own.smooth.coefficients), own.corners.angles, own.corners.pieces(own.period), at)
+    return PointSignal(share, Waves.of(own.coefficients), bends, Waves.of(slope))
+
+
+def _of_masses(model: AffineModel, measure: Measure) -> Signal:
+    rows = model.norm(measure, 1)
+    first = np.zeros(1, dtype=np.intp)
+    point = PointSignal(
+        1.0, Waves(first, rows.constant[None].astype(complex)), None, Waves(first, rows.slope[None].astype(complex))
+    )
+    places = tuple(str(k + 1) for k in range(len(rows.constant)))
+    return Signal(measure.channel.name, measure.unit, places, 1.0, 1, (point,), adds=True)

@@ -1,0 +1,96 @@
+"""Problems whose live pages tests look at, and designs of them at random."""
+
+from __future__ import annotations
+
+import math
+import random
+from pathlib import Path
+
+from laufruhe.files.reader import load
+from laufruhe.live import LiveModel, live_model
+from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.problem import Problem
+from laufruhe.report.result_report import result_document
+from laufruhe.report.web_page import as_html
+from laufruhe.solvers import state
+from problem_files import FOUR, MOUNTS, PROBLEMS, open_unbalance, shaft
+
+NORMS = ("mean", "maximum", "rms", "peak to peak", "worst mean")
+# every norm of loads with gas, whose pressure bends, at two points with weights of their own
+EVERY_NORM = (
+    FOUR.replace("[engine]", '[engine]\nbore = "100 mm"')
+    + "throws = [0, 180, 180, 0]\n"
+    + MOUNTS
+    + """
+[gas]
+model = "seiliger"
+peak_pressure = "80 bar"
+imep = "6 bar"
+[[operating_points]]
+name = "slow"
+speed = "1200 rpm"
+weight = 2
+[[operating_points]]
+name = "fast"
+speed = "2500 rpm"
+[[counterweights]]
+name = "web"
+opposite_throw = 1
+radius = "80 mm"
+mass = { between = ["0 kg", "2 kg"] }
+"""
+    + shaft("left", 2, "100 mm", open_unbalance())
+    + '[objective]\nminimise = "mean mount force"\n'
+    + "".join(
+        f'[[constraints]]\nlimit = "{norm} {load}"\nmax = "{most}"\n'
+        for norm in NORMS
+        for load, most in (("mount force", "3 kN"), ("rocking couple", "400 N m"))
+    )
+    + '[[constraints]]\nlimit = "maximum mount force"\nname = "second order"\norders = [2]\n'
+    + 'mounts = ["mount 2"]\noperating_points = ["fast"]\nmax = "3 kN"\n'
+    + '[[constraints]]\nlimit = "counterweight mass"\nmax = "1 kg"\n'
+)
+READY = ("vee-two-90", "tractor-four-bearings", "soft-single-run-up", "geared-twin")
+
+
+def problem_of(name: str) -> Problem:
+    """Every norm, or a ready problem."""
+    return load(EVERY_NORM if name == "every norm" else PROBLEMS / f"{name}.toml")
+
+
+def model_of(problem: Problem) -> LiveModel:
+    """Of the problem as it is given."""
+    return live_model(problem, state(problem))
+
+
+def page_of(problem: Problem, folder: Path) -> Path:
+    """A report with the live page, without pictures."""
+    result = state(problem)
+    path = folder / "report.html"
+    path.write_text(as_html(result_document(result, [], "laufruhe"), {}, live_model(problem, result)), encoding="utf-8")
+    return path
+
+
+def designs(model: LiveModel, count: int, seed: int = 7) -> list[dict[str, float]]:
+    """Values of all sliders at random between their bounds [SI]."""
+    draw = random.Random(seed)
+    found = []
+    for _ in range(count):
+        values = {}
+        for slider in model.sliders:
+            values[slider.name] = draw.uniform(slider.lower, slider.upper)
+            if slider.width > 1:
+                values[slider.angle] = draw.uniform(*slider.angles)
+        found.append(values)
+    return found
+
+
+def evaluated(problem: Problem, model: LiveModel, values: dict[str, float]) -> Evaluation:
+    """A design by the exact model."""
+    moved = {slider.name: slider for slider in model.sliders}
+    numbers = []
+    for decision in problem.decisions:
+        angle = values[moved[decision.name].angle] if decision.name in moved and decision.set.width > 1 else None
+        unit = complex(math.cos(angle), math.sin(angle)) if angle is not None else decision.set.directions[0]
+        numbers.append(values[decision.name] * unit if decision.name in moved else decision.start)
+    return evaluate(problem, problem.design(numbers))

@@ -1,0 +1,100 @@
+"""What a page is given: the same loads, a file that reads as the same design, and words for what does not move."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+
+import numpy as np
+import pytest
+
+from laufruhe.files.reader import load
+from laufruhe.live import page_assets
+from laufruhe.live.saving import written
+from laufruhe.problem.evaluation import objective_value
+from live.pages import EVERY_NORM, designs, evaluated, model_of, problem_of
+from problem_files import PROBLEMS
+
+
+@pytest.fixture(scope="module")
+def every():
+    problem = problem_of("every norm")
+    return problem, model_of(problem)
+
+
+def test_the_json_stands_in_a_page_and_holds_finite_numbers(every):
+    _, model = every
+    text = model.as_json()
+    assert "<" not in text
+    plain = json.loads(text)
+    numbers = np.frombuffer(zlib.decompress(base64.b64decode(plain["data"])), dtype="<f8")
+    assert np.isfinite(numbers).all()
+    last = max(part[0] + int(np.prod(part[1])) for part in _places(plain["signals"]))
+    assert last == len(numbers)
+
+
+def _places(node):
+    if isinstance(node, list) and len(node) == 2 and isinstance(node[1], list) and isinstance(node[0], int):
+        return [node]
+    inner = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
+    return [place for each in inner for place in _places(each)]
+
+
+def test_every_measure_is_there_and_signals_are_shared(every):
+    problem, model = every
+    assert [shown.name for shown in model.measures] == [
+        *(term.measure.name for term in problem.objective),
+        *(limit.name for limit in problem.limits),
+    ]
+    assert len({shown.signal for shown in model.measures if "mount force" in shown.name}) == 1
+    assert model.unmoved == ()
+
+
+def test_a_saved_file_is_evaluated_alike(every):
+    problem, model = every
+    for values in designs(model, 3):
+        text = model.save.text
+        for mark, name, unit in model.save.numbers:
+            text = text.replace(json.dumps(mark), written(values[name], unit))
+        saved = load(text)
+        assert saved.decisions == ()
+        direct = evaluated(problem, model, values)
+        from_file = evaluated(saved, model, {})
+        assert objective_value(saved, from_file) == pytest.approx(objective_value(problem, direct), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "still"), [("inline-five-torsion", "throws"), ("tractor-four-elastic", "front left.stiffness.x")]
+)
+def test_what_does_not_move_is_named_with_a_way_to_move_it(name, still):
+    model = model_of(load(PROBLEMS / f"{name}.toml"))
+    assert still in {name for name, _ in model.unmoved}
+    assert all("laufruhe page" in why for _, why in model.unmoved)
+    assert bool(model.sliders) != bool(model.why_not)
+
+
+def test_limits_that_no_slider_moves_stay_with_their_value():
+    shown = {each.name: each for each in model_of(load(PROBLEMS / "tractor-four-elastic.toml")).measures}
+    assert shown["static sag"].signal is None
+    assert shown["maximum mount travel"].signal is not None
+
+
+def test_a_page_too_large_says_so(every, monkeypatch):
+    monkeypatch.setattr("laufruhe.live.parts.MOST_MB", 1e-3)
+    assert "at the most" in every[1].too_large
+
+
+def test_a_problem_with_nothing_open_has_no_sliders():
+    closed = EVERY_NORM.replace('{ between = ["0 kg", "2 kg"] }', '"1 kg"')
+    closed = closed.replace('{ between = ["0 kg m", "0.05 kg m"] }', '"0.01 kg m"').replace(
+        "{ between = [0, 360] }", "0"
+    )
+    model = model_of(load(closed))
+    assert model.sliders == model.unmoved == ()
+
+
+def test_script_and_style_ask_for_nothing():
+    for text in page_assets().values():
+        for word in ("http://", "https://", "import ", "eval(", "innerHTML", "url("):
+            assert word not in text.replace("http://www.w3.org/2000/svg", "")
