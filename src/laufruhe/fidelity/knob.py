@@ -10,6 +10,9 @@ from laufruhe.fidelity.error_bounds import Scale
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.problem import Problem
 
+PART_SHARE = 0.1
+"""Share of the tolerance that one whole part may use."""
+
 
 @dataclass(frozen=True)
 class LeftOut:

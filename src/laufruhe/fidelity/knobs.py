@@ -7,15 +7,14 @@ of physics that obeys it, and a class here.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from laufruhe.errors import UncarriedLoadError
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale
-from laufruhe.fidelity.knob import Knob, LeftOut, Rungs, first_enough, part_left_out
-from laufruhe.physics.elastic_mounts import ElasticMounting
-from laufruhe.physics.fidelity import EXACT, CrankshaftModel, Fidelity, Kinematics, MountModel, RodModel
+from laufruhe.fidelity.knob import PART_SHARE, Knob, LeftOut, Rungs, first_enough, part_left_out
+from laufruhe.fidelity.mount_knobs import MOUNT_KNOBS
+from laufruhe.physics.fidelity import EXACT, CrankshaftModel, Fidelity, Kinematics, RodModel
 from laufruhe.physics.mechanism import rod_effects
 from laufruhe.physics.wrench import WRENCH
 from laufruhe.problem.problem import Problem
@@ -25,11 +24,9 @@ SAMPLES = tuple(48 * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 20, 24, 30
 GAS_SAMPLES = (720, 1440, 2880, REFERENCE_SAMPLES)
 GAS_ORDERS = 12
 """Of a rung whose gas is cut."""
-PHYSICS_SHARE, GAS_SHARE, PART_SHARE = 0.5, 0.25, 0.1
-"""Shares of the tolerance that all physics, the steps of the gas, and one whole part may use."""
-TIME_ORDERS, TIME_SAMPLES = 12, 360
-"""Of a rung in the time domain: more orders cost minutes."""
-TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
+PHYSICS_SHARE, GAS_SHARE = 0.5, 0.25
+"""Shares of the tolerance that all physics, and the steps of the gas, may use."""
+TWO_ORDER, NO_GAS = "two-order, 720 steps", "exact without gas, 720 steps"
 """Rungs that a report speaks of."""
 
 
@@ -202,106 +199,6 @@ class _CrankInertia(Knob):
         return ["crank speed that varies within the cycle"] if fidelity.is_uneven else []
 
 
-class _OfElasticMounts(Knob):
-    """How a block on elastic mounts answers: only one choice of it leaves mounts to be decided."""
-
-    def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
-        if value == getattr(EXACT, self.key):
-            return None
-        if problem.engine.block is None:
-            return "is a choice of elastic mounts", 'leave it out, or add mounts of kind "elastic"'
-        if problem.mount_decisions:
-            return "would change with the mounts that are open", "leave it out, or fix the mounts"
-        return None
-
-    def is_open(self, scale: Scale) -> bool:
-        """Whether the automatic choice has one here."""
-        return scale.mounting is not None and not scale.problem.mount_decisions
-
-
-class _Mounts(_OfElasticMounts):
-    key, kind = "mounts", MountModel
-    told: ClassVar = {"description": "Elastic mounts order by order, as if they gave no way, or integrated in time."}
-
-    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
-        if not self.is_open(scale):
-            return fidelity
-        rigid = replace(fidelity, mounts="rigid")
-        try:
-            lost = scale.loses(rigid)
-        except UncarriedLoadError:
-            return fidelity
-        return rigid if lost <= scale.loses(fidelity) + PART_SHARE * room else fidelity
-
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
-        return ["mounts as if they gave no way"] if scale.mounting and fidelity.mounts == "rigid" else []
-
-    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
-        if scale.mounting is None or fidelity.mounts != "rigid":
-            return []
-        restored = replace(fidelity, mounts="frequency")
-        return [
-            part_left_out(
-                scale, fidelity, restored, "motion of the block", "its mounts hardly give way at these orders"
-            )
-        ]
-
-    def rungs(self, scale: Scale) -> Rungs:
-        if scale.mounting is None or not scale.terms:
-            return []
-        cut, every = Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS), f"orders to {TIME_ORDERS}"
-        return [
-            (RIGID, Fidelity(samples=720, mounts="rigid")),
-            (f"{every}, {TIME_SAMPLES} steps", cut),
-            (f"in time, {every}", replace(cut, mounts="time")),
-        ]
-
-
-class _Modes(_OfElasticMounts):
-    key, kind = "modes", list[int]
-    told: ClassVar = {"description": "Natural modes that answer, 1 the lowest."}
-
-    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
-        """Without the modes that hardly answer; what an open rotor drives stays, for its answer is not known yet."""
-        if fidelity.mounts != "frequency" or not self.is_open(scale):
-            return fidelity
-        allowed = scale.loses(fidelity) + PART_SHARE * room
-        chosen, kept = fidelity, scale.excited_modes
-        for mode in sorted(set(kept) - scale.decided_modes, key=lambda mode: scale.strengths[mode]):
-            kept = tuple(m for m in kept if m != mode)
-            candidate = replace(fidelity, modes=kept)
-            if scale.loses(candidate) > allowed:
-                break
-            chosen = candidate
-        return chosen
-
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
-        if scale.mounting is None or fidelity.mounts != "frequency":
-            return []
-        modes = scale.excited_modes if fidelity.modes is None else fidelity.modes
-        return [f"mode(s) {mode_names(scale.mounting, modes)} of the block on its mounts"]
-
-    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
-        if scale.mounting is None:
-            return []
-        found, still = [], [mode for mode in range(1, 7) if mode not in scale.excited_modes]
-        if still:
-            found.append(LeftOut(f"mode(s) {mode_names(scale.mounting, still)} of the block", "nothing excites them"))
-        if fidelity.modes is not None:
-            silent = [mode for mode in scale.excited_modes if mode not in fidelity.modes]
-            what, every = f"mode(s) {mode_names(scale.mounting, silent)} of the block", replace(fidelity, modes=None)
-            found.append(part_left_out(scale, fidelity, every, what, "what they answer is small"))
-        return found
-
-    def rungs(self, scale: Scale) -> Rungs:
-        """The modes that answer most."""
-        if scale.mounting is None or not scale.terms:
-            return []
-        by_strength = sorted(scale.strengths, key=lambda mode: -scale.strengths[mode])
-        most = [tuple(sorted(by_strength[:count])) for count in (1, 3) if count < len(by_strength)]
-        return [(f"mode(s) {', '.join(map(str, m))}, 720 steps", Fidelity(samples=720, modes=m)) for m in most]
-
-
 class _Samples(Knob):
     key, kind = "samples", int
     told: ClassVar = {"description": "Steps over the working cycle.", "ge": 48, "le": 100_000}
@@ -330,15 +227,9 @@ class _Samples(Knob):
 
 GAS = _Gas()
 KNOBS: tuple[Knob, ...] = (
-    _Kinematics(), _Rod(), GAS, _GasSamples(), _GasOrders(), _Orders(), _CrankInertia(), _Crankshaft(), _Mounts(),
-    _Modes(), _Samples(),
+    _Kinematics(), _Rod(), GAS, _GasSamples(), _GasOrders(), _Orders(), _CrankInertia(), _Crankshaft(), *MOUNT_KNOBS,
+    _Samples(),
 )  # fmt: skip
-
-
-def mode_names(mounting: ElasticMounting, modes: Iterable[int]) -> str:
-    """Modes in words, 1 the lowest: number, motion and natural frequency."""
-    own = mounting.modes
-    return ", ".join(f"{k} ({own.names[k - 1]}, {own.frequencies[k - 1]:.3g} Hz)" for k in modes)
 
 
 def _orders(fidelity: Fidelity) -> str:

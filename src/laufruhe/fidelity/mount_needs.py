@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from laufruhe.fidelity.automatic import Choice
 from laufruhe.fidelity.knob import LeftOut
-from laufruhe.fidelity.knobs import KNOBS, mode_names
+from laufruhe.fidelity.knobs import KNOBS
+from laufruhe.fidelity.mount_knobs import mode_names
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
-from laufruhe.fidelity.knobs import NO_GAS, RIGID, TWO_ORDER
+from laufruhe.fidelity.knobs import NO_GAS, TWO_ORDER
+from laufruhe.fidelity.mount_knobs import RIGID
 from laufruhe.present.numbers import DASH
 from laufruhe.report.document import Block, Code, Document, Illustration, Paragraph
 from laufruhe.report.grid import Grid, piped

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, error_bound, reference
-from laufruhe.fidelity.knobs import TIME_ORDERS, TIME_SAMPLES
+from laufruhe.fidelity.mount_knobs import TIME_ORDERS, TIME_SAMPLES
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.numerics.budget import passed
