@@ -1,0 +1,125 @@
+"""The one loop that divides what is open, on functions whose least value is known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from laufruhe.numerics.budget import limited
+from laufruhe.numerics.progress import Step, listening
+from laufruhe.prove.best_first import Box, Division, Parts, Waiting, divide, halves, widest
+
+# of random numbers in a row, those between two places bound a part from below
+Part = tuple[int, int]
+
+
+class Least(Division[Part]):
+    """The least of numbers: a part's bound is the least of its own, less what its width leaves open."""
+
+    what = "parts"
+
+    def __init__(self, numbers: np.ndarray, at_once: int = 1) -> None:
+        self.numbers, self.at_once = numbers, at_once
+        self.looked: list[float] = []
+
+    def bound(self, part: Part) -> tuple[float, Part]:
+        first, last = part
+        return float(self.numbers[first:last].min()) - 0.3 * (last - first - 1), part
+
+    def look(self, part: Part) -> None:
+        self.value = min(self.value, float(self.numbers[part[0]]))
+
+    def is_done(self, one: Waiting[Part]) -> bool:
+        return one.bound >= self.value
+
+    def parts(self, taken: list[Waiting[Part]]) -> Parts[Part]:
+        for bound, _, (first, last) in taken:
+            self.looked.append(bound)
+            if last - first == 1:
+                # of a round a number may come before its turn
+                self.value = min(self.value, bound)
+                continue
+            middle = (first + last) // 2
+            for part in ((first, middle), (middle, last)):
+                found = self.bound(part)
+                yield found if found[0] < self.value else None
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("at_once", [1, 4])
+def test_it_ends_at_the_least_of_all(seed: int, at_once: int) -> None:
+    numbers = np.random.default_rng(seed).normal(size=40)
+    search = Least(numbers, at_once)
+    bound = search.divide(search.bound((0, 40)), 10_000)
+    assert min(bound, search.value) == search.value == numbers.min()
+    assert search.complete
+    # one at a time the bounds that are divided never fall
+    assert at_once > 1 or search.looked == sorted(search.looked)
+
+
+@pytest.mark.parametrize("most", [1, 2, 7, 20])
+def test_what_is_left_bounds_all_that_was_not_looked_at(most: int) -> None:
+    numbers = np.random.default_rng(5).normal(size=64)
+    search = Least(numbers)
+    bound = search.divide(search.bound((0, 64)), most)
+    assert most <= search.seen <= most + 1
+    assert not search.complete
+    assert min(bound, search.value) <= numbers.min()
+    assert [one.bound for one in search.coming(3)] == sorted(one.bound for one in search.waiting)[:3]
+
+
+def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
+    search = Least(np.arange(8.0))
+    assert search.divide(None, 10) == math.inf
+    assert search.complete
+    with limited(0.0):
+        assert search.divide((-5.0, (0, 8)), 10) == -5.0
+    assert not search.complete
+
+
+def test_who_listens_hears_bounds_that_rise_under_the_best_value() -> None:
+    heard: list[Step] = []
+    search = Least(np.random.default_rng(1).normal(size=64))
+    with listening(heard.append):
+        search.divide(search.bound((0, 64)), 1000)
+    assert [step.bound for step in heard] == sorted(step.bound for step in heard)
+    assert all(step.bound <= step.value for step in heard)
+
+
+class Bowl:
+    """The sum of |x - c|, bounded on a box exactly."""
+
+    what, at_once = "boxes", 8
+
+    def __init__(self, centre: np.ndarray) -> None:
+        self.centre = centre
+
+    def bounds(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        nearest = np.clip(self.centre, lower, upper)
+        # half of it is left open, so that boxes are divided
+        found = np.abs(nearest - self.centre).sum(axis=1) - 0.5 * (upper - lower).sum(axis=1)
+        return found, np.argmax(upper - lower, axis=1)
+
+
+def test_boxes_are_halved_until_none_is_better_by_the_room() -> None:
+    centre = np.array([0.3, 0.7])
+    found = divide(Bowl(centre), np.zeros(2), np.ones(2), 0.0, 1e-2, 20_000)
+    assert -1e-2 <= found.bound <= 0.0
+    few = divide(Bowl(centre), np.zeros(2), np.ones(2), 0.0, 1e-2, 20)
+    assert few.bound < -1e-2
+    assert len(few.places) == 3
+    assert divide(Bowl(centre), np.zeros(2), np.ones(2), -10.0, 1e-2, 20).places == ()
+
+
+def test_halves_cover_a_box() -> None:
+    box = Box(
+        np.array([0.0, 1.0]), np.array([2.0, 5.0]), widest(np.array([0.0, 1.0]), np.array([2.0, 5.0]), np.ones(2))
+    )
+    (low, middle), (again, high) = halves(box)
+    assert box.side == 1
+    assert low.tolist() == [0.0, 1.0]
+    assert middle.tolist() == [2.0, 3.0]
+    assert again.tolist() == [0.0, 3.0]
+    assert high.tolist() == [2.0, 5.0]
