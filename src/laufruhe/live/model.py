@@ -22,7 +22,7 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.norms import MEAN
 from laufruhe.present.measures import places_of
 from laufruhe.problem.channels import CHANNELS
-from laufruhe.problem.decision import Decision, Domain, Kind
+from laufruhe.problem.decision import Domain, Kind
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
@@ -54,7 +54,7 @@ def live_model(problem: Problem, result: Result) -> LiveModel:
     )  # fmt: skip
     values = _decided(result)
     moving = _moving(result.problem, values)
-    still = tuple((d.name, _stays(d, file)) for d in result.problem.decisions if not d.is_affine)
+    still = tuple((d.name, _stays(file)) for d in result.problem.decisions if not d.is_affine)
     if result.problem.phasing is not None:
         still = (*((name, _star(file)) for name in result.problem.phasing.open_names), *still)
     if not moving.decisions:
@@ -216,7 +216,7 @@ def _proved(result: Result) -> Proved | None:
     return Proved(objective.value, certificate.lower_bound, certificate.gap, str(certificate.kind))
 
 
-def _stays(decision: Decision, file: str) -> str:
+def _stays(file: str) -> str:
     """Why a decision has no slider."""
     return f"loads are not affine in it, so it stays as it was decided; {HOW.format(file=file)}"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -139,7 +139,7 @@ class LiveModel:
     unit: str = ""
     proved: Proved | None = None
     unmoved: tuple[tuple[str, str], ...] = ()
-    save: Saved = Saved()
+    save: Saved = field(default_factory=Saved)
     why_not: str = ""
 
     @property

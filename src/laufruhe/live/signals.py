@@ -12,7 +12,6 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum, common_base
-from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import over
 from laufruhe.problem.measure import Measure, bends_of, selected
 
@@ -130,15 +129,13 @@ def _of_load(model: AffineModel, measure: Measure) -> Signal:
         columns = [selected(measure, signal.rebased(base), problem.engine) for signal in by]
         if any(column.corners is not None for column in columns):
             raise ModelError(f"{channel} bends with what is open")
-        points.append(_point(float(share), selected(measure, own, problem.engine), columns, at, channel))
+        points.append(_point(float(share), selected(measure, own, problem.engine), columns, at))
     names = channel.places(problem.engine)
     places = tuple(names[k] for k in measure.places(names)) or ("block",)
     return Signal(channel.name, channel.unit, places, float(base), problem.fidelity.samples, tuple(points))
 
 
-def _point(
-    share: float, own: Spectrum, columns: Sequence[Spectrum], at: Array, channel: LoadChannel
-) -> PointSignal:  # fmt: skip
+def _point(share: float, own: Spectrum, columns: Sequence[Spectrum], at: Array) -> PointSignal:
     shape = own.coefficients.shape[1:]
     most = max((len(column.coefficients) for column in columns), default=1)
     slope = np.zeros((most, *shape, len(columns)), dtype=complex)
