@@ -18,6 +18,8 @@ from laufruhe.fidelity.automatic import Choice
 from laufruhe.fidelity.knob import LeftOut
 from laufruhe.fidelity.knobs import KNOBS
 from laufruhe.fidelity.mount_knobs import mode_names
+from laufruhe.machine import Mount
+from laufruhe.machine.mount import every_spring
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
@@ -76,18 +78,27 @@ def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
     if problem.engine.block is None:
         return
     block, mounts = mounting_in(problem.engine).block, problem.engine.mounts
-    stiff = tuple(replace(m, stiffness=(MORE * m.stiffness[0], m.stiffness[1], m.stiffness[2] / MORE)) for m in mounts)
+    stiff = tuple(mount.each(_turned_stiffer) for mount in mounts)
     inertia: Any = tuple(tuple(MORE * value for value in row) for row in block.inertia)
     parts: list[tuple[str, dict[str, Any]]] = [
         ("stiffness and places of the mounts", {"mounts": stiff}),
         ("mass of the block", {"block": replace(block, mass=MORE * block.mass)}),
         ("moments of inertia of the block", {"block": replace(block, inertia=inertia)}),
     ]
-    if any(mount.loss_factor or any(mount.damping) for mount in mounts):
-        firm = tuple(replace(mount, loss_factor=0.0, damping=(0.0, 0.0, 0.0)) for mount in mounts)
+    if any(spring.loss_factor or any(spring.damping) or spring.lag for _, spring in every_spring(mounts)):
+        firm = tuple(mount.each(_undamped) for mount in mounts)
         parts.append(("loss and damping of the mounts", {"mounts": firm}))
     for name, changed in parts:
         yield name, replace(problem, engine=replace(problem.engine, **changed))
+
+
+def _turned_stiffer(spring: Mount) -> Mount:
+    x, y, z = spring.stiffness
+    return replace(spring, stiffness=(MORE * x, y, z / MORE))
+
+
+def _undamped(spring: Mount) -> Mount:
+    return replace(spring, loss_factor=0.0, damping=(0.0, 0.0, 0.0), lag=0.0)
 
 
 def _modes_of_the_sag(problem: Problem) -> list[LeftOut]:

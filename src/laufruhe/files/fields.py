@@ -270,6 +270,8 @@ OpenPositiveLength: TypeAlias = Annotated[float | Open, Number("m", above=0.0, o
 OpenNonNegativeLength: TypeAlias = Annotated[float | Open, Number("m", least=0.0, openable=True)]
 OpenLength: TypeAlias = Annotated[float | Open, Number("m", openable=True)]
 OpenStiffness: TypeAlias = Annotated[float | Open, Number("N/m", least=0.0, openable=True)]
+Delay: TypeAlias = Annotated[float, Number("s", least=0.0)]
+OpenDelay: TypeAlias = Annotated[float | Open, Number("s", least=0.0, openable=True)]
 OpenDamping: TypeAlias = Annotated[float | Open, Number("N s/m", least=0.0, openable=True)]
 Side: TypeAlias = Annotated[
     str, BeforeValidator(_side), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})

@@ -16,6 +16,7 @@ from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.modes import free_motion
 from laufruhe.problem.decision import (
     DAMPING,
+    LAG,
     LOSS,
     NUMBERS_OF_MOUNT,
     POSITION,
@@ -27,16 +28,18 @@ from laufruhe.problem.decision import (
 )
 from laufruhe.problem.sets import Interval
 
-_AXES = ("x", "y", "z")
+_AXES, _AT = ("x", "y", "z"), "position"
 _FIELDS = {
     key: (unit, range(NUMBERS_OF_MOUNT)[part])
     for key, unit, part in (
         ("stiffness", "N/m", STIFFNESS), ("loss_factor", "", slice(LOSS, LOSS + 1)), ("damping", "N s/m", DAMPING),
-        ("position", "m", POSITION), ("turned", "rad", TURNED),
+        ("position", "m", POSITION), ("turned", "rad", TURNED), ("damping_per_stiffness", "s", slice(LAG, LAG + 1)),
     )
 }  # fmt: skip
 # what mirroring in y = 0 does to each number of a mount
-_MIRRORED = [1.0] * 8 + [-1.0, 1.0, -1.0, 1.0, -1.0]
+_MIRRORED = [1.0] * 8 + [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0]
+_OF_ALL = ("stiffness", "loss_factor", "damping_per_stiffness")
+_ELASTIC = ("stiffness", "loss_factor", "damping", "damping_per_stiffness", "like", "mirror_of", "joined_to", "stop")
 _NOT_RIGID = ('is for kind = "elastic" only', "leave it out, or set the kind")
 _NOT_ELASTIC = ('is for kind = "rigid" only', "give stiffness instead")
 
@@ -79,8 +82,12 @@ class MountTable(Table):
         "Hysteretic loss factor: energy lost in a cycle over 2 pi times the energy stored."
     )
     damping: f.Three[f.OpenDamping] | None = f.told("Viscous damping along the mount's own x, y, z.")
+    damping_per_stiffness: f.OpenDelay | None = f.told(
+        "Further viscous damping along each axis, over the stiffness there, which it follows."
+    )
     like: Name | None = f.told("Stiffness, loss and damping follow those of this mount.")
     mirror_of: Name | None = f.told("All follows this mount, mirrored in the plane y = 0.")
+    joined_to: Name | None = f.told("It stands where this mount stands, and their forces count together as one.")
     stop: StopTable | None = None
 
 
@@ -94,7 +101,10 @@ class MountsTable(Table):
         "Relative stiffness along x, y, z of every mount that gives none; not for elastic mounts.", [0.0, 1.0, 1.0]
     )
     stiffness: f.Three[f.Stiffness] | None = f.told("Stiffness along x, y, z of every elastic mount that gives none.")
-    loss_factor: f.LossFactor = f.told("Stiffness along x, y, z of every elastic mount that gives none.", 0.0)
+    loss_factor: f.LossFactor = f.told("Loss factor of every elastic mount that gives none.", 0.0)
+    damping_per_stiffness: f.Delay = f.told(
+        "Viscous damping over stiffness of every elastic mount that gives none.", 0.0
+    )
     stop: StopTable | None = None
     places: list[MountTable] = Field(default_factory=list)
 
@@ -133,12 +143,12 @@ def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
 
 
 def _rigid(table: MountsTable) -> tuple[Mount, ...]:
-    none_of(table, ("stiffness", "loss_factor", "stop"), "mounts", *_NOT_RIGID)
+    none_of(table, ("stiffness", "loss_factor", "damping_per_stiffness", "stop"), "mounts", *_NOT_RIGID)
     places, names = _places(table)
     mounts = []
     for k, (name, place) in enumerate(zip(names, places, strict=True)):
         where = f"mounts.places[{k + 1}]"
-        none_of(place, ("stiffness", "loss_factor", "damping", "like", "mirror_of", "stop"), where, *_NOT_RIGID)
+        none_of(place, _ELASTIC, where, *_NOT_RIGID)
         stiffness = place.relative_stiffness or table.relative_stiffness
         if not any(stiffness):
             own = f"places[{k + 1}]." if place.relative_stiffness else ""
@@ -149,7 +159,7 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
             if any(isinstance(value, Open) for value in values):
                 raise Refused(f"{where}.{key}", None, "is open, and rigid mounts stay", 'fix it, or use kind "elastic"')
             numbers += [Open.of(value).start for value in values]
-        mounts.append(mount_of(Mount(name, (0.0, 0.0, 0.0)), numbers))
+        mounts.append(mount_of(Mount(name, (0.0, 0.0, 0.0)), [*numbers, 0.0]))
     all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place")
     return tuple(mounts)
 
@@ -157,11 +167,11 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
 def _values(table: MountsTable, place: MountTable, key: str, where: str, remedy: str) -> Sequence[float | Open]:
     """What stands at a key of a mount, or of all of them."""
     value = getattr(place, key)
-    if value is None and key in ("stiffness", "loss_factor"):
+    if value is None and key in _OF_ALL:
         value = getattr(table, key)
     if value is None and key in ("stiffness", "position"):
         raise Refused(f"{where}.{key}", None, "is missing", remedy)
-    return [value] if key == "loss_factor" else value or [0.0, 0.0, 0.0]
+    return [value] if len(_FIELDS[key][1]) == 1 else value or [0.0, 0.0, 0.0]
 
 
 def _block(table: BlockTable) -> Block:
@@ -174,19 +184,28 @@ def _block(table: BlockTable) -> Block:
 def _elastic(table: MountsTable, block: Block) -> MountsFound:
     none_of(table, ("relative_stiffness",), "mounts", *_NOT_ELASTIC)
     places, names = _places(table)
-    read = _Numbers([], [])
+    read, joins = _Numbers([], []), list[int]()
     for k, (name, place) in enumerate(zip(names, places, strict=True)):
         where = f"mounts.places[{k + 1}]"
         none_of(place, ("relative_stiffness",), where, *_NOT_ELASTIC)
-        leader, followed = _leader(place, names, k, where), _followed(place)
+        leader, followed, joined = _leader(place, names, k, where), _followed(place), _joined(place, names, k, joins)
+        joins.append(joined)
         read.rows.append([0.0] * NUMBERS_OF_MOUNT)
         if leader is not None:
-            read.follow(leader, followed, mirrored=place.mirror_of is not None)
+            read.follow(leader, [key for key in followed if key != _AT or joined == k], place.mirror_of is not None)
+        if joined != k:
+            read.follow(joined, [_AT], mirrored=False)
         for key in _FIELDS:
-            if key not in followed:
+            if key not in followed and (key != _AT or joined == k):
                 read.take(name, key, _values(table, place, key, where, "add it, or like, or mirror_of"))
-    bare = (_bare(name, place.stop or table.stop) for name, place in zip(names, places, strict=True))
-    mounts = tuple(mount_of(mount, row) for mount, row in zip(bare, read.rows, strict=True))
+    stops = [place.stop or table.stop for place in places]
+    bare = map(_bare, names, stops)
+    springs = [mount_of(spring, row) for spring, row in zip(bare, read.rows, strict=True)]
+    mounts = tuple(
+        replace(springs[k], joined=tuple(springs[j] for j in range(k + 1, len(joins)) if joins[j] == k))
+        for k in sorted(set(joins))
+    )
+    read.sort([j for k in sorted(set(joins)) for j, first in enumerate(joins) if first == k])
     with blamed_on("mounts"):
         loose = free_motion(elastic_mounting(block, mounts).modes)
     if loose:
@@ -214,10 +233,25 @@ def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | No
     return names.index(leader)
 
 
+def _joined(place: MountTable, names: list[str], k: int, joins: Sequence[int]) -> int:
+    """Number of the mount that it stands with, its own where it stands alone."""
+    where, other = f"mounts.places[{k + 1}].joined_to", place.joined_to
+    if other is None:
+        return k
+    if other not in names[:k]:
+        remedy = nearest(other, names[:k]) if k else "define the other one first"
+        raise Refused(where, other, "is no mount defined before this one", remedy)
+    first = joins[names.index(other)]
+    if names[first] != other:
+        raise Refused(where, other, "is joined to another mount itself", f"name that one, '{names[first]}'")
+    none_of(place, (_AT,), f"mounts.places[{k + 1}]", f"is that of '{other}' already", "leave one out")
+    return first
+
+
 def _followed(place: MountTable) -> tuple[str, ...]:
     if place.mirror_of is not None:
         return tuple(_FIELDS)
-    return ("stiffness", "loss_factor", "damping") if place.like is not None else ()
+    return (*_OF_ALL, "damping") if place.like is not None else ()
 
 
 @dataclass
@@ -233,9 +267,17 @@ class _Numbers:
         for number, axis, value in zip(numbers, _AXES, map(Open.of, values), strict=False):
             self.rows[-1][number] = value.start
             if value.is_open:
-                label = f"{name}.{key}" if key == "loss_factor" else f"{name}.{key}.{axis}"
+                label = f"{name}.{key}" if len(numbers) == 1 else f"{name}.{key}.{axis}"
                 drive = MountDrive(len(self.rows) - 1, number, 1.0)
                 self.decisions.append(Decision(label, unit, Interval(*value.bounds), value.start, (drive,)))
+
+    def sort(self, order: Sequence[int]) -> None:
+        """Rows in another order: those of one place behind each other."""
+        self.rows = [self.rows[k] for k in order]
+        new = {old: k for k, old in enumerate(order)}
+        for d, decision in enumerate(self.decisions):
+            drives = (replace(drive, mount=new[drive.mount]) for drive in decision.mount_drives)
+            self.decisions[d] = replace(decision, drives=tuple(drives))
 
     def follow(self, leader: int, keys: Sequence[str], mirrored: bool) -> None:
         """Keys of the last mount are those of another."""

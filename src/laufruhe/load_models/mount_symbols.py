@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine.block import Block
+from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.namespaces import symbols
 from laufruhe.physics.rigid_body import along_axes, carried, point_motion, turned_axes
-from laufruhe.problem.decision import DAMPING, LOSS, POSITION, STIFFNESS, TURNED
+from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, TURNED
 from laufruhe.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -55,16 +56,20 @@ def mount_matrices(problem: Problem, block: Block) -> Any:
     totals = [ca.SX(6, 6) for _ in range(3)]
     maps: list[list[Any]] = [[], [], [], []]
     found = problem.numbers([decisions[k] for k in range(len(problem.mount_decisions))], problem.mount_decisions)
-    for numbers in found.mounts or problem.mount_numbers:
+    places = [place for place, _ in every_spring(problem.engine.mounts)]
+    for place, numbers in zip(places, found.mounts or problem.mount_numbers, strict=True):
         axes = turned_axes(lib, numbers[TURNED])
         arm = [p - c for p, c in zip(numbers[POSITION], block.centre_of_gravity, strict=True)]
         motion = ca.SX(point_motion(lib, arm))
         spring = along_axes(lib, axes, numbers[STIFFNESS])
-        each = (spring, numbers[LOSS] * spring, along_axes(lib, axes, numbers[DAMPING]))
-        maps[0].append(motion @ root.T)
-        for k, matrix in enumerate(each):
+        drag = along_axes(lib, axes, numbers[DAMPING]) + numbers[LAG] * spring
+        if place == len(maps[0]):
+            maps[0].append(motion @ root.T)
+        for k, matrix in enumerate((spring, numbers[LOSS] * spring, drag)):
             totals[k] += carried(motion, matrix)
-            maps[k + 1].append(matrix @ motion @ root.T)
+            felt = matrix @ motion @ root.T
+            # springs that are joined count together
+            maps[k + 1][place:] = [sum(maps[k + 1][place:], felt)]
     stacked = [ca.vertcat(*parts) for parts in maps]
     return ca.Function("mounts", [decisions], [*(root @ total @ root.T for total in totals), *stacked])
 

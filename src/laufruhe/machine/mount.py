@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ UPRIGHT: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Mount:
-    """A spring between engine and ground.
+    """A spring between engine and ground, or several that are joined in one place.
 
     Attributes
     ----------
@@ -33,6 +34,10 @@ class Mount:
         over 2 pi (eq. 40).
     damping
         Viscous, along its own three axes [N s/m].
+    lag
+        Further viscous damping over stiffness, along each axis [s] (E48).
+    joined
+        Further springs at the same place, whose forces count with its own as one (E49).
     stop_gap
         Travel along each own axis at which a bump stop is met [m]; time domain only.
     stop_stiffness
@@ -47,25 +52,53 @@ class Mount:
     damping: Vector3 = (0.0, 0.0, 0.0)
     stop_gap: float = math.inf
     stop_stiffness: float = 0.0
+    lag: float = 0.0
+    joined: tuple[Mount, ...] = ()
 
     def __post_init__(self) -> None:
         for what, value in (("stiffness", min(self.stiffness)), ("damping", min(self.damping)),
-                            ("loss factor", self.loss_factor), ("stop stiffness", self.stop_stiffness)):  # fmt: skip
+                            ("loss factor", self.loss_factor), ("stop stiffness", self.stop_stiffness),
+                            ("damping per stiffness", self.lag)):  # fmt: skip
             if not value >= 0.0:
                 raise ModelError(f"mount '{self.name}' has a negative {what}, {value:g}; give zero or more")
         if not self.stop_gap > 0.0:
             raise ModelError(f"mount '{self.name}' has a stop gap of {self.stop_gap:g} m; it must be positive")
 
     @property
+    def springs(self) -> tuple[Mount, ...]:
+        """All of the place, each by itself."""
+        return (replace(self, joined=()), *self.joined) if self.joined else (self,)
+
+    def each(self, change: Callable[[Mount], Mount]) -> Mount:
+        """With every spring of the place changed."""
+        own = change(replace(self, joined=())) if self.joined else change(self)
+        return replace(own, joined=tuple(map(change, self.joined))) if self.joined else own
+
+    @property
     def stiffness_matrix(self) -> NDArray[np.float64]:
         """3 x 3 stiffness in the axes of C2 (E2)."""
-        return self._in_c2(self.stiffness)
+        return self._in_c2(lambda spring: spring.stiffness)
+
+    @property
+    def loss_matrix(self) -> NDArray[np.float64]:
+        """3 x 3 stiffness times loss factor in the axes of C2 (E2)."""
+        return self._in_c2(lambda spring: tuple(spring.loss_factor * k for k in spring.stiffness))
 
     @property
     def damping_matrix(self) -> NDArray[np.float64]:
-        """3 x 3 viscous damping in the axes of C2 (E2)."""
-        return self._in_c2(self.damping)
+        """3 x 3 viscous damping in the axes of C2 (E2, E48)."""
+        return self._in_c2(
+            lambda spring: tuple(c + spring.lag * k for c, k in zip(spring.damping, spring.stiffness, strict=True))
+        )
 
-    def _in_c2(self, diagonal: Vector3) -> NDArray[np.float64]:
-        axes = np.array(self.orientation)
-        return np.asarray(axes.T @ np.diag(diagonal) @ axes)
+    def _in_c2(self, diagonal: Callable[[Mount], Sequence[float]]) -> NDArray[np.float64]:
+        total = np.zeros((3, 3))
+        for spring in self.springs:
+            axes = np.array(spring.orientation)
+            total += axes.T @ np.diag(diagonal(spring)) @ axes
+        return total
+
+
+def every_spring(mounts: Sequence[Mount]) -> list[tuple[int, Mount]]:
+    """Springs of all places, those of one behind each other, with the number of their place."""
+    return [(place, spring) for place, mount in enumerate(mounts) for spring in mount.springs]

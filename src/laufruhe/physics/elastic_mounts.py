@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, UncarriedLoadError
 from laufruhe.machine.block import Block
-from laufruhe.machine.mount import Mount
+from laufruhe.machine.mount import Mount, every_spring
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import Modes, modes_of
@@ -72,8 +72,7 @@ class ElasticMounting:
     @cached_property
     def losses(self) -> Array:
         """Loss factor times k, shape (mounts, 3, 3) [N/m] (E2)."""
-        factors = np.array([mount.loss_factor for mount in self.mounts])
-        return np.asarray(factors[:, None, None] * self.springs)
+        return np.array([mount.loss_matrix for mount in self.mounts]).reshape(-1, 3, 3)
 
     @cached_property
     def dampers(self) -> Array:
@@ -268,7 +267,7 @@ def elastic_mounting(
     ModelError
         Without a mount that has a stiffness.
     """
-    if not any(any(mount.stiffness) for mount in mounts):
+    if not any(any(spring.stiffness) for _, spring in every_spring(mounts)):
         raise ModelError("no mount has a stiffness; an elastic mounting needs one")
     return ElasticMounting(block, tuple(mounts), answering)
 

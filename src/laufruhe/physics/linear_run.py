@@ -71,7 +71,7 @@ class LinearRun:
         model, driven = self._model, self._driven(loads)
         states = (self._shapes @ self._stepped(driven)).real
         y, rate = states[:6], states[6:]
-        travel = (model.travels @ y).T.reshape(self._count + 1, -1, 3)
+        travel = model.mount_travels(y)
         return Response(model.mount_forces(y, rate), travel, (model.roll @ y)[:, None, None])
 
     def _driven(self, loads: Loads) -> ComplexArray:

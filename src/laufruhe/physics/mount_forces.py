@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import UncarriedLoadError
 from laufruhe.machine import Mount
+from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.rigid_body import point_motion
@@ -107,13 +108,15 @@ def _rigid_mounting(mounts: tuple[Mount, ...]) -> RigidMounting:
     # displacements of the mount points per scaled motion (translation, arm * rotation)
     geometry = np.array([point_motion(NUMBERS, position) for position in positions]) / scales
     # K = L^T L, and A = L G instead of A^T A: half the digits that stiffness ratios cost are kept
-    largest = max(max(mount.stiffness) for mount in mounts)
-    roots = np.array([np.sqrt(np.divide(m.stiffness, largest))[:, None] * np.array(m.orientation) for m in mounts])
-    stretches = np.einsum("mab,mbj->maj", roots, geometry)
+    places, springs = zip(*every_spring(mounts), strict=True)
+    largest = max(max(spring.stiffness) for spring in springs)
+    roots = np.array([np.sqrt(np.divide(m.stiffness, largest))[:, None] * np.array(m.orientation) for m in springs])
+    stretches = np.einsum("mab,mbj->maj", roots, geometry[list(places)])
     left, values, right = np.linalg.svd(stretches.reshape(-1, 6), full_matrices=True)
     rank = int(np.sum(values > FREE_STRETCH * values[0]))
-    shares = (left[:, :rank] / values[:rank]).reshape(len(mounts), 3, rank)
-    maps = np.einsum("mba,mbr,rk->mak", roots, shares, right[:rank]) / scales
+    shares = (left[:, :rank] / values[:rank]).reshape(len(springs), 3, rank)
+    maps = np.zeros((len(mounts), 3, 6))
+    np.add.at(maps, list(places), np.einsum("mba,mbr,rk->mak", roots, shares, right[:rank]) / scales)
     maps.setflags(write=False)
     return RigidMounting(maps, right[rank:], arm)
 

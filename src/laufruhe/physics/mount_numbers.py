@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Block, Mount
+from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import static_motion, torque_roll_axis, weight_wrench
@@ -141,4 +142,4 @@ def torque_roll_frequency(mounting: ElasticMounting) -> float:
 
 def total_stiffness(mounts: Sequence[Mount]) -> float:
     """Sum of all stiffnesses along the mounts' own axes [N/m]."""
-    return float(sum(sum(mount.stiffness) for mount in mounts))
+    return float(sum(sum(spring.stiffness) for _, spring in every_spring(mounts)))

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting
@@ -45,13 +46,15 @@ class TimeModel:
     load
         From a wrench about the origin to y.
     travels
-        From y to travel along the own axes of the mounts, shape (3 mounts, 6).
+        From y to travel along the own axes of the springs, shape (3 springs, 6).
     forces, drag
         From y and y' to the mount forces in the axes of C2, shape (3 mounts, 6).
     gaps, stops
-        Of the bump stops along every own axis, shape (3 mounts,).
+        Of the bump stops along every own axis, shape (3 springs,).
     turns
-        Own axes of the mounts, shape (mounts, 3, 3).
+        Own axes of the springs, shape (springs, 3, 3).
+    places
+        Number of the mount of every spring, shape (springs,).
     roll
         From y to the turn of the block about x, shape (6,).
     """
@@ -65,6 +68,7 @@ class TimeModel:
     gaps: Array
     stops: Array
     turns: Array
+    places: NDArray[np.intp]
     roll: Array
 
     @property
@@ -80,11 +84,17 @@ class TimeModel:
 
     def mount_forces(self, y: Array, rate: Array) -> Array:
         """Forces of the engine on its mounts, shape (n, mounts, 3) of y, y' (6, n)."""
-        linear = (self.forces @ y + self.drag @ rate).T.reshape(-1, len(self.turns), 3)
-        if not self.has_stops:
-            return linear
-        own = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
-        return np.asarray(linear + np.einsum("nma,mab->nmb", own, self.turns))
+        out = np.array((self.forces @ y + self.drag @ rate).T.reshape(y.shape[1], -1, 3))
+        if self.has_stops:
+            own = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
+            np.add.at(out.swapaxes(0, 1), self.places, np.einsum("nma,mab->mnb", own, self.turns))
+        return out
+
+    def mount_travels(self, y: Array) -> Array:
+        """Travel of the mounts in the axes of C2, shape (n, mounts, 3) of y (6, n)."""
+        first = np.unique(self.places, return_index=True)[1]
+        own = (self.travels @ y).T.reshape(y.shape[1], -1, 3)[:, first]
+        return np.asarray(np.einsum("nma,mab->nmb", own, self.turns[first]))
 
     def accelerations(self, y: Array, rate: Array, load: Array) -> Array:
         """y'' of columns (6, n)."""
@@ -102,8 +112,9 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
     root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
     vectors = np.linalg.solve(root.T, modes.shapes)
     motions = mounting.motions @ root.T
-    turns = np.array([mount.orientation for mount in mounting.mounts])
-    own = np.einsum("mab,mbj->maj", turns, motions)
+    places, springs = zip(*every_spring(mounting.mounts), strict=True)
+    turns = np.array([spring.orientation for spring in springs])
+    own = np.einsum("mab,mbj->maj", turns, motions[list(places)])
     spread = np.where(modes.squares > 0.0, 1.0 / np.sqrt(np.where(modes.squares > 0.0, modes.squares, 1.0)), 0.0)
     lossy = (mounting.losses @ (mounting.motions @ modes.shapes) * spread) @ vectors.T
     drag = mounting.dampers @ motions + lossy
@@ -112,12 +123,13 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
         stiffness=root @ mounting.stiffness @ root.T,
         damping=np.einsum("mai,maj->ij", motions, drag),
         load=root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
-        travels=own.reshape(3 * mounts, 6),
+        travels=own.reshape(-1, 6),
         forces=(mounting.springs @ motions).reshape(3 * mounts, 6),
         drag=drag.reshape(3 * mounts, 6),
-        gaps=np.repeat([mount.stop_gap for mount in mounting.mounts], 3),
-        stops=np.repeat([mount.stop_stiffness for mount in mounting.mounts], 3),
+        gaps=np.repeat([spring.stop_gap for spring in springs], 3),
+        stops=np.repeat([spring.stop_stiffness for spring in springs], 3),
         turns=turns,
+        places=np.array(places, dtype=np.intp),
         roll=root.T[3],
     )
 
@@ -129,7 +141,7 @@ class SteadyState:
     Attributes
     ----------
     forces, travels
-        On the mounts, and along their own axes, shape (n, mounts, 3) [N], [m].
+        On the mounts and of them, in the axes of C2, shape (n, mounts, 3) [N], [m].
     mismatch
         Distance between end and start of the period, over its size.
     """
@@ -174,7 +186,7 @@ def periodic_state(
     states = _integrated(rates, start, period, tolerance, np.minimum(times, period))
     y, rate = states[:6, :-1], states[6:, :-1]
     mismatch = float(np.abs(states[:, -1] - start).max() / max(np.abs(states).max(), 1e-300))
-    travels = (model.travels @ y).T.reshape(samples, -1, 3)
+    travels = model.mount_travels(y)
     return SteadyState(np.asarray(times[:-1] * speed, dtype=float), model.mount_forces(y, rate), travels, mismatch)
 
 
@@ -303,7 +315,7 @@ def run_through(
         times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
         states = _solved(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least)
         force[k] = np.linalg.norm(model.mount_forces(states[:6], states[6:]), axis=-1).max()
-        travel[k] = np.linalg.norm((model.travels @ states[:6]).T.reshape(len(times), -1, 3), axis=-1).max()
+        travel[k] = np.linalg.norm(model.mount_travels(states[:6]), axis=-1).max()
         twist[k] = np.abs(model.roll @ states[:6]).max()
         state = states[:, -1]
     return RunUp(first + gain * edges[1:], force, travel, twist)

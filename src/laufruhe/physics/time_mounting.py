@@ -41,8 +41,7 @@ class TimeMounting:
 
     def travel(self, wrench: Spectrum, speed: float) -> Spectrum:
         """Displacement of the engine at every mount, shape (n, mounts, 3) [m]."""
-        turns = np.array([mount.orientation for mount in self.mounting.mounts])
-        return spectrum_of(np.einsum("nma,mab->nmb", self._state(wrench, speed).travels, turns), wrench.base)
+        return spectrum_of(self._state(wrench, speed).travels, wrench.base)
 
     def _state(self, wrench: Spectrum, speed: float) -> SteadyState:
         # forces and travel are of one integration; the wrench is kept, so that its id stays its own

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from laufruhe.problem.drives import (
     DAMPING,
+    LAG,
     LOSS,
     NUMBERS_OF_MOUNT,
     POSITION,
@@ -38,6 +39,7 @@ from laufruhe.problem.sets import Set, Value
 
 __all__ = [
     "DAMPING",
+    "LAG",
     "LOSS",
     "NUMBERS_OF_MOUNT",
     "POSITION",

@@ -16,7 +16,7 @@ from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.sets import Value
 
 STIFFNESS, LOSS, DAMPING, POSITION, TURNED = slice(0, 3), 3, slice(4, 7), slice(7, 10), slice(10, 13)
-NUMBERS_OF_MOUNT = 13
+LAG, NUMBERS_OF_MOUNT = 13, 14
 
 
 class Kind(IntEnum):
@@ -56,7 +56,7 @@ class Numbers:
     places
         Of the rotors by name: x, and y and z of their shafts [m] (C2).
     mounts
-        Of every mount thirteen: stiffness, loss factor, damping, position, turned angles (E13).
+        Of every spring fourteen: stiffness, loss factor, damping, position, turned angles, lag (E13).
     flywheel, pistons
         Inertia of the rest, mean diameter, width and height of a rim; changes of reciprocating masses by name [kg].
     torsion
@@ -98,7 +98,8 @@ class Numbers:
         )
         mounts = given.mounts
         if self.mounts:
-            mounts = tuple(mount_of(mount, row) for mount, row in zip(given.mounts, self.mounts, strict=True))
+            rows = iter(self.mounts)
+            mounts = tuple(mount.each(lambda spring: mount_of(spring, next(rows))) for mount in given.mounts)
         flywheel, parts = given.flywheel.moved(self.flywheel) if given.flywheel else None, given.slider_cranks
         torsion = given.torsion.moved(self.torsion) if given.torsion else None
         if self.pistons:
@@ -285,5 +286,5 @@ def mount_of(mount: Mount, numbers: Sequence[float]) -> Mount:
     x, y, z = (float(v) for v in numbers[POSITION])
     return replace(
         mount, stiffness=(a, b, c), loss_factor=max(float(numbers[LOSS]), 0.0), damping=(p, q, r), position=(x, y, z),
-        orientation=(tuple(rows[0]), tuple(rows[1]), tuple(rows[2])),
+        orientation=(tuple(rows[0]), tuple(rows[1]), tuple(rows[2])), lag=max(float(numbers[LAG]), 0.0),
     )  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Engine
+from laufruhe.machine import Engine, Mount
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
@@ -30,13 +30,17 @@ def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
     """
     engine = problem.engine if engine is None else engine
     # on mounts that damp all modes: a resonance would make a size of its own
-    mounts = tuple(replace(mount, loss_factor=max(mount.loss_factor, 1.0)) for mount in engine.mounts)
+    mounts = tuple(mount.each(_lossy) for mount in engine.mounts)
     engine = replace(engine, mounts=mounts)
     # the crank turns evenly: what one part alone does to its speed is not asked
     even = replace(problem, engine=engine, fidelity=replace(problem.fidelity, crank_inertia=math.inf))
     total = sum(_alone(even, part) for part in _parts(engine))
     total += sum(term.weight * _own(term.measure, engine) for term in problem.objective)
     return ROUNDING * total
+
+
+def _lossy(spring: Mount) -> Mount:
+    return replace(spring, loss_factor=max(spring.loss_factor, 1.0))
 
 
 def _parts(engine: Engine) -> Iterator[Engine]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from laufruhe.errors import Complaint
 from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.turns import as_turn, within
 from laufruhe.units import shown
 
@@ -83,7 +84,7 @@ def _of_rotors(engine: Engine) -> Iterator[Complaint]:
 
 
 def _of_mounts(engine: Engine) -> Iterator[Complaint]:
-    stiffness = sum(max(mount.stiffness) for mount in engine.mounts)
+    stiffness = sum(max(spring.stiffness) for _, spring in every_spring(engine.mounts))
     if engine.block is None or not stiffness:
         return
     sag = 9.81 * engine.block.mass / stiffness

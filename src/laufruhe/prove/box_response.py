@@ -11,11 +11,13 @@ travel of the mounts are linear in x times y, so they are known up to the second
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.rigid_body import moved_wrench
@@ -159,7 +161,7 @@ class BoxModel:
                     for other, width in zip(moved, self.upper - self.lower, strict=True)
                 ]
             )
-            for name in ("stiffness", "loss", "springs", "losses")
+            for name in ("stiffness", "loss", "damping", "springs", "losses", "dampers")
         }
         self.highest = float(np.linalg.eigvalsh(self._parts(self.mounting(self.upper)).stiffness)[-1])
 
@@ -230,9 +232,10 @@ class BoxModel:
         """Motion over boxes, shapes (boxes, n) (E37)."""
         centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
         moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
-        stiffness, loss = (self._at(name, centres)[:, None] for name in ("stiffness", "loss"))
-        impedance = stiffness + 1j * (moving * loss + omegas * self._base.damping) - omegas**2 * np.eye(6)
-        slopes = self._slopes["stiffness"] + 1j * moving[:, None] * self._slopes["loss"]
+        stiffness, loss, damping = (self._at(name, centres)[:, None] for name in ("stiffness", "loss", "damping"))
+        impedance = stiffness + 1j * (moving * loss + omegas * damping) - omegas**2 * np.eye(6)
+        lost = moving[:, None] * self._slopes["loss"] + omegas[:, None] * self._slopes["damping"]
+        slopes = self._slopes["stiffness"] + 1j * lost
         inverse = _inverse(np.asarray(impedance, dtype=np.complex128))
         motion = np.einsum("bkij,kj->bki", inverse, lines.loads)
         pulled = np.einsum("bkij,knjl->bknil", inverse, slopes) * halves[:, None, :, None, None]
@@ -264,9 +267,12 @@ class BoxModel:
             flat = np.broadcast_to(self.travels[rows].astype(complex), (boxes, count, len(rows), 6))
             return flat, np.zeros((boxes, count, open_numbers, len(rows), 6), dtype=complex)
         moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
-        springs, losses = (self._at(name, at.centres)[:, None, rows] for name in ("springs", "losses"))
-        value = springs + 1j * (moving * losses + omegas * self._base.dampers[rows])
-        by_side = self._slopes["springs"][:, rows] + 1j * moving[:, None] * self._slopes["losses"][:, rows]
+        springs, losses, dampers = (
+            self._at(name, at.centres)[:, None, rows] for name in ("springs", "losses", "dampers")
+        )
+        value = springs + 1j * (moving * losses + omegas * dampers)
+        lost = moving[:, None] * self._slopes["losses"][:, rows] + omegas[:, None] * self._slopes["dampers"][:, rows]
+        by_side = self._slopes["springs"][:, rows] + 1j * lost
         return value, by_side * at.halves[:, None, :, None, None]
 
     def felt_at_most(self, lines: Lines, channel: Channel) -> Array:
@@ -276,9 +282,12 @@ class BoxModel:
         motion = np.where(room > 0.0, motion, np.inf)
         if is_travel(channel):
             return motion * float(np.linalg.norm(self.travels))
-        top = self._parts(self.mounting(self.upper))
-        still = float(np.linalg.norm(top.springs + 1j * top.losses))
-        return np.asarray(motion * (still + lines.omegas * float(np.linalg.norm(top.dampers))))
+        stiffest = self.mounting(self.upper)
+        # of springs that are joined, each by itself: their sum may be less
+        apart = replace(stiffest, mounts=tuple(spring for _, spring in every_spring(stiffest.mounts)))
+        most, top = max(len(mount.springs) for mount in stiffest.mounts), self._parts(apart)
+        still = math.sqrt(most) * float(np.linalg.norm(top.springs + 1j * top.losses))
+        return np.asarray(motion * (still + lines.omegas * math.sqrt(most) * float(np.linalg.norm(top.dampers))))
 
 
 def _both_ways(second: ComplexArray) -> ComplexArray:

@@ -3,7 +3,7 @@
 A mount's spring along one of its axes has rank one. With the deflection u_i = a_i' y of the springs whose stiffness
 x_i = c_i + s_i h_i is open, s_i from -1 to 1,
 
-    D(c) y + sum_i a_i (1 + i eta_i) h_i t_i = r,    t_i = s_i u_i                     (E42)
+    D(c) y + sum_i a_i (1 + i eta_i + i W lag_i) h_i t_i = r,    t_i = s_i u_i         (E42)
 
 so that motion, deflections and mount forces are affine in the t_i. What is nonlinear is t_i = s_i u_i alone.
 """
@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.machine.mount import every_spring
 from laufruhe.problem.channels import Channel
 from laufruhe.prove.box_response import BoxModel, Lines, Matrices, is_travel
 
@@ -41,15 +42,20 @@ class Springs:
         a_i, in coordinates in which the mass is one, shape (n, 6).
     axes
         Direction of each among the forces of the mounts, shape (3 mounts, n).
-    factors
-        1 + i eta_i, shape (n,).
+    losses, lags
+        eta_i, and viscous damping over stiffness [s], shape (n,).
     """
 
     decisions: Indices
     gains: Array
     arms: Array
     axes: Array
-    factors: ComplexArray
+    losses: Array
+    lags: Array
+
+    def factors(self, omega: float) -> ComplexArray:
+        """1 + i (eta_i + W lag_i), shape (n,) (E48)."""
+        return np.asarray(1.0 + 1j * (self.losses + omega * self.lags))
 
 
 def springs_of(model: BoxModel) -> Springs:
@@ -57,15 +63,17 @@ def springs_of(model: BoxModel) -> Springs:
     mounting = model.mounting(model.lower)
     seen = mounting.motions @ model.root.T
     pairs = [(j, drive) for j, decision in enumerate(model.problem.mount_decisions) for drive in decision.mount_drives]
-    axes = np.zeros((3 * len(mounting.mounts), len(pairs)))
+    axes, every = np.zeros((3 * len(mounting.mounts), len(pairs))), every_spring(mounting.mounts)
     for i, (_, drive) in enumerate(pairs):
-        axes[3 * drive.mount : 3 * drive.mount + 3, i] = mounting.mounts[drive.mount].orientation[drive.number]
+        place, spring = every[drive.mount]
+        axes[3 * place : 3 * place + 3, i] = spring.orientation[drive.number]
     return Springs(
         np.array([j for j, _ in pairs], dtype=np.intp),
         np.array([drive.gain for _, drive in pairs]),
         axes.T @ seen.reshape(-1, 6),
         axes,
-        np.array([1.0 + 1j * mounting.mounts[drive.mount].loss_factor for _, drive in pairs]),
+        np.array([every[drive.mount][1].loss_factor for _, drive in pairs]),
+        np.array([every[drive.mount][1].lag for _, drive in pairs]),
     )
 
 
@@ -121,8 +129,8 @@ def response(
     """Of one order above zero (E42)."""
     omega, load, here = float(lines.omegas[k]), lines.loads[k], at.here
     impedance = here.stiffness + 1j * (here.loss + omega * here.damping) - omega**2 * np.eye(6)
-    added = springs.gains * at.half[springs.decisions]
-    solved = np.linalg.solve(impedance, np.column_stack([load, -springs.arms.T * (added * springs.factors)]))
+    added, shared = springs.gains * at.half[springs.decisions], springs.factors(omega)
+    solved = np.linalg.solve(impedance, np.column_stack([load, -springs.arms.T * (added * shared)]))
     given, slopes = solved[:, 0], solved[:, 1:]
     deflection = np.abs(springs.arms @ given)
     unit = float(np.linalg.norm(given)) or 1.0
@@ -132,7 +140,7 @@ def response(
         value, direct = model.travels[rows].astype(complex), np.zeros((len(rows), len(added)), dtype=complex)
     else:
         value = here.springs[rows] + 1j * (here.losses[rows] + omega * here.dampers[rows])
-        direct = springs.axes[rows] * (added * springs.factors)
+        direct = springs.axes[rows] * (added * shared)
     reach = _motion_at_most(at, omega, load) * np.linalg.norm(springs.arms, axis=1) / (unit * scales)
     return Response(
         _parted(given / unit, slopes * scales),

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel
+from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.spectrum import common_base
@@ -95,8 +96,8 @@ def softest_of(problem: Problem) -> Softest:
     mounting = mounting_in(problem.engine)
     root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
     least, most = _ranges(problem)
-    floors, arms = [np.zeros((6, 6))], []
-    for mount, low, high in zip(mounting.mounts, least, most, strict=True):
+    floors, arms = [np.zeros((6, 6))], list[Array]()
+    for (place, spring), low, high in zip(every_spring(mounting.mounts), least, most, strict=True):
         middle = 0.5 * (low[POSITION] + high[POSITION])
         reach = float(np.linalg.norm(0.5 * (high[POSITION] - low[POSITION])))
         motion = root_motion = point_motion(NUMBERS, middle - np.array(mounting.block.centre_of_gravity))
@@ -105,13 +106,14 @@ def softest_of(problem: Problem) -> Softest:
         if reach == 0.0:
             soft = np.maximum(low[STIFFNESS], 0.0)
             turned = np.any(low[TURNED] < high[TURNED])
-            axes = np.array(mount.orientation)
-            spring = soft.min() * np.eye(3) if turned else axes.T @ np.diag(soft) @ axes
-            floors[0] += carried(root_motion, spring)
+            axes = np.array(spring.orientation)
+            held = soft.min() * np.eye(3) if turned else axes.T @ np.diag(soft) @ axes
+            floors[0] += carried(root_motion, held)
         else:
             turning = root[:, 3:] @ root[:, 3:].T
             square = (1.0 + STRETCH) * square + (1.0 + 1.0 / STRETCH) * reach**2 * turning
-        arms.append(square)
+        # springs that are joined stand in one place
+        arms += [square] if place == len(arms) else []
     floors += limited_stiffness(problem, root)[0]
     return Softest(
         (1.0 - SLACK) * np.array(floors),
@@ -121,7 +123,7 @@ def softest_of(problem: Problem) -> Softest:
 
 
 def _ranges(problem: Problem) -> tuple[Array, Array]:
-    """Least and largest values of the numbers of every mount, shape (mounts, 13) each."""
+    """Least and largest values of the numbers of every spring, shape (springs, 14) each."""
     low = np.array(problem.mount_numbers, dtype=float)
     high = low.copy()
     for decision in problem.mount_decisions:

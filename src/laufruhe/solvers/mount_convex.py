@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.machine.mount import every_spring
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import mass_root
@@ -77,10 +78,10 @@ def convex_program(problem: Problem) -> ConvexProgram:
 
 def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
     """dK of one decision: exact, for K is linear in it (E3)."""
-    total = np.zeros((6, 6))
+    total, springs = np.zeros((6, 6)), every_spring(mounting.mounts)
     for drive in decision.mount_drives:
-        axis = np.array(mounting.mounts[drive.mount].orientation)[drive.number]
-        row = axis @ mounting.motions[drive.mount]
+        place, spring = springs[drive.mount]
+        row = np.array(spring.orientation)[drive.number] @ mounting.motions[place]
         total += drive.gain * np.outer(row, row)
     return total
 

@@ -85,7 +85,7 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
         torsion=None if engine.torsion is None else engine.torsion.scaled(k, m),
         gear=None if engine.gear is None else engine.gear.scaled(k, m / k**3),
         mounts=tuple(
-            replace(mount, position=(mount.position[0] * k, mount.position[1] * k, mount.position[2] * k))
+            mount.each(lambda m: replace(m, position=(m.position[0] * k, m.position[1] * k, m.position[2] * k)))
             for mount in engine.mounts
         ),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from laufruhe.machine.mount import every_spring
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
@@ -43,11 +44,11 @@ def _mounts(result: Result, facts: MountingFacts) -> Grid:
     rows, points = [], result.problem.points
     slowest = min(range(len(points)), key=lambda k: points[k].speed)
     travels = measured(result.final, slowest, MOUNT_TRAVEL)
-    for mount, sag, travel in zip(result.final.engine.mounts, facts.mount_sag, travels, strict=True):
-        stiffness = " / ".join(trimmed(1e-3 * k) for k in mount.stiffness)
-        place = ", ".join(trimmed(1e3 * c) for c in mount.position)
-        sags, moved = number(1e3 * sag), number(1e3 * travel.max)
-        rows.append((mount.name, place, stiffness, trimmed(mount.loss_factor), sags, moved))
+    for k, spring in every_spring(result.final.engine.mounts):
+        stiffness = " / ".join(trimmed(1e-3 * k) for k in spring.stiffness)
+        place = ", ".join(trimmed(1e3 * c) for c in spring.position)
+        sags, moved = number(1e3 * facts.mount_sag[k]), number(1e3 * travels[k].max)
+        rows.append((spring.name, place, stiffness, trimmed(spring.loss_factor), sags, moved))
     axis = ", ".join(f"{c:.3f}" for c in facts.torque_roll_axis)
     note = (
         f"The centre of gravity sags {figure(facts.sag, 'm')}; the mean torque moves a mount by at most "
