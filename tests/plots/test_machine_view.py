@@ -13,10 +13,10 @@ from PIL import Image
 from cli import scenes
 from laufruhe.files.reader import load
 from laufruhe.plots import motion
-from laufruhe.plots.machine_parts import STEEL, THICKNESS, Pose, half_disc
 from laufruhe.plots.machine_view import Scene, reaches
 from laufruhe.plots.motion import animate
 from laufruhe.plots.results import engine
+from laufruhe.present.poses import STEEL, THICKNESS, Pose, half_disc
 from problem_files import PROBLEMS
 
 

@@ -132,6 +132,24 @@ def evaluate(
         run(Request("evaluate", problem, json, out, () if no_plots else kind.kinds, animate, series=series), stated)
 
 
+@app.command(epilog=_example("laufruhe page problem.toml", "laufruhe page problem.toml --no-browser --port 8600"))
+def page(
+    problem: o.FileOnDisk,
+    port: o.PortOption = None,
+    no_browser: o.NoBrowserOption = False,
+    time_limit: o.SearchOption = 20.0,
+    ends_after: o.ForOption = None,
+) -> None:
+    """Serve a page of the problem on this machine.
+
+    Sliders for what is open, for limits, speed and load, crank and mounts; the optimum follows.
+    """
+    with exit_statuses(problem, "the page is no longer served"):
+        from laufruhe.cli.page import Wanted, served
+
+        served(Wanted(problem, port, time_limit, ends_after, not no_browser))
+
+
 @app.command(epilog=_example("laufruhe study tractor-sweeps.toml --jobs 4"))
 def study(
     problem: o.StudyArgument,

@@ -23,6 +23,7 @@ def _completed(kinds: str) -> Callable[[str], list[str]]:
     return names
 
 
+FileOnDisk = Annotated[Path, typer.Argument(metavar="PROBLEM", help="Problem file (TOML).", show_default=False)]
 FILE = "Problem file (TOML); - reads standard input."
 ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help=FILE, show_default=False)]
 JSON = "Write the result as JSON to FILE; - prints it, and the text goes to stderr."
@@ -91,3 +92,11 @@ QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help=QUIET)]
 VERBOSE = "Print every step on standard error, in a pipe too."
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help=VERBOSE)]
 Problems = Annotated[list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False)]
+PORT = "Port to serve at.  [default: 8537, or one that is free]"
+PortOption = Annotated[int | None, typer.Option("--port", metavar="N", help=PORT)]
+NO_BROWSER = "Open no browser; print the address only."
+NoBrowserOption = Annotated[bool, typer.Option("--no-browser", help=NO_BROWSER)]
+SEARCH = "Seconds that a whole solve may take, once sliders rest."
+SearchOption = Annotated[float, typer.Option("--time-limit", metavar="SECONDS", help=SEARCH)]
+FOR = "End by itself after SECONDS."
+ForOption = Annotated[float | None, typer.Option("--for", metavar="SECONDS", help=FOR)]

@@ -20,16 +20,11 @@ from laufruhe.plots.machine_parts import (
     METAL,
     MM,
     PISTON,
-    THICKNESS,
-    Pose,
     at,
     bar,
     bodies,
-    bore_of,
     box,
     cylinder,
-    direction,
-    half_disc,
     heights_of,
     look_of,
     piston_at,
@@ -38,6 +33,7 @@ from laufruhe.plots.machine_parts import (
 from laufruhe.plots.style import AFTER, GREY, ORANGE, PALE, Page, entry_of_dots, page
 from laufruhe.plots.words import INK, SMALL, round_ticks, width_of
 from laufruhe.present.measures import changed
+from laufruhe.present.poses import THICKNESS, Pose, bore_of, direction, half_disc
 from laufruhe.solvers.result import Result
 
 # both views side by side, of one page, and between them [inch]

@@ -137,7 +137,7 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float,
     solution = solve_cones(tightened(coarse, margin))
     if solution.x is None:
         return None
-    x = _settled(problem, fine, solution.x)
+    x = settled(problem, fine, solution.x)
     averaged = model.at(fine.samples, averaged=True)
     bound = best_bound(averaged, x, on_grid(coarse, averaged, solution.multipliers))
     judge = model.at(fine.samples, finer=True) if _has_peaks(problem) else fine
@@ -172,7 +172,7 @@ def _given(norm: AffineNorm) -> float:
     return norm.value(np.zeros(norm.slope.shape[-1]))
 
 
-def _settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
+def settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
     """Of designs that no load can tell apart the lightest, what is negligible in it left out."""
     still = _indistinguishable(problem, affine)
     if still.shape[1]:

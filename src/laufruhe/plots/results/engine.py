@@ -6,10 +6,10 @@ import math
 
 from matplotlib.figure import Figure
 
-from laufruhe.plots.machine_parts import THICKNESS
 from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
 from laufruhe.plots.style import headed, styled
 from laufruhe.present.measures import has_firing
+from laufruhe.present.poses import THICKNESS
 from laufruhe.solvers.result import Result
 
 

@@ -1,0 +1,60 @@
+"""Where the parts of an engine are at a crank angle, and how large weights are drawn (C4, C5)."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from laufruhe.machine import Engine, Rotor, SliderCrank
+from laufruhe.machine.slider_crank import Outline
+
+STEEL = 7850.0
+THICKNESS = 0.02
+"""Of the half discs that stand for weights [m]."""
+LONG_ROD = 4.0
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a slider-crank is, zeta = z + i y [m] (C4), the foot of its rod, and the bodies of one without a piston."""
+
+    part: SliderCrank
+    crank: complex
+    pin: complex
+    foot: complex
+    piston: complex
+    bodies: tuple[Outline, ...]
+
+    @classmethod
+    def of(cls, part: SliderCrank, phi: float) -> Pose:
+        """At a crank angle (C5)."""
+        centre, axis = complex(part.shaft.z, part.shaft.y), cmath.exp(1j * part.bank)
+        turn = part.throw + part.shaft.ratio * phi
+        rod = part.rod_length if math.isfinite(part.rod_length) else LONG_ROD * part.crank_radius
+        moved = complex(part.motion(np, np.float64(turn - part.bank)).points[0][1][0])
+        way = part.crank_radius + rod + moved
+        bodies = tuple(
+            replace(body, points=centre + axis * body.points) for body in part.outlines(float(turn - part.bank))
+        )
+        pin = part.crank_radius * cmath.exp(1j * turn)
+        # the pin of a Scotch yoke slides across its rod, which stays on the axis
+        foot = pin if math.isfinite(part.rod_length) else axis * (pin / axis).real
+        return cls(part, centre, centre + pin, centre + foot, centre + way * axis, bodies)
+
+
+def half_disc(unbalance: float) -> float:
+    """Radius of a half disc of steel with this unbalance [m]: its area centre lies 4 R / 3 pi off."""
+    return math.cbrt(1.5 * unbalance / (STEEL * THICKNESS))
+
+
+def direction(rotor: Rotor, phi: float) -> float:
+    """Angle of its unbalance from z towards y [rad]."""
+    return cmath.phase(rotor.unbalance) + rotor.shaft.ratio * phi
+
+
+def bore_of(engine: Engine) -> float:
+    """Of the largest cylinder; as wide as the stroke where it is not told [m]."""
+    return max(part.bore or part.stroke for part in engine.slider_cranks)

@@ -1,0 +1,160 @@
+"""What a page asks for: numbers of the problem changed by name, of those only that it was offered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+from laufruhe.files import edits
+from laufruhe.files.complaints import Refused
+
+Tables: TypeAlias = Mapping[str, Any]
+
+MOST_EDITS, LONGEST, MOST_ENTRIES = 300, 100, 96
+"""Of one request; characters of a text; entries of a list."""
+_ANGLES = ("bank_angle", "split_pin_angle")
+
+
+@dataclass(frozen=True)
+class Edit:
+    """One change of the problem's tables: what is done, to which number, and the value as a file has it."""
+
+    what: str
+    name: str
+    value: Any
+
+    def __call__(self, tables: Tables) -> dict[str, Any]:
+        """The tables with it; `Refused` where it cannot be made."""
+        return _WAYS[self.what](tables, self.name, self.value)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The state of a page.
+
+    Attributes
+    ----------
+    edits
+        That the user made.
+    held
+        Open numbers that stay where the last whole solution had them, while what is affine follows a slider.
+    design
+        Numbers of the design that is shown, by name [SI].
+    has
+        Key of the model that the page has.
+    """
+
+    edits: tuple[Edit, ...] = ()
+    held: tuple[Edit, ...] = ()
+    design: Mapping[str, float] = field(default_factory=dict)
+    has: str = ""
+
+    @classmethod
+    def of(cls, given: object) -> Asked:
+        """From what a request holds; `Refused` where it is nothing that a page asks."""
+        if not isinstance(given, dict) or not set(given) <= {"edits", "held", "design", "has"}:
+            raise _strange("request", "is no table of edits, held, design and has")
+        design, has = given.get("design", {}), given.get("has", "")
+        if not isinstance(design, dict) or len(design) > MOST_EDITS or not all(map(_is_number, design.values())):
+            raise _strange("design", "is no table of names and numbers")
+        if not isinstance(has, str) or len(has) > LONGEST:
+            raise _strange("has", "is no key of a model")
+        told = {str(name): float(value) for name, value in design.items()}
+        return cls(_edits(given.get("edits", []), "edits"), _edits(given.get("held", []), "held"), told, has)
+
+    def tables(self, tables: Tables, with_held: bool) -> dict[str, Any]:
+        """The tables of the problem as it is asked about."""
+        found = dict(tables)
+        for edit in (*self.edits, *(self.held if with_held else ())):
+            found = edit(found)
+        return found
+
+    def check(self, offered: Sequence[str]) -> None:
+        """Refuse numbers that the page was not offered: a path might lead to the name of a file."""
+        for edit in (*self.edits, *self.held):
+            if edit.name not in offered:
+                raise _strange(edit.name, "is not offered by this page")
+
+
+def _edits(given: object, where: str) -> tuple[Edit, ...]:
+    if not isinstance(given, list) or len(given) > MOST_EDITS:
+        raise _strange(where, f"is no list of at most {MOST_EDITS} changes")
+    return tuple(_edit(entry, where) for entry in given)
+
+
+def _edit(given: object, where: str) -> Edit:
+    if not isinstance(given, list) or len(given) != 3 or given[0] not in _WAYS or not isinstance(given[1], str):
+        raise _strange(where, "holds a change that is none of: " + ", ".join(_WAYS))
+    if not _is_plain(given[2]) or len(given[1]) > LONGEST:
+        raise _strange(where, f"holds a value of '{given[1][:LONGEST]}' that no number has")
+    return Edit(*given)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_plain(value: object, deep: int = 0) -> bool:
+    """Whether a number, a short text, or a short list or table of these."""
+    if isinstance(value, dict) and not deep:
+        own = value.items()
+        return len(value) <= MOST_ENTRIES and all(isinstance(k, str) and _is_plain(v, deep + 1) for k, v in own)
+    if isinstance(value, list) and deep < 2:
+        return len(value) <= MOST_ENTRIES and all(_is_plain(entry, deep + 1) for entry in value)
+    return value is None or (len(value) <= LONGEST if isinstance(value, str) else _is_number(value))
+
+
+def _strange(where: str, rule: str) -> Refused:
+    return Refused(where, None, rule, "load the page again")
+
+
+def _star(tables: Tables, _: str, value: Any) -> dict[str, Any]:
+    """A crank with its firing order, the angles of its banks and its shafts; nothing of them is open any more."""
+    if not isinstance(value, dict) or not isinstance(value.get("throws"), list):
+        raise _strange("star", "has no throws")
+    engine = dict(tables["engine"])
+    for key in ("throws", "firing_order", *_ANGLES):
+        if value.get(key) is not None:
+            engine[key] = value[key]
+    gone = value.get("without") or []
+    found = {**tables, "engine": engine}
+    found.pop("phasing", None)
+    if "balancer_shafts" in tables:
+        kept = [shaft for shaft in tables["balancer_shafts"] if shaft.get("name") not in gone]
+        found["balancer_shafts"] = [{k: v for k, v in shaft.items() if k != "optional"} for shaft in kept]
+    return found
+
+
+def _open_crank(tables: Tables, _: str, __: Any) -> dict[str, Any]:
+    """Throws and firing order left open, so that all of them are ranked."""
+    engine = dict(tables["engine"])
+    if "cylinders" not in engine and isinstance(engine.get("firing_order"), list):
+        engine["cylinders"] = len(engine["firing_order"])
+    return {**tables, "engine": {**engine, "throws": "open", "firing_order": "open"}}
+
+
+def _first(tables: Tables, _: str, value: Any) -> dict[str, Any]:
+    """One of several objectives before the others."""
+    ranks = tables.get("objective")
+    if not isinstance(ranks, list) or not isinstance(value, int) or not 0 <= value < len(ranks):
+        raise _strange("objective", "is none of this problem's")
+    order = [ranks[value], *(rank for k, rank in enumerate(ranks) if k != value)]
+    last = {key: entry for key, entry in order[-1].items() if key != "within"}
+    return {**tables, "objective": [*order[:-1], last]}
+
+
+def _fix(tables: Tables, name: str, value: Any) -> dict[str, Any]:
+    return edits.fixed(tables, name, value)
+
+
+_WAYS: Mapping[str, Callable[[Tables, str, Any], dict[str, Any]]] = {
+    "set": edits.with_value,
+    "fix": _fix,
+    "star": _star,
+    "open crank": _open_crank,
+    "first": _first,
+}
+STAR, CRANK, OBJECTIVE = "star", "crank", "objective"
+"""Names of what is changed as a whole."""

@@ -1,0 +1,166 @@
+"""What of a problem a page may change that loads are not affine in: one control each, with the ends of its slider."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from laufruhe import units
+from laufruhe.files import edits
+from laufruhe.files.asked import limit_name
+from laufruhe.files.complaints import Refused
+from laufruhe.problem.problem import Problem
+from laufruhe.server.asked import CRANK, OBJECTIVE, STAR
+
+_OF_ENGINE = {
+    "rod_ratio": ("Rod ratio", 0.4, 1.6),
+    "rod_length": ("Rod length", 0.6, 2.0),
+    "bank_angle": ("Bank angle", 0.0, 180.0),
+    "split_pin_angle": ("Split pins", 0.0, 60.0),
+}
+_WHOLE_TURN = ("bank_angle", "split_pin_angle")
+_LOADS = {"imep": "indicated mean pressure", "bmep": "brake mean pressure", "brake_torque": "torque at the brake"}
+_SPEEDS = {"speed": "speed", "mean_piston_speed": "mean piston speed"}
+_SIDES = {"max": "at most", "min": "at least"}
+_AXES = "xyz"
+_NARROW, _WIDE = 0.25, 2.0
+
+
+@dataclass(frozen=True)
+class Control:
+    """A number with a slider.
+
+    Attributes
+    ----------
+    way, name
+        Of the edit that moves it.
+    group, label
+        Where it stands on the page, and what it is called.
+    value, low, high
+        In `unit`, as a file has it.
+    open
+        Whether it is decided unless it is held.
+    """
+
+    way: str
+    name: str
+    group: str
+    label: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    open: bool = False
+    limit: str = ""
+
+
+def controls_of(tables: Mapping[str, Any], problem: Problem) -> list[Control]:
+    """Of the problem as its file has it."""
+    return [*_of_points(tables), *_of_engine(tables), *_of_decisions(tables, problem), *_of_mounts(tables),
+            *_of_limits(tables)]  # fmt: skip
+
+
+def offered_by(tables: Mapping[str, Any], problem: Problem) -> list[str]:
+    """Names that edits may have: of controls, of open numbers, and of what is changed as a whole."""
+    decided = [decision.name for decision in problem.decisions]
+    return [STAR, CRANK, OBJECTIVE, *(control.name for control in controls_of(tables, problem)), *decided]
+
+
+def as_json(controls: list[Control]) -> list[dict[str, Any]]:
+    """For the page."""
+    return [asdict(control) for control in controls]
+
+
+def _number(given: Any) -> tuple[float, str] | None:
+    """Of a text with a unit, or a plain number, and the unit; None of what is open, or no number."""
+    if isinstance(given, int | float) and not isinstance(given, bool):
+        return float(given), ""
+    if not isinstance(given, str):
+        return None
+    unit = units.unit_of(given)
+    try:
+        number = float(given.removesuffix(unit).strip() if unit else given)
+    except ValueError:
+        return None
+    return (number, unit) if math.isfinite(number) else None
+
+
+def _around(name: str, group: str, label: str, given: Any, low: float = _NARROW, high: float = _WIDE) -> list[Control]:
+    """A slider about a number that is given; none where it is zero or no number."""
+    found = _number(given)
+    if found is None or found[0] <= 0.0:
+        return []
+    value, unit = found
+    return [Control("set", name, group, label, value, _rounded(low * value), _rounded(high * value), unit)]
+
+
+def _rounded(value: float) -> float:
+    """To two figures: an end that can be read."""
+    return float(f"{value:.2g}")
+
+
+def _of_points(tables: Mapping[str, Any]) -> Iterator[Control]:
+    points, gas = tables.get("operating_points", []), tables.get("gas", {})
+    for k, point in enumerate(points):
+        at = f", {point.get('name') or f'point {k + 1}'}" if len(points) > 1 else ""
+        for key, words in _SPEEDS.items():
+            yield from _around(f"operating_points.{k + 1}.{key}", "Engine", f"Engine {words}{at}", point.get(key))
+        for key, words in _LOADS.items():
+            yield from _around(f"operating_points.{k + 1}.{key}", "Engine", f"Load, {words}{at}", point.get(key))
+    yield from _around("gas.imep", "Engine", "Load, indicated mean pressure", gas.get("imep"))
+
+
+def _of_engine(tables: Mapping[str, Any]) -> Iterator[Control]:
+    engine = tables["engine"]
+    for key, (label, low, high) in _OF_ENGINE.items():
+        found = _number(engine.get(key))
+        if found is not None and key in _WHOLE_TURN:
+            yield Control("set", f"engine.{key}", "Engine", label, found[0], low, high, found[1] or "deg")
+        elif found is not None:
+            yield from _around(f"engine.{key}", "Engine", label, engine.get(key), low, high)
+
+
+def _of_decisions(tables: Mapping[str, Any], problem: Problem) -> Iterator[Control]:
+    """Numbers that a method decides, which the page may hold."""
+    for decision in problem.decisions:
+        try:
+            edits.keys_by_name(tables, decision.name)
+        except Refused:
+            continue
+        if not decision.is_affine and decision.set.width == 1:
+            unit, factor = typed(decision.unit)
+            value, low, high = (
+                float(f"{factor * x:.10g}") for x in (decision.start_number, decision.lower, decision.upper)
+            )
+            yield Control("fix", decision.name, "Open numbers", decision.name, value, low, high, unit, open=True)
+
+
+def typed(unit: str) -> tuple[str, float]:
+    """The unit in which a number is typed, and its factor on SI."""
+    _, factor = units.readable(unit)
+    return units.shown(1.0, unit).partition(" ")[2], factor
+
+
+def _of_mounts(tables: Mapping[str, Any]) -> Iterator[Control]:
+    mounts = tables.get("mounts", {})
+    of = [("mounts", "All mounts", mounts)]
+    of += [(f"mounts.places.{k + 1}", m.get("name", str(k + 1)), m) for k, m in enumerate(mounts.get("places", []))]
+    for path, name, table in of:
+        for axis, given in zip(_AXES, table.get("stiffness") or [], strict=False):
+            place = _AXES.index(axis) + 1
+            yield from _around(f"{path}.stiffness.{place}", "Mounts", f"{name}, stiffness {axis}", given)
+
+
+def _of_limits(tables: Mapping[str, Any]) -> Iterator[Control]:
+    for k, entry in enumerate(tables.get("constraints", [])):
+        name = limit_name(entry) or ""
+        for key, words in _SIDES.items():
+            for own in _around(f"constraints.{k + 1}.{key}", "Limits", f"{name} {words}", entry.get(key), 0.05):
+                yield Control(**{**asdict(own), "limit": name})
+        for end, given in enumerate(entry.get("outside") or []):
+            words = "band ends" if end else "band begins"
+            path = f"constraints.{k + 1}.outside.{end + 1}"
+            for own in _around(path, "Limits", f"{name}, {words} at", given, 0.5, 1.5):
+                yield Control(**{**asdict(own), "limit": name})

@@ -1,0 +1,118 @@
+"""Requests for one kind of work, of which only the newest matters: a process at work, and who waits for it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, CancelledError, Future
+from typing import ParamSpec, TypeVar
+
+from laufruhe.errors import SolverError
+from laufruhe.numerics.processes import Processes
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+class Superseded(Exception):
+    """A newer request came, or the page was closed."""
+
+
+class Late(SolverError):
+    """The work took longer than it may."""
+
+
+class Desk:
+    """Hands the newest request to a process of its own; older ones that wait are dropped.
+
+    Parameters
+    ----------
+    patience
+        Seconds that a newer request waits for one at work, before that is ended with its process.
+    """
+
+    def __init__(self, patience: float) -> None:
+        self._patience = patience
+        self._changed = threading.Condition()
+        self._newest = 0
+        self._workers: Processes | None = None
+        self._busy = False
+        self._closed = False
+
+    def ask(self, seconds: float, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """What becomes of the work.
+
+        Parameters
+        ----------
+        seconds
+            After which it is ended.
+
+        Raises
+        ------
+        Superseded
+            Where a newer request came before the answer.
+        Late
+            Where time is over.
+        """
+        mine, workers = self._turn()
+        try:
+            return self._submitted(workers, work, *args, **kwargs).result(seconds)
+        except TimeoutError:
+            self._end(workers)
+            raise Late(f"it took longer than {seconds:.0f} s and was ended") from None
+        except (BrokenExecutor, CancelledError):
+            if mine != self._newest or self._closed:
+                raise Superseded from None
+            self._end(workers)
+            raise
+        finally:
+            with self._changed:
+                if self._workers is workers or self._workers is None:
+                    self._busy = False
+                self._changed.notify_all()
+
+    def _submitted(self, workers: Processes, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        try:
+            return workers.submit(work, *args, **kwargs)
+        except RuntimeError:
+            # ended by a newer request a moment ago
+            raise Superseded from None
+
+    def _turn(self) -> tuple[int, Processes]:
+        """Wait until nothing is at work; what is there too long is ended."""
+        with self._changed:
+            self._newest += 1
+            mine = self._newest
+            self._changed.notify_all()
+            until = time.monotonic() + self._patience
+            while self._busy and mine == self._newest and not self._closed:
+                if not self._changed.wait(max(until - time.monotonic(), 0.0)) and time.monotonic() >= until:
+                    self._end(self._workers)
+            if mine != self._newest or self._closed:
+                raise Superseded
+            self._busy = True
+            if self._workers is None:
+                self._workers = Processes(1)
+            return mine, self._workers
+
+    def _end(self, workers: Processes | None) -> None:
+        with self._changed:
+            if workers is not None and workers is self._workers:
+                workers.shutdown(wait=False, cancel_futures=True)
+                self._workers, self._busy = None, False
+
+    def drop(self) -> None:
+        """Nobody wants an answer any more."""
+        with self._changed:
+            self._newest += 1
+            if self._busy:
+                self._end(self._workers)
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """End the process at once."""
+        with self._changed:
+            self._closed = True
+            self._end(self._workers)
+            self._changed.notify_all()

@@ -1,0 +1,85 @@
+"""The engine as numbers that a page draws and turns: where its parts are over a cycle, and what its weights follow."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from laufruhe.machine import Rotor
+from laufruhe.machine.rotor import Role
+from laufruhe.present.poses import STEEL, THICKNESS, Pose, bore_of
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.conclusion import angle_name
+
+STEPS = 72
+"""Over one turn of the crank."""
+_MOST_PARTS = 48
+
+
+def drawing_of(problem: Problem) -> dict[str, Any] | None:
+    """Front view of a problem's engine in millimetres, y to the right and z up (C2); None of very many cylinders."""
+    engine = problem.engine
+    parts = engine.slider_cranks
+    if not parts or len(parts) > _MOST_PARTS:
+        return None
+    turns = engine.cycle.angle / math.tau
+    steps = round(STEPS * turns)
+    angles = np.arange(steps) * engine.cycle.angle / steps
+    poses = [[Pose.of(part, float(phi)) for phi in angles] for part in parts]
+    return {
+        "steps": steps,
+        "cycle": math.degrees(engine.cycle.angle),
+        "bore": 1e3 * bore_of(engine),
+        "disc": 1.5e9 / (STEEL * THICKNESS),
+        "parts": [_part(own) for own in poses],
+        "rotors": [_rotor(problem, rotor) for rotor in engine.rotors if rotor.role is not Role.THROW],
+        "mounts": [{"name": m.name, "at": [_mm(m.position[1]), _mm(m.position[2])]} for m in engine.mounts],
+    }
+
+
+def _part(poses: list[Pose]) -> dict[str, Any]:
+    part = poses[0].part
+    return {
+        "name": part.name,
+        "x": _mm(part.x),
+        "bank": math.degrees(part.bank),
+        "fires": math.degrees(part.firing_angle),
+        "crank": _place(poses[0].crank),
+        "pins": [_place(pose.pin) for pose in poses],
+        "feet": [_place(pose.foot) for pose in poses],
+        "pistons": [_place(pose.piston) for pose in poses],
+        "bodies": [
+            {"moves": body.moves, "shapes": [[_place(z) for z in pose.bodies[k].points] for pose in poses]}
+            for k, body in enumerate(poses[0].bodies)
+        ],
+    }
+
+
+def _rotor(problem: Problem, rotor: Rotor) -> dict[str, Any]:
+    """A weight: what it is without decisions [kg m], and what each adds to it (C4)."""
+    bare, by = complex(rotor.unbalance), list[dict[str, Any]]()
+    for decision in problem.decisions:
+        for drive in decision.rotor_drives:
+            if drive.rotor == rotor.name:
+                bare -= complex(drive.of(decision.start))
+                gains = [complex(drive.of(direction)) for direction in decision.set.directions]
+                angle = angle_name(decision) if decision.set.width > 1 else None
+                by.append({"name": decision.name, "angle": angle, "gains": [[g.real, g.imag] for g in gains]})
+    return {
+        "name": rotor.name,
+        "x": _mm(rotor.x),
+        "at": [_mm(rotor.shaft.y), _mm(rotor.shaft.z)],
+        "ratio": float(rotor.shaft.ratio),
+        "unbalance": [bare.real, bare.imag],
+        "by": by,
+    }
+
+
+def _place(zeta: complex) -> list[float]:
+    return [_mm(zeta.imag), _mm(zeta.real)]
+
+
+def _mm(value: float) -> float:
+    return round(1e3 * float(value), 2)

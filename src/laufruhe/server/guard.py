@@ -1,0 +1,72 @@
+"""Who may ask: a page that this server handed out, opened by the address that the command printed, on this machine."""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+import threading
+from collections.abc import Mapping
+
+HOST = "127.0.0.1"
+TOKEN = "X-Laufruhe-Token"
+HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+"""Of every answer: nothing is loaded from elsewhere, framed, kept, or told of to others."""
+
+
+class Guard:
+    """The token of one run, and what else a request is asked for.
+
+    The token is in the part of an address that browsers send to nobody. What a browser is started with other users of
+    the machine may see, so that holds a ticket, which is good for one exchange.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.token = secrets.token_urlsafe(32)
+        self._ticket = secrets.token_urlsafe(32)
+        self._lock = threading.Lock()
+        self.hosts = tuple(f"{name}:{port}" for name in (HOST, "localhost"))
+
+    @property
+    def address(self) -> str:
+        """With the token, as it is printed."""
+        return f"http://{self.hosts[0]}/#t={self.token}"
+
+    @property
+    def ticket_address(self) -> str:
+        """With the ticket, as a browser is started with it."""
+        return f"http://{self.hosts[0]}/#o={self._ticket}"
+
+    def refusal(self, method: str, headers: Mapping[str, str]) -> str:
+        """Why a request is not for this server; empty where it is."""
+        if headers.get("Host", "") not in self.hosts:
+            return "Host is not this server"
+        origin = headers.get("Origin")
+        wanted = [f"http://{host}" for host in self.hosts]
+        if (origin is not None or method == "POST") and origin not in wanted:
+            return "Origin is not this page"
+        if headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
+            return "asked for by another site"
+        return ""
+
+    def knows(self, token: str | None) -> bool:
+        """Whether a request has the token of this run."""
+        return hmac.compare_digest((token or "").encode("utf-8", "replace"), self.token.encode())
+
+    def exchanged(self, ticket: str) -> str | None:
+        """The token for the ticket, once."""
+        with self._lock:
+            good = bool(self._ticket) and hmac.compare_digest(ticket.encode("utf-8", "replace"), self._ticket.encode())
+            if good:
+                self._ticket = ""
+            return self.token if good else None

@@ -1,0 +1,79 @@
+"""What of a solution stays where it is while sliders move what loads are affine in: cranks, and all other numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from laufruhe.errors import InputError
+from laufruhe.files.complaints import Refused
+from laufruhe.present.numbers import figure
+from laufruhe.server.asked import STAR, Edit
+from laufruhe.server.controls import typed
+from laufruhe.solvers.ranking import RankedOrder, RankedStar
+from laufruhe.solvers.result import Result
+
+_DIGITS = 9
+"""Of an angle in degrees: steps of a turn are found again from them."""
+
+
+def held_by(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
+    """Changes that hold what is not affine where a result has it; empty where there is none, or it cannot be told."""
+    found: list[list[Any]] = []
+    if result.phasing is not None and result.phasing.ranking:
+        star = result.phasing.ranking[0]
+        found.append(["star", STAR, star_value(result, star, star.firing_orders[0] if star.firing_orders else None)])
+    values = {entry.name: entry for entry in result.decisions}
+    for decision in result.problem.decisions:
+        if decision.is_affine or decision.name not in values:
+            continue
+        unit, factor = typed(decision.unit)
+        value = factor * values[decision.name].value
+        edit = Edit("fix", decision.name, f"{value!r} {unit}" if unit else value)
+        try:
+            edit(tables)
+        except (Refused, InputError):
+            return []
+        found.append([edit.what, edit.name, edit.value])
+    return found
+
+
+def star_value(result: Result, star: RankedStar, order: RankedOrder | None) -> dict[str, Any]:
+    """A star as the page may ask for it again."""
+    phasing = result.problem.phasing
+    optional = [name for names in phasing.shafts.optional for name in names] if phasing is not None else []
+    return {
+        "throws": [_degrees(angle) for angle in star.throws],
+        "firing_order": None if order is None else list(order.order),
+        "bank_angle": None if star.bank_angle is None else _degrees(star.bank_angle),
+        "split_pin_angle": None if star.split_pin is None else _degrees(star.split_pin),
+        "without": [name for name in optional if name not in star.shafts],
+    }
+
+
+def ranking_of(result: Result) -> list[dict[str, Any]]:
+    """Stars of a result and their firing orders, best first; each as it is told, and as it is asked for."""
+    if result.phasing is None:
+        return []
+    unit = result.problem.objective_unit or ""
+    return [
+        {
+            "throws": ", ".join(f"{math.degrees(angle):.6g}" for angle in star.throws),
+            "bank": "" if star.bank_angle is None else f"{math.degrees(star.bank_angle):.6g}",
+            "value": star.value,
+            "text": figure(star.value, unit, 5),
+            "bound": figure(star.lower_bound, unit, 5),
+            "proven": star.proven,
+            "orders": [
+                {"text": "-".join(map(str, order.order)), "star": star_value(result, star, order)}
+                for order in star.firing_orders
+            ]
+            or [{"text": "", "star": star_value(result, star, None)}],
+        }
+        for star in result.phasing.ranking
+    ]
+
+
+def _degrees(angle: float) -> float:
+    return round(math.degrees(angle), _DIGITS)

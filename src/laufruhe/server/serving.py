@@ -1,0 +1,184 @@
+"""A problem's page, served until somebody ends it: which request is worked out where."""
+
+from __future__ import annotations
+
+import errno
+import json
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor
+from contextlib import suppress
+from functools import partial
+from http import HTTPStatus
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, ParamSpec
+
+from laufruhe.errors import Complaint, InputError, SolverError
+from laufruhe.files.complaints import Refused
+from laufruhe.live import page_assets
+from laufruhe.server import answers
+from laufruhe.server.asked import Asked
+from laufruhe.server.desk import Desk, Superseded
+from laufruhe.server.front import POINTS
+from laufruhe.server.transport import Answer, Server
+from laufruhe.server.watched import Watched
+
+P = ParamSpec("P")
+
+USUAL_PORT = 8537
+"""Where links of yesterday lead, unless another page is served there."""
+FOLLOWED, GRACE = 20.0, 10.0
+"""Seconds for an answer while a slider moves, and beyond those that a search may take."""
+HEARTBEAT = 1.0
+_HASTE, _PATIENCE = 5.0, 1.0
+
+
+class Page:
+    """A server with the processes that work for it.
+
+    Parameters
+    ----------
+    path
+        Of the problem.
+    port
+        To listen on; the usual one, or any that is free, when None.
+    seconds
+        That a search may take.
+    """
+
+    def __init__(self, path: Path, port: int | None, seconds: float) -> None:
+        self.watched = Watched(path)
+        self.server = _listening(port, _files())
+        self._seconds = seconds
+        self._follow, self._settle, self._front = Desk(_HASTE), Desk(_PATIENCE), Desk(_PATIENCE)
+        self.server.handles = {
+            "/begin": self._begun,
+            "/follow": self._asked(self._follow, FOLLOWED, answers.follow),
+            "/settle": self._asked(self._settle, seconds + GRACE, answers.settle, seconds),
+            "/save": self._asked(self._follow, FOLLOWED, answers.save),
+            "/front": self._fronted,
+            "/rest": self._rested,
+            "/events": lambda _: Answer(lines=self._events()),
+        }
+
+    @property
+    def address(self) -> str:
+        """As it is printed."""
+        return self.server.guard.address
+
+    def serve(self, ends_after: float | None, when_ready: Callable[[], object]) -> None:
+        """Answer until an interrupt, or so many seconds."""
+        self.watched.start()
+        timer = None
+        if ends_after is not None:
+            timer = threading.Timer(ends_after, self.server.shutdown)
+            timer.daemon = True
+            timer.start()
+        # the process that follows sliders begins to import now
+        threading.Thread(target=self._warmed, daemon=True).start()
+        try:
+            when_ready()
+            self.server.serve_forever(poll_interval=0.1)
+        finally:
+            self.close()
+            if timer is not None:
+                timer.cancel()
+
+    def close(self) -> None:
+        """End what works for it, and the server."""
+        self.watched.close()
+        for desk in (self._follow, self._settle, self._front):
+            desk.close()
+        self.server.server_close()
+
+    def _warmed(self) -> None:
+        with suppress(Exception):
+            self._follow.ask(FOLLOWED, answers.follow, self.watched.source, Asked())
+
+    def _begun(self, _: Any) -> Answer:
+        found = json.loads(answers.begin(self.watched.source))
+        return Answer(json.dumps({**found, **self._state()}))
+
+    def _state(self) -> dict[str, Any]:
+        return {"version": self.watched.version, "complaint": self.watched.complaint}
+
+    def _asked(self, desk: Desk, seconds: float, work: Callable[..., str], *more: Any) -> Callable[[Any], Answer]:
+        """How requests of one kind are answered."""
+
+        def answer(body: Any) -> Answer:
+            try:
+                asked = Asked.of(body)
+            except Refused as refused:
+                return _wrong(refused.complaint)
+            return _worked(partial(desk.ask, seconds, work, self.watched.source, asked, *more))
+
+        return answer
+
+    def _rested(self, _: Any) -> Answer:
+        """Nobody looks at a front, or waits for a search, any more."""
+        self._front.drop()
+        self._settle.drop()
+        return Answer("{}")
+
+    def _fronted(self, body: Any) -> Answer:
+        across = body.pop("across", None) if isinstance(body, dict) else None
+        try:
+            asked = Asked.of(body)
+        except Refused as refused:
+            return _wrong(refused.complaint)
+        if not isinstance(across, str) or len(across) > 200:
+            return _wrong(Complaint("across", "", "is no measure", "load the page again"))
+        return Answer(lines=self._points(asked, across))
+
+    def _points(self, asked: Asked, across: str) -> Iterator[str]:
+        source = self.watched.source
+        for k in range(POINTS):
+            found = _worked(partial(self._front.ask, FOLLOWED, answers.front, source, asked, across, k))
+            yield found.text
+            if '"error"' in found.text or '"done"' in found.text or '"dropped"' in found.text:
+                return
+        yield '{"done": true}'
+
+    def _events(self) -> Iterator[str]:
+        """What the page is told unasked: that the file has changed, and that somebody is there."""
+        version = 0
+        while not self.watched.is_closed:
+            version = self.watched.later(version, HEARTBEAT)
+            yield json.dumps(self._state())
+
+
+def _worked(work: Callable[[], str]) -> Answer:
+    try:
+        return Answer(work())
+    except Superseded:
+        return Answer('{"dropped": true}')
+    except SolverError as error:
+        return Answer(json.dumps({"error": str(error)}))
+    except BrokenExecutor:
+        text = "the process that solves has ended, most likely for want of memory; it is started again"
+        return Answer(json.dumps({"error": text}))
+
+
+def _wrong(complaint: Complaint) -> Answer:
+    return Answer(json.dumps({"error": str(complaint)}), status=HTTPStatus.BAD_REQUEST)
+
+
+def _files() -> dict[str, str]:
+    """Everything that is handed out: the page's own files, and those of a live report."""
+    folder = files("laufruhe.server") / "static"
+    own = {f.name: f.read_text(encoding="utf-8") for f in folder.iterdir() if f.name.endswith((".html", ".js", ".css"))}
+    return {**own, **page_assets()}
+
+
+def _listening(port: int | None, texts: dict[str, str]) -> Server:
+    """At the port; without one at the usual, or where that is taken at any."""
+    try:
+        return Server(USUAL_PORT if port is None else port, texts)
+    except OSError as error:
+        if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+            raise
+        if port is None:
+            return Server(0, texts)
+        rule = "is in use" if error.errno == errno.EADDRINUSE else "is for the system's own services"
+        raise InputError("laufruhe", (Complaint("--port", str(port), rule, "name another, or leave it out"),)) from None

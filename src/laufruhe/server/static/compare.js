@@ -1,0 +1,66 @@
+// Two designs side by side: A is kept, B is the one that is shown.
+import { byId, element, shown } from "./parts.js";
+
+/**
+ * @typedef {{name: string, value: number, unit: string, met?: boolean | null}} Measured
+ */
+
+/** The design that is kept. */
+export class Comparison {
+  constructor() {
+    /** @type {{measures: Measured[], state: object} | null} */
+    this.kept = null;
+  }
+
+  /**
+   * @param {Measured[]} measures
+   * @param {object} state whatever shows it again
+   * @param {HTMLElement} live whose pictures are kept
+   */
+  keep(measures, state, live) {
+    this.kept = { measures, state };
+    byId("kept").replaceChildren(...[...live.querySelectorAll("[data-figure]")].map(copied));
+    byId("compare").hidden = false;
+    this.tell(measures);
+  }
+
+  drop() {
+    this.kept = null;
+    byId("compare").hidden = true;
+    byId("kept").replaceChildren();
+  }
+
+  /** @param {Measured[]} measures of B */
+  tell(measures) {
+    if (!this.kept) return;
+    const head = element("tr", {}, ...["", "A", "B", "B against A"].map((word) => element("th", { scope: "col" }, word)));
+    const rows = this.kept.measures.map((own) => row(own, measures.find((other) => other.name === own.name)));
+    byId("compared").replaceChildren(head, ...rows);
+  }
+}
+
+/**
+ * @param {Measured} a
+ * @param {Measured | undefined} b
+ */
+function row(a, b) {
+  const change = b && a.value ? `${b.value >= a.value ? "+" : ""}${shown((100 * (b.value - a.value)) / a.value, 3)} %` : "-";
+  return element("tr", {}, element("th", { scope: "row" }, a.name), ...[a, b].map(cell), element("td", {}, change));
+}
+
+/** @param {Measured | undefined} measured */
+function cell(measured) {
+  const broken = measured?.met === false ? ", broken" : "";
+  return element("td", {}, measured ? `${shown(measured.value, 5)} ${measured.unit}${broken}` : "-");
+}
+
+/**
+ * A picture as it is now.
+ * @param {Element} figure
+ */
+function copied(figure) {
+  const copy = /** @type {HTMLElement} */ (figure.cloneNode(true));
+  copy.removeAttribute("data-figure");
+  copy.querySelectorAll("[id]").forEach((inner) => inner.removeAttribute("id"));
+  return copy;
+}

@@ -1,0 +1,137 @@
+// Sliders for what loads are not affine in: each moves one number of the problem, by name.
+import { element, shown } from "./parts.js";
+
+/**
+ * @typedef {{way: string, name: string, group: string, label: string, value: number, low: number, high: number,
+ *   unit: string, open: boolean, limit: string}} Control
+ * @typedef {[string, string, any]} Edit
+ */
+
+const STEPS = 400;
+const ORDER = ["Limits", "Engine", "Open numbers", "Mounts"];
+
+/** All sliders of a problem, in groups. */
+export class Controls {
+  /**
+   * @param {HTMLElement} root
+   * @param {(edit: Edit | null, control: Control) => void} moved
+   */
+  constructor(root, moved) {
+    this.root = root;
+    this.moved = moved;
+    /** @type {Map<string, {control: Control, box: HTMLElement, range: any, number: any, free: any, said: HTMLElement}>} */
+    this.rows = new Map();
+  }
+
+  /**
+   * @param {Control[]} controls
+   * @param {Map<string, Edit>} edits
+   */
+  build(controls, edits) {
+    this.rows.clear();
+    this.root.querySelectorAll("fieldset.numbers").forEach((old) => old.remove());
+    for (const group of ORDER) {
+      const own = controls.filter((control) => control.group === group);
+      if (!own.length) continue;
+      const box = element("fieldset", { class: "numbers" }, element("legend", {}, group));
+      box.append(...own.map((control) => this.row(control, edits.get(control.name))));
+      this.root.append(box);
+    }
+  }
+
+  /**
+   * One number: slider, figure, and the way back.
+   * @param {Control} control
+   * @param {Edit | undefined} edit
+   */
+  row(control, edit) {
+    const id = `c-${control.name}`;
+    const value = edit ? parseFloat(edit[2]) : control.value;
+    const limits = { min: control.low, max: control.high, step: (control.high - control.low) / STEPS };
+    const range = element("input", { type: "range", id, ...limits, "data-control": control.name });
+    const number = element("input", { type: "number", step: "any", "aria-label": `${control.label}, ${control.unit || "number"}`,
+      "data-number-of": control.name });
+    const free = element("button", { type: "button", hidden: true, "aria-label": `${control.label}: as in the file` }, "↺");
+    const said = element("p", { class: "said" }, control.open ? "decided, until you move it" : "");
+    range.value = String(value);
+    number.value = shown(value, 6);
+    const row = element("div", { class: "row" }, range, number, element("span", {}, control.unit), free);
+    const box = element("div", { class: "control" }, element("label", { for: id }, control.label), row, said);
+    range.addEventListener("input", () => this.set(control, Number(range.value)));
+    number.addEventListener("change", () => this.set(control, Number(number.value)));
+    free.addEventListener("click", () => this.release(control));
+    this.rows.set(control.name, { control, box, range, number, free, said });
+    this.mark(control.name, Boolean(edit));
+    return box;
+  }
+
+  /**
+   * @param {Control} control
+   * @param {number} value
+   */
+  set(control, value) {
+    const row = this.rows.get(control.name);
+    if (!row || !Number.isFinite(value)) return;
+    const text = shown(value, 6);
+    row.number.value = text;
+    row.range.value = text;
+    this.mark(control.name, true);
+    this.moved([control.way, control.name, control.unit ? `${text} ${control.unit}` : Number(text)], control);
+  }
+
+  /** @param {Control} control */
+  release(control) {
+    this.place(control.name, control.value);
+    this.mark(control.name, false);
+    this.rows.get(control.name)?.range.focus();
+    this.moved(null, control);
+  }
+
+  /**
+   * Move a slider without asking for anything.
+   * @param {string} name
+   * @param {number} value
+   */
+  place(name, value) {
+    const row = this.rows.get(name);
+    if (!row) return;
+    row.range.value = String(value);
+    row.number.value = shown(value, 6);
+  }
+
+  /**
+   * @param {string} name
+   * @param {boolean} changed
+   */
+  mark(name, changed) {
+    const row = this.rows.get(name);
+    row?.box.classList.toggle("changed", changed);
+    if (row) row.free.hidden = !changed;
+  }
+
+  /**
+   * How a design stands to its limits, what they cost, and which contradict each other.
+   * @param {{name: string, text: string, side: string, active: boolean, priceText: string}[]} limits
+   * @param {string[]} conflict
+   */
+  tell(limits, conflict) {
+    for (const { control, box, said } of this.rows.values()) {
+      if (!control.limit) continue;
+      const own = limits.find((limit) => limit.name === control.limit);
+      const against = conflict.includes(control.limit);
+      box.classList.toggle("conflict", against);
+      said.textContent = against ? "contradicts the others marked so, or the bounds" : own ? price(own) : "";
+    }
+  }
+
+  /** @param {boolean} dead whether nobody is there to compute */
+  disable(dead) {
+    this.root.querySelectorAll("fieldset").forEach((box) => { box.disabled = dead; });
+  }
+}
+
+/** @param {{text: string, active: boolean, priceText: string}} limit */
+function price(limit) {
+  const told = limit.priceText === "-" ? "no price" : `price ${limit.priceText}`;
+  return `is ${limit.text}; ${limit.active ? told : "has room"}`;
+}

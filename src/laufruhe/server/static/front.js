@@ -1,0 +1,94 @@
+// The front between the objective and another measure, drawn as its points come.
+import { drawn, shown, ticks } from "./parts.js";
+
+const [WIDE, HIGH, LEFT, LOW] = [640, 360, 74, 44];
+
+/**
+ * @typedef {{across: number, value: number, bound: number, acrossText: string, text: string, boundText: string,
+ *   acrossUnit: string, unit: string, name: string, design: Record<string, number>}} Point
+ */
+
+/**
+ * @param {HTMLElement} root
+ * @param {Point[]} points
+ * @param {string} across its name
+ * @param {(point: Point) => void} picked
+ */
+export function drawFront(root, points, across, picked) {
+  if (!points.length) {
+    root.replaceChildren();
+    return;
+  }
+  const sorted = [...points].sort((a, b) => a.across - b.across);
+  const x = scale(sorted.map((point) => point.across), LEFT, WIDE - 12);
+  const y = scale(sorted.flatMap((point) => [point.value, point.bound]), HIGH - LOW, 12);
+  const svg = drawn("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "group", "aria-label": `Front against ${across}` });
+  svg.append(...axes(x, y, sorted[0], across), line(sorted, x, y, "bound", "bound"), line(sorted, x, y, "value", "curve"));
+  svg.append(...sorted.map((point) => dot(point, x, y, picked)));
+  root.replaceChildren(svg);
+}
+
+/**
+ * @param {number[]} values
+ * @param {number} from
+ * @param {number} to
+ */
+function scale(values, from, to) {
+  const [least, most] = [Math.min(...values), Math.max(...values)];
+  const room = 0.05 * (most - least || Math.abs(most) || 1);
+  const [low, high] = [Math.max(least - room, least >= 0 ? 0 : -Infinity), most + room];
+  const at = (/** @type {number} */ value) => from + ((value - low) / (high - low)) * (to - from);
+  return { low, high, at };
+}
+
+/**
+ * @param {{low: number, high: number, at: (value: number) => number}} x
+ * @param {{low: number, high: number, at: (value: number) => number}} y
+ * @param {Point} point
+ * @param {string} across
+ */
+function axes(x, y, point, across) {
+  const found = [];
+  for (const tick of ticks(x.low, x.high)) {
+    found.push(drawn("line", { class: "grid", x1: x.at(tick), x2: x.at(tick), y1: 12, y2: HIGH - LOW }),
+      drawn("text", { x: x.at(tick), y: HIGH - LOW + 15, "text-anchor": "middle" }, shown(tick)));
+  }
+  for (const tick of ticks(y.low, y.high)) {
+    found.push(drawn("line", { class: "grid", x1: LEFT, x2: WIDE - 12, y1: y.at(tick), y2: y.at(tick) }),
+      drawn("text", { x: LEFT - 6, y: y.at(tick) + 4, "text-anchor": "end" }, shown(tick)));
+  }
+  found.push(drawn("text", { x: WIDE - 12, y: HIGH - 8, "text-anchor": "end" }, `${across} [${point.acrossUnit}]`),
+    drawn("text", { x: 4, y: HIGH - 8 }, `${point.name} [${point.unit}] up; dashed: no design under it`));
+  return found;
+}
+
+/**
+ * @param {Point[]} points
+ * @param {{at: (value: number) => number}} x
+ * @param {{at: (value: number) => number}} y
+ * @param {"value" | "bound"} what
+ * @param {string} look
+ */
+function line(points, x, y, what, look) {
+  return drawn("polyline", { class: look, points: points.map((p) => `${x.at(p.across)},${y.at(p[what])}`).join(" ") });
+}
+
+/**
+ * @param {Point} point
+ * @param {{at: (value: number) => number}} x
+ * @param {{at: (value: number) => number}} y
+ * @param {(point: Point) => void} picked
+ */
+function dot(point, x, y, picked) {
+  const told = `${point.acrossText}: ${point.text}, at least ${point.boundText}`;
+  const made = drawn("circle", { cx: x.at(point.across), cy: y.at(point.value), r: 4.5, tabindex: 0, role: "button",
+    "aria-label": `Show the design with ${told}` }, drawn("title", {}, told));
+  made.addEventListener("click", () => picked(point));
+  made.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+    if (event.key === "Enter" || event.key === " ") {
+      event.preventDefault();
+      picked(point);
+    }
+  });
+  return made;
+}

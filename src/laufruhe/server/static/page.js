@@ -1,0 +1,354 @@
+// The page of a problem: what is asked, when, and where answers are shown.
+import { address, addressed, ask, enter, Gone, listen, Refusal } from "./link.js";
+import { Comparison } from "./compare.js";
+import { Controls } from "./controls.js";
+import { Crank } from "./crank.js";
+import { EngineView } from "./engine.js";
+import { Trade } from "./trade.js";
+import { byId, element } from "./parts.js";
+import { busy, complain, tellGone, tellOptimum } from "./words.js";
+
+/** Milliseconds of rest after which the whole problem is solved. */
+const REST = 350;
+const CRANK = ["star", "crank"];
+
+/** @typedef {import("./controls.js").Edit} Edit */
+
+const state = {
+  /** @type {Map<string, Edit>} by the name of the number */
+  edits: new Map(),
+  /** @type {Edit[]} */
+  held: [],
+  key: "",
+  /** @type {any} */
+  handle: null,
+  /** @type {any} the last answer that has an optimum */
+  optimum: null,
+  /** @type {string[]} */
+  conflict: [],
+  version: 0,
+  gone: false,
+  asking: false,
+  again: false,
+  resting: 0,
+  serial: 0,
+  /** Whether a design was set by the page and not by the user. */
+  setting: false,
+};
+/** For who measures: milliseconds from an input to the picture drawn. */
+const latencies = /** @type {number[]} */ ([]);
+let inputAt = 0;
+
+const controls = new Controls(byId("controls"), (edit, control) => changed(control.name, edit));
+const crank = new Crank(byId("controls"), (edit) => {
+  CRANK.forEach((name) => state.edits.delete(name));
+  state.held = [];
+  changed(edit ? edit[1] : "star", edit);
+});
+const engine = new EngineView(byId("engine"));
+const comparison = new Comparison();
+const trade = new Trade(picked);
+
+/**
+ * A number has another value, or that of the file again.
+ * @param {string} name
+ * @param {Edit | null} edit
+ */
+function changed(name, edit) {
+  if (!inputAt) inputAt = performance.now();
+  if (edit) state.edits.set(name, edit);
+  else state.edits.delete(name);
+  // what is held by hand is held no other way
+  state.held = state.held.filter((held) => held[1] !== name);
+  remember();
+  follow();
+}
+
+/** The state in the address, so that a link shows it. */
+function remember() {
+  address("e", state.edits.size ? JSON.stringify([...state.edits.values()]) : null);
+  const star = state.edits.get("star");
+  crank.choose(star ? JSON.stringify(star[2]) : "");
+}
+
+/** @returns {{edits: Edit[], held: Edit[], has: string}} */
+const asked = () => ({ edits: [...state.edits.values()], held: state.held, has: state.key });
+
+/** Ask for the optimum that follows; while an answer is on its way only the newest state waits. */
+async function follow() {
+  clearTimeout(state.resting);
+  if (state.asking) {
+    state.again = true;
+    return;
+  }
+  state.asking = true;
+  const from = inputAt;
+  inputAt = 0;
+  state.serial += 1;
+  try {
+    const answer = await ask("follow", asked());
+    if (!answer.dropped) await show(answer);
+    if (from) requestAnimationFrame(() => setTimeout(() => latencies.push(performance.now() - from)));
+    rest();
+  } catch (error) {
+    failed(error);
+  }
+  state.asking = false;
+  if (state.again) {
+    state.again = false;
+    follow();
+  }
+}
+
+/** The whole problem is solved when nothing has moved for a while. */
+function rest() {
+  clearTimeout(state.resting);
+  state.resting = setTimeout(settle, REST);
+}
+
+async function settle() {
+  const mine = state.serial;
+  const stop = busy(state.optimum);
+  try {
+    const answer = await ask("settle", { edits: [...state.edits.values()] });
+    if (!answer.dropped && mine === state.serial) await settled(answer);
+  } catch (error) {
+    if (mine === state.serial) failed(error);
+  } finally {
+    stop();
+  }
+}
+
+/**
+ * What was proven: shown at once, with the model of what was decided beside weights.
+ * @param {any} answer
+ */
+async function settled(answer) {
+  crank.tell(answer.ranking, JSON.stringify(state.edits.get("star")?.[2] ?? answer.ranking[0]?.orders[0]?.star ?? ""));
+  const moved = JSON.stringify(answer.held) !== JSON.stringify(state.held);
+  if (answer.optimum && moved) {
+    state.held = answer.held;
+    const mine = state.serial;
+    const model = await ask("follow", asked());
+    if (mine !== state.serial) return;
+    await show(model);
+  }
+  answer.held.filter((/** @type {Edit} */ edit) => edit[0] === "fix").forEach((/** @type {Edit} */ edit) => controls.place(edit[1], parseFloat(edit[2])));
+  tell(answer);
+}
+
+/**
+ * @param {any} answer
+ */
+async function show(answer) {
+  complain("");
+  if (answer.engine !== undefined) {
+    state.key = answer.key;
+    if (answer.model && state.handle) await state.handle.setModel(answer.model);
+    else if (answer.model) await first(answer.model);
+    else unshown(answer.unshown);
+    engine.load(answer.engine);
+    trade.offer(answer.partners);
+  }
+  tell(answer);
+}
+
+/** @param {any} model */
+async function first(model) {
+  state.handle = await window.laufruheLive.show(model, byId("live"));
+  state.handle.onDesign(designed);
+  const design = addressed().get("d");
+  if (design) byId("follows").checked = false;
+}
+
+/** @param {string} why nothing slides */
+function unshown(why) {
+  state.handle?.end();
+  state.handle = null;
+  byId("live").replaceChildren(element("p", {}, why));
+}
+
+/** @param {any} answer with an optimum, or why there is none */
+function tell(answer) {
+  state.optimum = answer.optimum;
+  state.conflict = answer.conflict || [];
+  controls.tell(answer.limits, state.conflict);
+  tellOptimum(answer);
+  byId("keep").disabled = !state.handle;
+  if (!state.handle) return;
+  state.setting = true;
+  state.handle.setLimits(answer.limits.filter((/** @type {any} */ l) => l.side === "at most")
+    .map((/** @type {any} */ l) => ({ name: l.name, maximum: l.limit })));
+  if (answer.optimum) {
+    state.handle.setOptimum({ ...answer.optimum, kind: answer.optimum.proof, limits: answer.limits });
+    if (byId("follows").checked) state.handle.setDesign(answer.optimum.design, { quiet: true });
+  }
+  state.setting = false;
+  drawDesign();
+}
+
+/** The user has moved a weight. */
+function designed() {
+  if (!state.setting) byId("follows").checked = false;
+  drawDesign();
+}
+
+function drawDesign() {
+  if (!state.handle) return;
+  engine.follow(state.handle.design());
+  comparison.tell(state.handle.measures());
+}
+
+/** @param {unknown} error */
+function failed(error) {
+  if (error instanceof Gone) lost();
+  else if (error instanceof Refusal) {
+    complain(error.message);
+    if (state.held.length) {
+      // what was held may be what no longer fits
+      state.held = [];
+      state.again = true;
+    }
+  } else throw error;
+}
+
+/** The server has ended: what the page knows still moves. */
+function lost() {
+  if (state.gone) return;
+  state.gone = true;
+  clearTimeout(state.resting);
+  controls.disable(true);
+  ["back", "draw", "save"].forEach((id) => { byId(id).disabled = true; });
+  tellGone(byId("file").textContent);
+}
+
+/** @param {{design: Record<string, number>}} point */
+function picked(point) {
+  byId("follows").checked = false;
+  state.handle.setDesign(point.design, {});
+  drawDesign();
+}
+
+/** Begin, or begin again with another file. */
+async function begin() {
+  const told = await ask("begin", {});
+  state.version = told.version;
+  byId("title").textContent = told.title;
+  byId("file").textContent = told.file;
+  document.title = `${told.title} · Laufruhe`;
+  controls.build(told.controls, state.edits);
+  crank.offer(told.crank, told.openCrank);
+  objectives(told.objectives);
+  tellFile(told.complaint);
+}
+
+/** @param {string} complaint of the file as it is on the disk */
+function tellFile(complaint) {
+  const banner = byId("banner");
+  banner.hidden = !complaint;
+  banner.textContent = complaint ? `The file has changed and cannot be used; the page shows its last good state. ${complaint}` : "";
+}
+
+/** @param {string[]} names of several objectives in order */
+function objectives(names) {
+  byId("controls").querySelector("#objectives")?.remove();
+  if (names.length < 2) return;
+  const select = element("select", { id: "first-objective" }, ...names.map((name, k) => element("option", { value: k }, name)));
+  select.value = String(state.edits.get("objective")?.[2] ?? 0);
+  select.addEventListener("change", () => changed("objective", Number(select.value) ? ["first", "objective", Number(select.value)] : null));
+  byId("controls").prepend(element("fieldset", { id: "objectives" }, element("legend", {}, "Objective"),
+    element("label", {}, "First of them ", select)));
+}
+
+/** @param {{version: number, complaint: string}} told that somebody is there, and how the file is */
+async function heard(told) {
+  tellFile(told.complaint);
+  if (told.version === state.version) return;
+  state.version = told.version;
+  if (told.complaint) return;
+  state.held = [];
+  await begin();
+  follow();
+}
+
+async function events() {
+  try {
+    await listen("events", {}, (told) => { heard(told).catch(failed); });
+  } catch (error) {
+    if (!(error instanceof Gone)) failed(error);
+  }
+  lost();
+}
+
+/** The state of another time, or of a link. */
+function recall() {
+  try {
+    const edits = JSON.parse(addressed().get("e") || "[]");
+    state.edits = new Map(edits.map((/** @type {Edit} */ edit) => [edit[1], edit]));
+  } catch {
+    state.edits = new Map();
+  }
+}
+
+/** As the file has it. */
+function back() {
+  state.edits.clear();
+  state.held = [];
+  remember();
+  byId("follows").checked = true;
+  begin().then(follow).catch(failed);
+}
+
+async function save() {
+  const { edits, held } = asked();
+  const told = await ask("save", { edits, held, design: state.handle ? state.handle.design() : {} });
+  const link = element("a", { href: URL.createObjectURL(new Blob([told.toml], { type: "application/toml" })), download: told.file });
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
+/** Keep what is shown, or show what was kept. */
+function keep() {
+  const kept = { edits: new Map(state.edits), held: [...state.held], design: state.handle.design() };
+  comparison.keep(state.handle.measures(), kept, byId("live"));
+}
+
+async function showKept() {
+  const kept = /** @type {any} */ (comparison.kept?.state);
+  if (!kept) return;
+  state.edits = new Map(kept.edits);
+  state.held = [...kept.held];
+  remember();
+  byId("follows").checked = false;
+  await begin();
+  await follow();
+  state.handle.setDesign(kept.design, {});
+  drawDesign();
+}
+
+/** @param {string} id @param {() => any} work */
+function onClick(id, work) {
+  byId(id).addEventListener("click", () => Promise.resolve(work()).catch(failed));
+}
+
+async function start() {
+  await enter();
+  recall();
+  byId("controls").addEventListener("submit", (/** @type {Event} */ event) => event.preventDefault());
+  onClick("back", back);
+  onClick("save", save);
+  onClick("keep", keep);
+  onClick("show-a", showKept);
+  onClick("drop-a", () => comparison.drop());
+  onClick("draw", () => trade.draw({ edits: asked().edits, held: state.held }));
+  engine.listen();
+  byId("follows").addEventListener("change", () => {
+    if (byId("follows").checked && state.optimum) state.handle.setDesign(state.optimum.design, {});
+  });
+  await begin();
+  events();
+  await follow();
+}
+
+window.laufruhePage = { state, latencies };
+start().catch(failed);

@@ -1,0 +1,61 @@
+// The front fills in while it is looked at.
+import { drawFront } from "./front.js";
+import { listen, Refusal } from "./link.js";
+import { byId, element } from "./parts.js";
+
+/** What the objective is traded against, and the points so far. */
+export class Trade {
+  /** @param {(point: import("./front.js").Point) => void} picked */
+  constructor(picked) {
+    this.picked = picked;
+    /** @type {AbortController | null} */
+    this.asking = null;
+  }
+
+  /** @param {string[]} names of other measures */
+  offer(names) {
+    const select = byId("across");
+    const before = select.value;
+    byId("trade").hidden = !names.length;
+    select.replaceChildren(...names.map((name) => element("option", { value: name }, name)));
+    if (names.includes(before)) select.value = before;
+    this.clear("");
+  }
+
+  /** @param {string} why what is drawn no longer holds */
+  clear(why) {
+    this.asking?.abort();
+    byId("front").replaceChildren();
+    byId("front-state").textContent = why;
+  }
+
+  /** @param {{edits: any[], held: any[]}} asked the state that it is drawn for */
+  async draw(asked) {
+    this.clear("The first point is being computed.");
+    const mine = new AbortController();
+    this.asking = mine;
+    /** @type {import("./front.js").Point[]} */
+    const points = [];
+    const across = byId("across").value;
+    try {
+      await listen("front", { ...asked, across }, (told) => this.add(told, points, across), mine.signal);
+      const held = asked.held.length ? "; what is not affine is held as it is" : "";
+      byId("front-state").textContent = `${points.length} points, done${held}`;
+    } catch (error) {
+      if (error.name !== "AbortError") throw error;
+    }
+  }
+
+  /**
+   * @param {any} told
+   * @param {import("./front.js").Point[]} points
+   * @param {string} across
+   */
+  add(told, points, across) {
+    if (told.error) throw new Refusal(told.error);
+    if (!told.text) return;
+    points.push(told);
+    byId("front-state").textContent = `${points.length} points`;
+    drawFront(byId("front"), points, across, this.picked);
+  }
+}

@@ -1,0 +1,76 @@
+// What the page says of the optimum: what is proven, what is being computed, and why there is none.
+import { byId, element } from "./parts.js";
+
+/**
+ * @param {any} answer
+ */
+export function tellOptimum(answer) {
+  const place = byId("optimum");
+  place.dataset.stage = answer.stage;
+  place.dataset.value = answer.optimum ? String(answer.optimum.value) : "";
+  place.dataset.bound = answer.optimum ? String(answer.optimum.bound) : "";
+  place.dataset.proof = answer.optimum ? answer.optimum.proof : "";
+  place.replaceChildren(...words(answer));
+}
+
+/** @param {any} answer */
+function words(answer) {
+  if (answer.conflict?.length) return [conflict(answer.conflict)];
+  const own = answer.optimum;
+  if (!own) return [answer.message || given(answer)];
+  const lead = [element("strong", {}, `Optimum ${own.text}`), ` ${own.name}, `];
+  const share = `${(100 * own.gap).toPrecision(2)} %`;
+  if (own.proof === "global") return [...lead, element("span", { class: "proven" }, `proven: no design has less than ${own.boundText}`)];
+  const found = answer.stage === "settled"
+    ? `found; no design has less than ${own.boundText} (gap ${share}${own.proof === "local" ? ", a local optimum" : ""})`
+    : `at ${share} from its bound so far: no design has less than ${own.boundText}; being proven`;
+  return [...lead, element("span", { class: "pending" }, found)];
+}
+
+/** @param {any} answer */
+function given(answer) {
+  return answer.given ? `${answer.given.name} ${answer.given.text} as given; the optimum is being computed` : "The optimum is being computed";
+}
+
+/** @param {string[]} names */
+function conflict(names) {
+  const told = names.map((name) => `'${name}'`).join(" and ");
+  const why = names.length > 1 ? `${told} contradict each other` : `${told} cannot be met within the bounds`;
+  return element("strong", { class: "infeasible" }, `No design exists: ${why}. Move one of the limits.`);
+}
+
+/**
+ * Say how long the whole problem is being solved.
+ * @param {any} optimum
+ * @returns {() => void} what ends it
+ */
+export function busy(optimum) {
+  const place = byId("optimum");
+  const said = element("span", { class: "pending", id: "busy" });
+  const began = performance.now();
+  const timer = setInterval(() => {
+    const seconds = (performance.now() - began) / 1000;
+    said.textContent = seconds < 1 ? "" : ` ${optimum ? "Proving" : "Solving"}: ${seconds.toFixed(0)} s.`;
+    if (!said.isConnected) place.append(said);
+  }, 250);
+  return () => {
+    clearInterval(timer);
+    said.remove();
+  };
+}
+
+/** @param {string} text one line, or nothing where all is well */
+export function complain(text) {
+  const place = byId("complaint");
+  place.hidden = !text;
+  place.textContent = text;
+}
+
+/** @param {string | null} file */
+export function tellGone(file) {
+  const banner = byId("banner");
+  banner.hidden = false;
+  banner.dataset.gone = "true";
+  banner.textContent = "The server of this page has ended. Sliders of weights still move the forces; limits, speed, load, crank and " +
+    `mounts do not. Start it again with: laufruhe page ${file || ""}`;
+}

@@ -1,0 +1,70 @@
+"""Designs, limits and figures as a page is told of them: JSON that every browser reads."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from laufruhe.present.numbers import figure, price_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.solvers.conclusion import decision_values
+from laufruhe.solvers.result import LimitValue
+
+
+def as_text(found: dict[str, Any]) -> str:
+    """As JSON; a model is JSON already, and what is no finite number is null."""
+    told = {key: entry for key, entry in found.items() if key != "model"}
+    text = json.dumps(_finite(told), allow_nan=False)
+    return f'{text[:-1]}, "model": {found["model"]}}}' if "model" in found else text
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    return [_finite(entry) for entry in value] if isinstance(value, list | tuple) else value
+
+
+def figures(value: float, problem: Problem) -> dict[str, Any]:
+    """A value of the objective, in SI and as it is read."""
+    unit = problem.objective_unit or ""
+    return {"name": problem.objective_name, "value": value, "unit": unit, "text": figure(value, unit, 5)}
+
+
+def optimum(
+    problem: Problem, values: Sequence[Value], value: float, bound: float, gap: float, proof: str
+) -> dict[str, Any]:
+    """A design with what bounds it."""
+    entries = [e for d, v in zip(problem.decisions, values, strict=False) for e in decision_values(d, v)]
+    return {
+        **figures(value, problem),
+        "design": {entry.name: entry.value for entry in entries},
+        "bound": bound,
+        "boundText": figure(bound, problem.objective_unit or "", 5),
+        "gap": gap,
+        "proof": proof,
+    }
+
+
+def limits(found: Iterable[LimitValue], problem: Problem) -> list[dict[str, Any]]:
+    """How a design stands to its limits, and what they cost."""
+    return [_limit(limit, problem.objective_unit or "") for limit in found]
+
+
+def _limit(limit: LimitValue, of: str) -> dict[str, Any]:
+    return {
+        "name": limit.name,
+        "value": limit.value,
+        "limit": limit.limit,
+        "unit": limit.unit,
+        "side": limit.side,
+        "active": limit.active,
+        "price": limit.shadow_price,
+        "text": figure(limit.value, limit.unit),
+        "limitText": figure(limit.limit, limit.unit),
+        "priceText": price_of(limit.shadow_price, of, limit.unit),
+    }

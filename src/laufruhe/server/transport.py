@@ -1,0 +1,193 @@
+"""HTTP on the loopback: what is let in, how much of it, and how answers go out."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from laufruhe.server.guard import HEADERS, HOST, TOKEN, Guard
+
+MOST_BYTES, MOST_AT_ONCE = 64_000, 32
+"""Of a request's body; connections."""
+_TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css", "svg": "image/svg+xml"}
+_JSON = "application/json"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a request gets: text, or lines that come as they are made."""
+
+    text: str = ""
+    lines: Iterator[str] | None = None
+    status: HTTPStatus = HTTPStatus.OK
+
+
+Handle = Callable[[Any], Answer]
+
+
+class Server(ThreadingHTTPServer):
+    """Threads for the requests of one page; nobody beyond this machine reaches it.
+
+    Parameters
+    ----------
+    port
+        To listen on; any that is free when 0.
+    files
+        Texts that are handed out, by their names.
+    """
+
+    daemon_threads = True
+    block_on_close = False
+    request_queue_size = MOST_AT_ONCE
+
+    def __init__(self, port: int, files: Mapping[str, str]) -> None:
+        super().__init__((HOST, port), Request)
+        self.port: int = self.server_address[1]
+        self.guard = Guard(self.port)
+        self.files = {f"/{name}": text.encode() for name, text in files.items()}
+        self.handles: dict[str, Handle] = {}
+        self._room = threading.BoundedSemaphore(MOST_AT_ONCE)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """In a thread of its own; where there are too many, the connection is closed."""
+        if not self._room.acquire(blocking=False):
+            self.shutdown_request(request)
+            return
+        super().process_request(request, client_address)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """One connection."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._room.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Who has gone away is no error; nothing of a request is ever written to a log."""
+
+    def server_bind(self) -> None:
+        """Bind, and look up no name."""
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self.socket.bind(self.server_address)
+        self.server_address = self.socket.getsockname()
+        self.server_name, self.server_port = HOST, self.server_address[1]
+
+
+class Request(BaseHTTPRequestHandler):
+    """One connection of a page."""
+
+    protocol_version = "HTTP/1.1"
+    server_version = "laufruhe"
+    sys_version = ""
+    timeout = 30.0
+    disable_nagle_algorithm = True
+    wbufsize = -1
+    server: Server
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing: a log may be read by others."""
+
+    def do_GET(self) -> None:
+        """The page and its files, which hold nothing of the problem."""
+        path = "/page.html" if self.path == "/" else self.path
+        refusal = self.server.guard.refusal("GET", self._headers())
+        if refusal:
+            self._refused(HTTPStatus.FORBIDDEN, refusal)
+        elif path not in self.server.files:
+            self._refused(HTTPStatus.NOT_FOUND, "no such page")
+        else:
+            kind = _TYPES[path.rsplit(".", 1)[1]]
+            self._send(HTTPStatus.OK, self.server.files[path], f"{kind}; charset=utf-8")
+
+    def do_POST(self) -> None:
+        """What computes, for whoever has the token; a ticket is exchanged for it."""
+        guard = self.server.guard
+        refusal = guard.refusal("POST", self._headers())
+        if refusal:
+            self._refused(HTTPStatus.FORBIDDEN, refusal)
+        elif self.path != "/token" and not guard.knows(self.headers.get(TOKEN)):
+            self._refused(HTTPStatus.UNAUTHORIZED, "open the page by the address that laufruhe printed")
+        elif self.path != "/token" and self.path not in self.server.handles:
+            self._refused(HTTPStatus.NOT_FOUND, "no such request")
+        else:
+            body = self._body()
+            if body is not None:
+                self._answer(self._exchanged(body) if self.path == "/token" else self.server.handles[self.path](body))
+
+    def _headers(self) -> Mapping[str, str]:
+        # two of one name are as good as a wrong one
+        found = {name: self.headers.get_all(name, []) for name in ("Host", "Origin", "Sec-Fetch-Site")}
+        return {name: given[0] if len(given) == 1 else "?" for name, given in found.items() if given}
+
+    def _body(self) -> Any:
+        """What was sent, as JSON; None where it was refused."""
+        told = self.headers.get("Content-Length", "")
+        if self.headers.get("Transfer-Encoding") is not None or not told.isdecimal() or len(told) > 9:
+            return self._refused(HTTPStatus.LENGTH_REQUIRED, "tell the length of the request")
+        if int(told) > MOST_BYTES:
+            return self._refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"at most {MOST_BYTES} bytes are read")
+        if self.headers.get_content_type() != _JSON:
+            return self._refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send JSON")
+        try:
+            found = json.loads(self.rfile.read(int(told)), parse_constant=_no_number)
+        except (ValueError, RecursionError):
+            return self._refused(HTTPStatus.BAD_REQUEST, "is no JSON")
+        return found if found is not None else self._refused(HTTPStatus.BAD_REQUEST, "is nothing")
+
+    def _exchanged(self, body: Any) -> Answer:
+        ticket = body.get("ticket") if isinstance(body, dict) else None
+        token = self.server.guard.exchanged(ticket) if isinstance(ticket, str) else None
+        if token is None:
+            text = json.dumps({"error": "this address was used before; take the one that laufruhe printed"})
+            return Answer(text, status=HTTPStatus.UNAUTHORIZED)
+        return Answer(json.dumps({"token": token}))
+
+    def _answer(self, answer: Answer) -> None:
+        if answer.lines is None:
+            self._send(answer.status, answer.text.encode(), _JSON)
+            return
+        self.close_connection = True
+        self._begin(HTTPStatus.OK, "application/x-ndjson")
+        self.send_header("Connection", "close")
+        self.end_headers()
+        with suppress(OSError):
+            for line in answer.lines:
+                self.wfile.write(line.encode() + b"\n")
+                self.wfile.flush()
+        close = getattr(answer.lines, "close", None)
+        if close is not None:
+            close()
+
+    def _begin(self, status: HTTPStatus, kind: str) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        for name, value in HEADERS.items():
+            self.send_header(name, value)
+
+    def _send(self, status: HTTPStatus, body: bytes, kind: str) -> None:
+        with suppress(OSError):
+            self._begin(status, kind)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+            self.wfile.flush()
+
+    def _refused(self, status: HTTPStatus, why: str) -> None:
+        # what was sent is not read, so nothing may follow it
+        self.close_connection = True
+        self._send(status, json.dumps({"error": why}).encode(), _JSON)
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:  # noqa: ARG002
+        """What http.server itself refuses, in the same words and under the same headers."""
+        self._refused(HTTPStatus(code), message or HTTPStatus(code).phrase)
+
+
+def _no_number(_: str) -> float:
+    raise ValueError("is no number")

@@ -1,0 +1,138 @@
+"""The optimum of unbalances while a limit is moved: one cone program at few angles, in milliseconds (P1, P4).
+
+Rows hang on the engine alone, so they are made once. A limit that is moved changes one number of the program. What is
+found is a design, its value at twice as many angles, and a bound that holds for the whole cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineModel, AffineProblem
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.prove.certificate import best_bound, gap_of
+from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conic import solve_cones
+from laufruhe.solvers.equations import on_grid
+from laufruhe.solvers.unbalances import conflict_of, settled
+
+Array = NDArray[np.float64]
+
+FEW_ANGLES = 48
+"""Over the period of the loads, where the problem itself takes more."""
+TIMES = 2
+_FOLLOWED = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A design under limits that are being moved.
+
+    Attributes
+    ----------
+    values
+        Of the decisions; empty where no design exists.
+    value, bound
+        Objective at the angles looked at, and what no design allowed goes under [SI].
+    gap
+        Share of the value that is not proven.
+    standing, prices
+        Of every limit in turn the value of its measure, and the fall of the objective per unit by which it is relaxed.
+    conflict
+        Names of limits that cannot be met together, proven for the whole cycle.
+    """
+
+    values: tuple[Value, ...]
+    value: float
+    bound: float
+    gap: float
+    standing: tuple[float, ...]
+    prices: tuple[float, ...]
+    conflict: tuple[str, ...] = ()
+
+
+def can_follow(problem: Problem) -> bool:
+    """Whether all that is open is what loads are affine in, of the drawing, and a norm of theirs is minimised."""
+    kinds = {decision.kind for decision in problem.decisions}
+    told = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
+    alone = problem.over is None and problem.assembly is None and problem.phasing is None
+    return bool(kinds) and kinds <= _FOLLOWED and told and alone
+
+
+class Follower:
+    """The optimum of one problem, its limits at any place.
+
+    Parameters
+    ----------
+    problem
+        That `can_follow`.
+
+    Raises
+    ------
+    ModelError
+        If its loads are not affine in what is open.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._model = model = AffineModel(problem)
+        self._nothing = nothing_of(problem)
+        self.samples = min(model.full_samples, FEW_ANGLES)
+        self._coarse = model.at(self.samples)
+        self._fine = model.at(TIMES * self.samples)
+        self._whole = model.at(TIMES * self.samples, averaged=True)
+
+    def at(self, limits: Sequence[Limit]) -> Followed:
+        """The least value under the problem's limits, each at the place that is given here."""
+        moved = {limit.measure: limit for limit in limits if limit.maximum < np.inf}
+        coarse, fine, whole = (self._under(rows, moved) for rows in (self._coarse, self._fine, self._whole))
+        names = [limit.name for limit in self._problem.load_limits]
+        found = solve_cones(coarse)
+        if found.x is None:
+            # rows that are never more than what they stand for: where these contradict each other, the cycle does
+            found = solve_cones(whole)
+            if found.x is None:
+                return _none(conflict_of(whole, names))
+            bound = best_bound(whole, found.x, found.multipliers)
+        else:
+            found = replace(found, x=settled(self._problem, fine, found.x))
+            assert found.x is not None
+            bound = best_bound(whole, found.x, on_grid(coarse, whole, found.multipliers))
+        assert found.x is not None
+        x, value = found.x, fine.objective(found.x)
+        price = dict(zip(names, bound.multipliers.shadow_prices(whole), strict=True))
+        stands = {name: norm.value(x) for name, (_, norm) in zip(names, fine.limits, strict=True)}
+        broken = tuple(n for n, (most, norm) in zip(names, fine.limits, strict=True) if _breaks(norm.value(x), most))
+        idle = [n for n, (_, norm) in zip(names, fine.limits, strict=True) if not norm.slope.any()]
+        if set(broken) & set(idle):
+            return _none(tuple(n for n in broken if n in idle))
+        return Followed(
+            values=tuple(domain.complex_value(x) for domain in self._model.domains),
+            value=value,
+            bound=bound.value,
+            gap=gap_of(value, bound.value, self._nothing),
+            standing=tuple(stands.get(limit.name, np.nan) for limit in limits),
+            prices=tuple(price.get(limit.name, 0.0) for limit in limits),
+        )
+
+    def _under(self, rows: AffineProblem, moved: Mapping[Measure, Limit]) -> AffineProblem:
+        own = zip(self._problem.load_limits, rows.limits, strict=True)
+        return replace(
+            rows, limits=tuple((moved[x.measure].maximum if x.measure in moved else most, n) for x, (most, n) in own)
+        )
+
+
+def _breaks(value: float, maximum: float) -> bool:
+    return value > maximum * (1.0 + KEPT)
+
+
+def _none(conflict: tuple[str, ...]) -> Followed:
+    return Followed((), np.inf, np.inf, 0.0, (), (), conflict)

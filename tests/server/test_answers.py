@@ -1,0 +1,177 @@
+"""What a page is answered is what the commands find, and nothing is reached that it was not offered."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import laufruhe
+from laufruhe.files.complaints import Refused
+from laufruhe.files.reader import load, tables_of
+from laufruhe.server import answers
+from laufruhe.server.answers import Source
+from laufruhe.server.asked import Asked, Edit
+from problem_files import PROBLEMS
+
+LANCHESTER, VEE = PROBLEMS / "tractor-four-lanchester.toml", PROBLEMS / "vee-eight-open.toml"
+TIGHT = Edit("set", "constraints.1.max", "0.5 kg")
+
+
+@cache
+def source(path: Path) -> Source:
+    return Source(tables_of(path), path)
+
+
+def follow(path: Path, **state: Any) -> dict[str, Any]:
+    return json.loads(answers.follow(source(path), Asked(**state)))  # type: ignore[no-any-return]
+
+
+def settle(path: Path, **state: Any) -> dict[str, Any]:
+    return json.loads(answers.settle(source(path), Asked(**state), 60.0))  # type: ignore[no-any-return]
+
+
+@pytest.fixture(scope="module")
+def tight() -> dict[str, Any]:
+    return settle(LANCHESTER, edits=(TIGHT,))
+
+
+def test_what_follows_brackets_what_is_proven(tight: dict[str, Any]) -> None:
+    found = follow(LANCHESTER, edits=(TIGHT,))
+    proven = tight["optimum"]
+    assert tight["status"] == "optimal"
+    assert found["stage"] == "following"
+    assert found["optimum"]["bound"] <= proven["value"] * (1 + 1e-6)
+    assert found["optimum"]["value"] == pytest.approx(proven["value"], rel=2e-3)
+    assert found["optimum"]["proof"] == "global within gap"
+    (limit,) = found["limits"]
+    assert limit["active"]
+    assert limit["price"] == pytest.approx(tight["limits"][0]["price"], rel=0.02)
+    assert limit["value"] <= 0.5 * (1 + 1e-6)
+
+
+def test_what_is_proven_is_what_the_command_finds(tight: dict[str, Any]) -> None:
+    result = laufruhe.solve(load(LANCHESTER).with_values({"constraints.balancer mass.max": "0.5 kg"}))
+    assert result.objective is not None
+    assert tight["optimum"]["value"] == pytest.approx(result.objective.value, rel=1e-9)
+    assert tight["optimum"]["design"] == pytest.approx({d.name: d.value for d in result.decisions})
+
+
+def test_a_model_is_sent_once_and_again_where_loads_are_others() -> None:
+    first = follow(LANCHESTER)
+    assert {"model", "engine", "partners"} <= set(first)
+    assert "model" not in follow(LANCHESTER, has=first["key"], edits=(TIGHT,))
+    faster = follow(LANCHESTER, has=first["key"], edits=(Edit("set", "operating_points.1.speed", "3000 rpm"),))
+    assert faster["model"]["designs"]["given"] != first["model"]["designs"]["given"]
+    assert faster["optimum"]["value"] > first["optimum"]["value"]
+
+
+def test_limits_that_contradict_each_other_are_named() -> None:
+    tables = {**tables_of(LANCHESTER)}
+    tables["constraints"] = [*tables["constraints"], {"limit": "maximum mount force", "max": "600 N"}]
+    of = Source(tables, LANCHESTER)
+    edits = (Edit("set", "constraints.1.max", "0.05 kg"),)
+    for found in (
+        json.loads(answers.follow(of, Asked(edits))),
+        json.loads(answers.settle(of, Asked(edits), 60.0)),
+    ):
+        assert found["optimum"] is None
+        assert sorted(found["conflict"]) == ["balancer mass", "maximum mount force"]
+        assert len(found["limits"]) == 2
+    assert json.loads(answers.follow(of, Asked()))["optimum"] is not None
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (Edit("set", "operating_points.1.speed", "fast"), "is not a number"),
+        (Edit("set", "operating_points.1.speed", "-3 rpm"), "operating_points"),
+        (Edit("set", "engine.rod_ratio", 1.2), "rod_ratio"),
+        (Edit("star", "star", {"throws": [0, 90]}), "engine"),
+        (Edit("first", "objective", 3), "objective"),
+    ],
+)
+def test_a_bad_state_is_one_line(edit: Edit, said: str) -> None:
+    found = follow(LANCHESTER, edits=(edit,))
+    assert set(found) == {"error"}
+    assert said in found["error"]
+    assert len(found["error"].splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["title", "gas.model", "gas.file", "engine.layout", "mounts.positions.1", "assembly"])
+def test_numbers_that_were_not_offered_are_refused(name: str) -> None:
+    found = follow(LANCHESTER, edits=(Edit("set", name, "../../etc/passwd"),))
+    assert "is not offered" in found["error"]
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        [], {"more": 1}, {"edits": {}}, {"edits": [["set", "x"]]}, {"edits": [["run", "x", 1]]},
+        {"edits": [["set", 1, 1]]}, {"edits": [["set", "x", [[[1]]]]]}, {"edits": [["set", "x", "1" * 101]]},
+        {"edits": [["set", "x", 1]] * 301}, {"edits": [["set", "x", True]]}, {"has": "x" * 101}, {"design": {"a": "b"}},
+        {"design": []}, {"edits": [["set", "x", {"a": {"b": 1}}]]},
+    ],
+)  # fmt: skip
+def test_what_no_page_asks_is_refused(given: object) -> None:
+    with pytest.raises(Refused):
+        Asked.of(given)
+
+
+def test_what_a_page_asks_is_read() -> None:
+    given = {"edits": [["set", "a", "1 kg"]], "held": [["star", "star", {"throws": [0, 180]}]], "design": {"b": 2}}
+    asked = Asked.of(given)
+    assert asked.edits == (Edit("set", "a", "1 kg"),)
+    assert asked.held[0].value == {"throws": [0, 180]}
+    assert asked.design == {"b": 2.0}
+
+
+@pytest.mark.slow
+def test_a_crank_is_ranked_held_and_chosen() -> None:
+    found = settle(VEE)
+    assert len(found["ranking"]) == 5
+    assert found["optimum"]["value"] == pytest.approx(found["ranking"][0]["value"], rel=1e-4)
+    held = tuple(Edit(*edit) for edit in found["held"])
+    following = follow(VEE, held=held)["optimum"]
+    assert following["bound"] <= found["optimum"]["value"] <= following["value"] * (1 + 1e-3)
+    second = found["ranking"][1]
+    chosen = settle(VEE, edits=(Edit("star", "star", second["orders"][0]["star"]),))
+    assert chosen["optimum"]["value"] == pytest.approx(second["value"], rel=1e-4)
+    assert chosen["ranking"] == []
+
+
+def test_a_given_crank_may_be_opened() -> None:
+    problem = load(LANCHESTER)
+    assert problem.phasing is None
+    asked = Asked(edits=(Edit("open crank", "crank", True),))
+    tables = asked.tables(source(LANCHESTER).tables, with_held=True)
+    assert load(tables).phasing is not None
+
+
+def test_the_state_is_saved_as_a_problem_that_evaluates_alike(tight: dict[str, Any], tmp_path: Path) -> None:
+    asked = Asked(edits=(TIGHT,), design=tight["optimum"]["design"])
+    told = json.loads(answers.save(source(LANCHESTER), asked))
+    path = tmp_path / told["file"]
+    path.write_text(told["toml"], encoding="utf-8")
+    found = laufruhe.evaluate(path)
+    assert found.objective is not None
+    # at fewer angles than it was proven at
+    assert found.objective.value == pytest.approx(tight["optimum"]["value"], rel=1e-5)
+    assert found.problem.limits[0].maximum == pytest.approx(0.5)
+    assert len(found.problem.decisions) == len(load(LANCHESTER).decisions)
+
+
+def test_a_front_comes_as_a_whole_first_and_no_point_is_dominated() -> None:
+    points = [json.loads(answers.front(source(LANCHESTER), Asked(), "balancer mass", k)) for k in range(9)]
+    by_mass = sorted(points, key=lambda point: point["across"])
+    assert {by_mass[0]["across"], by_mass[-1]["across"]} == {point["across"] for point in points[:2]}
+    values = [point["value"] for point in by_mass]
+    assert values == sorted(values, reverse=True)
+    assert all(point["bound"] <= point["value"] for point in points)
+    # the optimum under a limit is on the front of that limit
+    found = follow(LANCHESTER, edits=(Edit("set", "constraints.1.max", f"{by_mass[4]['across']!r} kg"),))
+    assert found["optimum"]["value"] == pytest.approx(by_mass[4]["value"], rel=1e-4)
+    assert "is no measure" in json.loads(answers.front(source(LANCHESTER), Asked(), "beauty", 0))["error"]

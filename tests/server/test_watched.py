@@ -1,0 +1,63 @@
+"""A file that changes under a page: the last good state stays, and the line that is wrong is told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from laufruhe.errors import InputError
+from laufruhe.server.watched import Watched
+from problem_files import FOUR, MOUNTS, written
+
+TEXT = FOUR + '[[operating_points]]\nspeed = "2500 rpm"\n' + MOUNTS
+PATIENCE = 20.0
+
+
+@pytest.fixture
+def watched(tmp_path: Path) -> Iterator[Watched]:
+    made = Watched(written(tmp_path, TEXT))
+    made.start()
+    yield made
+    made.close()
+
+
+def test_changes_are_told_and_what_is_wrong_leaves_the_last_good_state(watched: Watched) -> None:
+    first = watched.source
+    watched.path.write_text(TEXT.replace('"2500 rpm"', "2500 rpm"), encoding="utf-8")
+    assert watched.later(1, PATIENCE) == 2
+    assert watched.source is first
+    line = TEXT.splitlines().index('speed = "2500 rpm"') + 1
+    assert f"at line {line}" in watched.complaint
+    watched.path.write_text(TEXT.replace("2500", "10000000"), encoding="utf-8")
+    assert watched.later(2, PATIENCE) == 3
+    assert "rpm" in watched.complaint or watched.source is not first
+    watched.path.write_text(TEXT.replace("2500", "2600"), encoding="utf-8")
+    assert watched.later(3, PATIENCE) == 4
+    assert watched.complaint == ""
+    assert watched.source.tables["operating_points"][0]["speed"] == "2600 rpm"
+    watched.path.unlink()
+    assert watched.later(4, PATIENCE) == 5
+    assert "does not exist" in watched.complaint
+
+
+def test_who_waits_is_let_go_when_nothing_is_served_any_more(watched: Watched) -> None:
+    watched.close()
+    assert watched.later(watched.version, PATIENCE) == watched.version
+    assert watched.is_closed
+
+
+def test_what_cannot_be_read_is_not_served(tmp_path: Path) -> None:
+    with pytest.raises(InputError):
+        Watched(tmp_path / "missing.toml")
+
+
+@pytest.mark.parametrize("name", ["../trace.csv", "/etc/passwd", "inner/../../trace.csv"])
+def test_nothing_beyond_the_folder_is_read(name: str, tmp_path: Path) -> None:
+    (tmp_path / "trace.csv").write_text("0, 1\n360, 2\n", encoding="utf-8")
+    folder = tmp_path / "own"
+    folder.mkdir()
+    gas = f'[gas]\nmodel = "trace"\nfile = "{name}"\n'
+    with pytest.raises(InputError, match=r"gas\.file = .*outside the folder of the problem"):
+        Watched(written(folder, TEXT + gas))
