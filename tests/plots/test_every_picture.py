@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from scipy.optimize import isotonic_regression
 
 from cli import scenes
 from lanes import first_fast
@@ -114,6 +115,16 @@ def test_places_are_spread_as_little_as_may_be() -> None:
     assert moved == pytest.approx([0.46, 0.56, 0.9, 0.1])
     assert np.diff(np.sort(spread(np.full(9, 1.0), 0.1))) == pytest.approx(np.full(8, 0.1))
     assert spread(np.full(9, 1.0), 0.1).max() <= 1.0 + 1e-12
+    assert spread(np.array([]), 0.1).size == 0
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 30])
+def test_spread_places_are_moved_by_the_least_squares(count: int) -> None:
+    """As another library finds it."""
+    places = np.sort(np.random.default_rng(count).random(count))
+    steps = 0.01 * np.arange(count)
+    other = np.clip(isotonic_regression(places - steps).x, 0.0, 1.0 - steps[-1]) + steps
+    assert spread(places, 0.01) == pytest.approx(other, abs=1e-12)
 
 
 def test_words_are_set_as_print_sets_them() -> None:

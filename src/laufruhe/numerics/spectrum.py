@@ -140,8 +140,10 @@ class Spectrum:
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at any crank angles [rad], shape (len(angles), ...)."""
-        waves = np.exp(1j * np.outer(angles, self.orders))
-        found = np.asarray(np.tensordot(waves, self.smooth.coefficients, axes=(1, 0)).real)
+        smooth = self.smooth.coefficients
+        used = np.flatnonzero(smooth.reshape(len(smooth), -1).any(axis=1))
+        waves = np.exp(1j * np.outer(angles, self.orders[used]))
+        found = np.asarray(np.tensordot(waves, smooth[used], axes=(1, 0)).real)
         return found if self.corners is None else found + self.corners.values(angles, self.period)
 
     @property

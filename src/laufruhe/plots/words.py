@@ -18,7 +18,6 @@ from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
-from scipy.optimize import isotonic_regression
 
 Array = NDArray[np.float64]
 INK, FAINT = "#222222", "#5c5c5c"
@@ -95,10 +94,22 @@ def spread(places: Array, least: float, low: float = 0.0, high: float = 1.0) -> 
         return places
     order = np.argsort(places, kind="stable")
     steps = least * np.arange(len(places))
-    moved = np.clip(isotonic_regression(places[order] - steps).x, low, max(high - steps[-1], low))
+    moved = np.clip(_rising(places[order] - steps), low, max(high - steps[-1], low))
     found = np.empty(len(places))
     found[order] = moved + steps
     return found
+
+
+def _rising(values: Array) -> Array:
+    """The nearest values that nowhere fall, by least squares: neighbours that fall share their mean."""
+    shared: list[tuple[float, int]] = []
+    for value in values:
+        mean, count = float(value), 1
+        while shared and shared[-1][0] > mean:
+            other, many = shared.pop()
+            mean, count = (mean * count + other * many) / (count + many), count + many
+        shared.append((mean, count))
+    return np.repeat([mean for mean, _ in shared], [count for _, count in shared])
 
 
 def beside(axes: Axes, heights: Sequence[float], texts: Sequence[str], size: float = SMALL) -> None:
