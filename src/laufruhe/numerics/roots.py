@@ -1,4 +1,4 @@
-"""Where a function that rises crosses zero, without a library that takes longer to load than a small problem takes."""
+"""Where something changes, without a library that takes longer to load than a small problem takes."""
 
 from __future__ import annotations
 
@@ -24,3 +24,11 @@ def rising_root(function: Callable[[float], float], below: float, above: float) 
         else:
             above = middle
     return below
+
+
+def parted(holds: Callable[[float], bool], start: float, end: float, halvings: int) -> tuple[float, float]:
+    """Where what holds from a start on ends: the last place known to hold, and the first known not to."""
+    for _ in range(halvings):
+        middle = 0.5 * (start + end)
+        start, end = (middle, end) if holds(middle) else (start, middle)
+    return start, end

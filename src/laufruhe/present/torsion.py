@@ -10,6 +10,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.roots import parted
 from laufruhe.physics.torsion import (
     TorsionalModes,
     chain_of,
@@ -210,7 +211,5 @@ def _ranges(is_barred: Callable[[float], bool], speeds: Array) -> list[tuple[flo
 
 def _edge(is_barred: Callable[[float], bool], low: float, high: float, after: bool) -> float:
     """Where it changes between two speeds: the end that is barred, so that none is left out."""
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if is_barred(middle) == after else (middle, high)
+    low, high = parted(lambda speed: is_barred(speed) != after, low, high, _HALVINGS)
     return low if after else high

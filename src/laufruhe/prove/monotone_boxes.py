@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.numerics.roots import parted
 from laufruhe.prove.best_first import Box, Division, Parts, Waiting, halves, widest
 
 Array = NDArray[np.float64]
@@ -172,10 +173,7 @@ def _last(broken: Callable[[float], bool], start: float, end: float) -> float:
     """How far from its start a side may be cut: the last place known to be broken, or the start where nothing is."""
     if start == end or not broken(start):
         return start
-    for _ in range(CUTS):
-        middle = 0.5 * (start + end)
-        start, end = (middle, end) if broken(middle) else (start, middle)
-    return start
+    return parted(broken, start, end, CUTS)[0]
 
 
 def _designs(problem: OneWayProblem, lower: Array, upper: Array) -> Sequence[Array]:
@@ -203,7 +201,4 @@ def _edge(holds: Callable[[float], bool], start: float, end: float) -> float | N
         return start
     if not holds(end):
         return None
-    for _ in range(HALVINGS):
-        middle = 0.5 * (start + end)
-        start, end = (start, middle) if holds(middle) else (middle, end)
-    return end
+    return parted(lambda x: not holds(x), start, end, HALVINGS)[1]

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from laufruhe.machine import Flywheel
 from laufruhe.problem.decision import Numbers, moved_numbers
 from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.measure import Limit, Measure, Side
+from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
-from laufruhe.prove.monotone_boxes import Divided, OneWay, OneWayProblem, divided
-from laufruhe.solvers.conclusion import Shown, concluded, judged, none_within
+from laufruhe.prove.monotone_boxes import OneWay, OneWayProblem, divided
+from laufruhe.solvers.conclusion import concluded, judged, none_within
+from laufruhe.solvers.conflicts import smallest_conflict
+from laufruhe.solvers.local_programs import LocalProgram, shown
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -25,8 +26,6 @@ Array = NDArray[np.float64]
 WIDTH = "flywheel.width"
 # boxes close in fast where the sum goes one way: at so small a share of the tolerance limits hold the design
 SHARPER = 1e-3
-# a limit, and a bound, that is met to this share holds the design; step of a slope
-HELD, STEP = 1e-6, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,19 +67,20 @@ class _Coordinates:
         """The decisions of a point."""
         if self.width is None:
             return x
-        return np.clip(np.insert(x[:-1], self.width, self.wheel(x).ring.width), *self._bounds)
+        return np.clip(np.insert(x[:-1], self.width, self.wheel(x).ring.width), *self.bounds)
 
     def _width(self, sign: float, ways: Array) -> OneWay:
         return OneWay(lambda x: sign * self.wheel(x).ring.width, sign * ways)
 
     @property
-    def _bounds(self) -> tuple[Array, Array]:
+    def bounds(self) -> tuple[Array, Array]:
+        """Of the decisions."""
         decisions = self.problem.decisions
         return np.array([d.lower for d in decisions]), np.array([d.upper for d in decisions])
 
     def asked(self, initial: Evaluation, limits: Sequence[Limit]) -> OneWayProblem:
         """What is asked as functions of these coordinates: at an even speed the flywheel moves nothing else."""
-        lower, upper = self._bounds
+        lower, upper = self.bounds
         width: list[tuple[float, OneWay]] = []
         if self.width is not None:
             ways = np.array([*(-1.0 for _ in lower[1:]), 1.0])
@@ -108,6 +108,18 @@ class _Coordinates:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class _WheelProgram(LocalProgram):
+    """Objective and rooms of the flywheel alone."""
+
+    asked: OneWayProblem
+
+    def numbers(self, shares: Array) -> Array:
+        """The objective, then the relative room under each limit."""
+        x = np.array(self.values(shares))
+        return np.array([self.asked.value(x), *(1.0 - number.value(x) / most for most, number in self.asked.limits)])
+
+
 def solve_flywheel(problem: Problem) -> Result:
     """The best flywheel, proven; or the limits that no flywheel within its bounds keeps."""
     started = time.perf_counter()
@@ -117,53 +129,18 @@ def solve_flywheel(problem: Problem) -> Result:
     timing = {"solve": time.perf_counter() - started}
     if found.x is None:
         return none_within(problem, initial, _conflict(problem, initial, boxes), timing)
-    x = boxes.decided(found.x)
-    plain = _Coordinates.of(problem, weighs=False).asked(initial, problem.limits)
-    return concluded(judged(problem, x.tolist()), initial, _shown(problem, plain, found, x), timing)
+    design, whole = judged(problem, boxes.decided(found.x).tolist()), _Coordinates.of(problem, weighs=False)
+    program = _WheelProgram(problem, *whole.bounds, whole.asked(initial, problem.limits))
+    unfinished = "" if found.complete else ", some of them not finished"
+    method = f"monotone quantities, bounded on {found.boxes} boxes of the flywheel's numbers{unfinished}"
+    proof = shown(program, design, program.shares(design.values), found.bound, Reach.WHOLE, method)
+    return concluded(design, initial, proof, timing)
 
 
 def _conflict(problem: Problem, initial: Evaluation, boxes: _Coordinates) -> tuple[str, ...]:
-    """A smallest set of limits that no flywheel keeps together."""
-    kept = list(problem.limits)
-    for limit in problem.limits:
-        without = [other for other in kept if other is not limit]
-        # nothing is minimised, so the first design found ends it
-        if divided(replace(boxes.asked(initial, without), terms=()), problem.tolerance).x is None:
-            kept = without
-    return tuple(limit.name for limit in kept)
+    """Limits that no flywheel keeps together: nothing is minimised, so the first design found ends it."""
 
+    def excluded(kept: Sequence[Limit]) -> bool:
+        return divided(replace(boxes.asked(initial, kept), terms=()), problem.tolerance).x is None
 
-def _shown(problem: Problem, asked: OneWayProblem, found: Divided, x: Array) -> Shown:
-    """Bound, multipliers and how far they are from balance (T9)."""
-    widths = asked.upper - asked.lower
-    own = _slope(asked.value, x, asked, widths)
-    held = [
-        (limit, _slope(number.value, x, asked, widths))
-        for limit, (maximum, number) in zip(problem.limits, asked.limits, strict=True)
-        if number.value(x) >= maximum * (1.0 - HELD)
-    ]
-    low, high = (np.abs(x - edge) <= HELD * widths for edge in (asked.lower, asked.upper))
-    sides = [sign * np.eye(len(x))[k] for mask, sign in ((low, -1.0), (high, 1.0)) for k in np.flatnonzero(mask)]
-    size = float(np.abs(own).max()) or 1.0
-    columns = [*(slope / (float(np.abs(slope).max()) or 1.0) for _, slope in held), *sides]
-    shares, rest = nnls(np.column_stack(columns), -own / size) if columns else (np.zeros(0), float(np.abs(own).max()))
-    prices: dict[Side, float] = {}
-    left = own.copy()
-    for (limit, slope), share in zip(held, shares, strict=False):
-        price = float(share) * size / (float(np.abs(slope).max()) or 1.0)
-        prices[limit, "at most"] = price
-        left = left + price * slope
-    slopes = {d.name: np.array([left[k] / widths[k]]) for k, d in enumerate(problem.decisions)}
-    unfinished = "" if found.complete else ", some of them not finished"
-    method = f"monotone quantities, bounded on {found.boxes} boxes of the flywheel's numbers{unfinished}"
-    return Shown(found.bound, Reach.WHOLE, float(rest), method, prices, slopes)
-
-
-def _slope(value: Callable[[Array], float], x: Array, asked: OneWayProblem, widths: Array) -> Array:
-    """Change of a number for each whole width of what is open."""
-    out = np.zeros(len(x))
-    for k in range(len(x)):
-        ends = [np.clip(x + sign * STEP * widths * np.eye(len(x))[k], asked.lower, asked.upper) for sign in (-1.0, 1.0)]
-        low, high = (value(end) for end in ends)
-        out[k] = (high - low) / (ends[1][k] - ends[0][k]) * widths[k]
-    return out
+    return smallest_conflict(problem.limits, excluded)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,9 @@ from laufruhe.numerics.budget import passed
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import KEPT, Design
+from laufruhe.problem.sets import Value
+from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.conclusion import KEPT, Design, Shown
 
 Array = NDArray[np.float64]
 
@@ -31,6 +33,16 @@ class LocalProgram:
     problem: Problem
     lower: Array
     upper: Array
+
+    @classmethod
+    def of(cls, problem: Problem) -> Self:
+        """Over the bounds of all that is open."""
+        ends = (np.array([getattr(decision, end) for decision in problem.decisions]) for end in ("lower", "upper"))
+        return cls(problem, *ends)
+
+    def shares(self, values: Sequence[Value] | Array) -> Array:
+        """Of the bounds, where decisions have these values."""
+        return np.asarray(np.clip((np.real(values) - self.lower) / (self.upper - self.lower), 0.0, 1.0))
 
     def values(self, shares: Array) -> list[float]:
         """Decisions."""
@@ -107,25 +119,8 @@ def _local(program: LocalProgram, place: Array) -> Array:
     return np.asarray(np.clip(found.x, 0.0, 1.0))
 
 
-@dataclass(frozen=True, eq=False)
-class Prices:
-    """Multipliers of a design.
-
-    Attributes
-    ----------
-    rest
-        How far slopes are from balance.
-    limits, slopes
-        As `Shown` has them.
-    """
-
-    rest: float
-    limits: Mapping[Side, float]
-    slopes: Mapping[str, Array]
-
-
-def priced(program: LocalProgram, design: Design, best: Array) -> Prices:
-    """Multipliers of the limits and bounds that hold a design."""
+def shown(program: LocalProgram, design: Design, best: Array, bound: float, reach: Reach, method: str) -> Shown:
+    """A bound, with multipliers of the limits and bounds that hold a design, and how far these are from balance."""
     problem = program.problem
     slopes = program.slopes(best)
     rooms = program.numbers(best)[1:]
@@ -147,4 +142,4 @@ def priced(program: LocalProgram, design: Design, best: Array) -> Prices:
         left = left - float(share) * scale / steep * slopes[1 + k]
     widths = program.upper - program.lower
     by_name = {d.name: np.array([left[k] / widths[k]]) for k, d in enumerate(problem.decisions)}
-    return Prices(float(rest), prices, by_name)
+    return Shown(bound, reach, float(rest), method, prices, by_name)

@@ -34,6 +34,7 @@ from laufruhe.prove.convex_functions import (
     dual_bound,
 )
 from laufruhe.solvers.conclusion import Shown, better, concluded, given_design, judged, none_within
+from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mount_cones import solve_cones
 from laufruhe.solvers.result import Result
 
@@ -166,11 +167,10 @@ def _residual(program: ConvexProgram, x: Array, duals: ConvexDuals, gradient: Ar
 
 
 def _conflict(program: ConvexProgram, problem: Problem) -> tuple[str, ...]:
-    """A smallest set of limits that no stiffness within the bounds meets together."""
-    kept: Sequence[int] = range(len(problem.limits))
-    for k in range(len(problem.limits)):
-        without = [j for j in kept if j != k]
-        fewer = replace(program, terms=(), limits=tuple(limit for limit in program.limits if limit.source in without))
-        if solve_cones(fewer) is None:
-            kept = without
-    return tuple(problem.limits[k].name for k in kept)
+    """Limits that no stiffness within the bounds meets together."""
+
+    def excluded(kept: Sequence[Limit]) -> bool:
+        limits = tuple(limit for limit in program.limits if problem.limits[limit.source] in kept)
+        return solve_cones(replace(program, terms=(), limits=limits)) is None
+
+    return smallest_conflict(problem.limits, excluded)

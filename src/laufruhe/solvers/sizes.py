@@ -19,7 +19,8 @@ from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, room_of
 from laufruhe.prove.size_boxes import MOST_BOXES, SizeBoxes, divided_sizes
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged, none_within
-from laufruhe.solvers.local_programs import LocalProgram, looks, priced, searched
+from laufruhe.solvers.conflicts import smallest_conflict
+from laufruhe.solvers.local_programs import LocalProgram, looks, searched, shown
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -55,8 +56,8 @@ def solve_sizes(problem: Problem) -> Result:
     initial, model = evaluate(problem), SizeModel(problem)
     _check_acts(model)
     program = _SizeProgram(problem, model.lower, model.upper, model)
-    given = (np.array([d.start_number for d in problem.decisions]) - model.lower) / (model.upper - model.lower)
-    starts = [np.clip(given, 0.0, 1.0), np.ones(len(given)), *looks(problem)]
+    given = program.shares(problem.start)
+    starts = [given, np.ones(len(given)), *looks(problem)]
     best = searched(program, starts, min(problem.search.starts, STARTS))
     design, divided, boxes = judged(problem, program.values(best)), Divided(0.0, 0), _boxes(model)
     for _ in range(TRIES):
@@ -69,13 +70,13 @@ def solve_sizes(problem: Problem) -> Result:
             return none_within(problem, initial, names, {"solve": time.perf_counter() - started})
         if met and divided.bound >= design.value - room_of(design.value, problem.tolerance, 0.0):
             break
-        places = [np.clip((x - model.lower) / (model.upper - model.lower), 0.0, 1.0) for x in divided.places]
+        places = [program.shares(x) for x in divided.places]
         again = searched(program, [best, *places], len(places) + 1)
         if program.rank(again) >= program.rank(best):
             break
         best, design = again, judged(problem, program.values(again))
-    shown = _shown(program, boxes, divided, design, best)
-    return concluded(design, initial, shown, {"solve": time.perf_counter() - started})
+    proof = _shown(program, boxes, divided, design, best)
+    return concluded(design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 def _boxes(model: SizeModel) -> SizeBoxes | None:
@@ -96,13 +97,10 @@ def _divided(boxes: SizeBoxes, design: Design | None) -> Divided:
 
 
 def _conflict(problem: Problem, boxes: SizeBoxes) -> tuple[str, ...]:
-    """A smallest set of limits that no sizes keep together, as far as boxes tell."""
-    kept = list(problem.limits)
-    for limit in problem.limits:
-        without = [other for other in kept if other is not limit]
-        if divided_sizes(boxes.keeping(without), math.inf, 0.0, 64).bound == math.inf:
-            kept = without
-    return tuple(limit.name for limit in kept)
+    """Limits that no sizes keep together, as far as boxes tell."""
+    return smallest_conflict(
+        problem.limits, lambda kept: divided_sizes(boxes.keeping(kept), math.inf, 0.0, 64).bound == math.inf
+    )
 
 
 def _check_acts(model: SizeModel) -> None:
@@ -115,17 +113,12 @@ def _check_acts(model: SizeModel) -> None:
             raise ModelError(f"{decision.name} is open, and nothing that is asked depends on it; fix it, or limit it")
 
 
-def _shown(
-    program: LocalProgram, boxes: SizeBoxes | None, divided: Divided, design: Design, best: Array
-) -> Shown:  # fmt: skip
-    """Bound and prices."""
-    prices = priced(program, design, best)
+def _shown(program: LocalProgram, boxes: SizeBoxes | None, divided: Divided, design: Design, best: Array) -> Shown:
     if boxes is None:
         why = "local programs; nothing bounds the length of the rod" if _has_rod(program) else "local programs"
-        return Shown(0.0, Reach.ASIDE, prices.rest, why, prices.limits, prices.slopes)
+        return shown(program, design, best, 0.0, Reach.ASIDE, why)
     method = f"local programs; lower bound on {divided.boxes} boxes of sizes"
-    bound = divided.bound if design.excess <= KEPT else 0.0
-    return Shown(bound, Reach.WHOLE, prices.rest, method, prices.limits, prices.slopes)
+    return shown(program, design, best, divided.bound if design.excess <= KEPT else 0.0, Reach.WHOLE, method)
 
 
 def _has_rod(program: LocalProgram) -> bool:

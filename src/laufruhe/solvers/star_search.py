@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import tell
+from laufruhe.numerics.roots import parted
 from laufruhe.numerics.workers import HERE, count_of, each, executor_for
 from laufruhe.physics.crank_stars import Array, Stars, phase_waves
 from laufruhe.physics.star_space import Partial, StarSpace
@@ -230,11 +231,12 @@ class _Bounds:
             counts[0, 0] -= 1
             star = np.zeros((1, self._space.throws), dtype=np.uint8)
             partial = Partial(star, counts, (0,), tuple(range(1, self._space.throws)))
-            low, high = 0.0, 1.0 + 2.0 * float(self._objective.values(self._space, star)[0])
-            for _ in range(60):
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if self.beyond(partial, middle)[0] else (low, middle)
-            values.append(low)
+            high = 1.0 + 2.0 * float(self._objective.values(self._space, star)[0])
+
+            def is_beyond(value: float, at: Partial = partial) -> bool:
+                return bool(self.beyond(at, value)[0])
+
+            values.append(parted(is_beyond, 0.0, high, 60)[0])
         return min(values)
 
     def _open_part(self, partial: Partial, which: NDArray[np.intp], kinds: int) -> Array:

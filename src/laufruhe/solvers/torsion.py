@@ -16,7 +16,7 @@ from laufruhe.prove.best_first import Divided, divide
 from laufruhe.prove.certificate import Reach, room_of
 from laufruhe.prove.twist_boxes import TwistBoxes
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged, none_within
-from laufruhe.solvers.local_programs import LocalProgram, looks, priced, searched
+from laufruhe.solvers.local_programs import LocalProgram, looks, searched, shown
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -33,10 +33,8 @@ def solve_torsion(problem: Problem) -> Result:
     """
     started = time.perf_counter()
     initial = evaluate(problem)
-    ends = (np.array([getattr(decision, end) for decision in problem.decisions]) for end in ("lower", "upper"))
-    program = LocalProgram(problem, *ends)
-    start = (np.array([d.start_number for d in problem.decisions]) - program.lower) / (program.upper - program.lower)
-    best = searched(program, [np.clip(start, 0.0, 1.0), *looks(problem)], problem.search.starts)
+    program = LocalProgram.of(problem)
+    best = searched(program, [program.shares(problem.start), *looks(problem)], problem.search.starts)
     design = judged(problem, program.values(best))
     boxes, divided = TwistBoxes(problem, initial), Divided(0.0, 0)
     most = _most_boxes(problem) if boxes.coordinates.is_exact and boxes.is_sampled_fully else 0
@@ -52,16 +50,13 @@ def solve_torsion(problem: Problem) -> Result:
         if not met and divided.bound == math.inf:
             names = tuple(limit.name for limit in problem.limits)
             return none_within(problem, initial, names, {"solve": time.perf_counter() - started})
-        places = [(boxes.coordinates.decisions(x) - program.lower) / (program.upper - program.lower)
-                  for x in divided.places]  # fmt: skip
+        places = [program.shares(boxes.coordinates.decisions(x)) for x in divided.places]
         again = judged(problem, program.values(searched(program, [best, *places], 3)))
         if again.rank >= design.rank or again.value > value * (1.0 - 0.1 * problem.tolerance):
             break
-        design, best = again, np.array([
-            (v - low) / (high - low) for v, low, high in zip(again.values, program.lower, program.upper, strict=True)
-        ], dtype=float)  # fmt: skip
-    shown = _shown(program, boxes, divided, design, best)
-    return concluded(design, initial, shown, {"solve": time.perf_counter() - started})
+        design, best = again, program.shares(again.values)
+    proof = _shown(program, boxes, divided, design, best)
+    return concluded(design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 def _most_boxes(problem: Problem) -> int:
@@ -71,13 +66,9 @@ def _most_boxes(problem: Problem) -> int:
 
 
 def _shown(program: LocalProgram, boxes: TwistBoxes, divided: Divided, design: Design, best: Array) -> Shown:
-    """Bound and prices."""
-    prices = priced(program, design, best)
     exact = boxes.coordinates.is_exact and boxes.knows_all
-    method = f"local programs; lower bound on {divided.boxes} boxes of discs and shafts"
     # of a design that breaks a limit nothing is proven
     is_bounded = design.excess <= KEPT and boxes.coordinates.is_exact
-    bound = divided.bound if is_bounded else 0.0
-    return Shown(
-        bound, Reach.NEAR if exact and is_bounded else Reach.ASIDE, prices.rest, method, prices.limits, prices.slopes
-    )
+    method = f"local programs; lower bound on {divided.boxes} boxes of discs and shafts"
+    reach = Reach.NEAR if exact and is_bounded else Reach.ASIDE
+    return shown(program, design, best, divided.bound if is_bounded else 0.0, reach, method)

@@ -20,6 +20,7 @@ from laufruhe.problem.nothing import ROUNDING, nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
+from laufruhe.solvers.conflicts import smallest
 from laufruhe.solvers.conic import solve_cones
 from laufruhe.solvers.equations import on_grid
 from laufruhe.solvers.lightest import SAME_LOAD, lightest
@@ -260,10 +261,8 @@ def _shown(limits: Sequence[Limit], idle: Sequence[Limit], optimum: Optimum, val
 
 def conflict_of(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:
     """A smallest set of limits that no design meets together: each is needed for the contradiction."""
-    kept = list(range(len(affine.limits)))
-    for k in range(len(affine.limits)):
-        without = [j for j in kept if j != k]
-        fewer = replace(affine, terms=(), limits=tuple(affine.limits[j] for j in without))
-        if solve_cones(fewer).x is None:
-            kept = without
-    return tuple(names[k] for k in kept)
+
+    def excluded(kept: Sequence[int]) -> bool:
+        return solve_cones(replace(affine, terms=(), limits=tuple(affine.limits[k] for k in kept))).x is None
+
+    return tuple(names[k] for k in smallest(range(len(affine.limits)), excluded))
