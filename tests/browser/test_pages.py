@@ -57,6 +57,8 @@ def test_paper_is_white_and_its_letters_dark(shown: Page) -> None:
     for ink, paper in seen:
         assert paper == 1.0
         assert (paper + 0.05) / (ink + 0.05) >= 7.0
+    # grounds of their own that are printed are light too
+    assert serious(shown) == []
     assert shown.evaluate("() => [...document.images].map(image => getComputedStyle(image).filter)") == ["none"] * len(
         shown.locator("img").all()
     )
