@@ -18,7 +18,6 @@ from problem_files import PROBLEMS, changed, loaded
 
 THREE = (PROBLEMS / "geared-three-leads.toml").read_text(encoding="utf-8")
 RADIUS, ROD, PISTON, SPEED = 0.04, 0.16, 0.8, 1500.0 * np.pi / 30.0
-WEIGHT = '[[counterweights]]\nname = "w"\nx = "0 mm"\nunbalance = { between = ["0 kg m", "1 kg m"] }\n'
 FEW = changed(THREE, "[objective]", "[fidelity]\nsamples = 180\n[objective]")
 
 
@@ -106,14 +105,94 @@ def test_bounds_beyond_the_ports_are_refused(tmp_path: Path) -> None:
         loaded(tmp_path, text)
 
 
+COUPLED = (PROBLEMS / "two-machines-angle.toml").read_text(encoding="utf-8")
+ALONE = "[[counterweights]]" + COUPLED.split("[[counterweights]]", 1)[1].split("[[operating_points]]")[0]
+BARE = changed(changed(COUPLED, ALONE, ""), "[0, 180]", "[0, 360]")
+BARE = BARE.split("[[constraints]]")[0] + "[fidelity]\nsamples = 180\n"
+JOURNALS = "".join(
+    f'[[main_bearings]]\nname = "{name}"\nx = "{x} mm"\nshaft = "{shaft}"\n'
+    for name, x, shaft in (
+        ("a", 250, "crankshaft"), ("b", 50, "crankshaft"), ("c", -50, "second machine"), ("d", -250, "second machine"),
+    )
+)  # fmt: skip
+
+
+LIMIT = '[[constraints]]\nname = "c"\nlimit = "{}"\nmax = "{}"\n[objective]'
+
+
+def turned(text: str, angle: float) -> str:
+    """The machines on one crankshaft, the second throw at an angle and fired as much earlier."""
+    given = changed(
+        text,
+        "[[engine.shafts]]                       # on the axis of the first, coupled to it at an angle\n"
+        'name = "second machine"\nposition = ["0 mm", "0 mm"]\nlead = { between = [0, 360], start = 90 }\n',
+        "",
+    )
+    return changed(given, 'x = "-150 mm"\nshaft = "second machine"\n',
+                   f'x = "-150 mm"\nthrow = {angle}\nfiring_angle = {(360.0 - angle) % 360.0}\n')  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        '"degree of irregularity"', '"peak to peak stored work"', '"rms roll moment"\norders = [1, 2, 3]',
+        pytest.param('"maximum crank torque"', marks=pytest.mark.slow),
+        pytest.param('"mean mount force"', marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_the_angle_between_machines_is_the_least_of_a_scan(asked: str, tmp_path: Path) -> None:
+    """Against the same machines with throws on one crankshaft, whose loads no lead moves."""
+    text = changed(BARE, '"rms mount force"', asked)
+    result = solve(loaded(tmp_path, text))
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    fixed = [loaded(tmp_path, turned(text, angle)) for angle in np.linspace(0.0, 354.0, 60)]
+    least = min(objective_value(each, evaluate(each)) for each in fixed)
+    value = objective_value(result.problem, result.final)
+    assert result.certificate.lower_bound <= value <= least * (1.0 + 1e-6)
+    at_best = loaded(tmp_path, turned(text, float(np.degrees(result.decisions[0].value))))
+    assert objective_value(at_best, evaluate(at_best)) == pytest.approx(value, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_weights_and_the_angle_are_proven_together(tmp_path: Path) -> None:
+    """No angle of a scan has weights that are better, each proven by itself; one more limit is never better."""
+    problem = load(PROBLEMS / "two-machines-angle.toml")
+    found = solve(problem)
+    assert found.certificate is not None
+    assert found.certificate.kind is Proof.GLOBAL
+    value = objective_value(problem, found.final)
+    values = {}
+    for angle in (0, 90, 150, 165, 170, 175, 177, 178, 180):
+        each = solve(loaded(tmp_path, changed(COUPLED, "{ between = [0, 180], start = 90 }", str(angle))))
+        if each.status is Status.OPTIMAL:
+            values[angle] = objective_value(each.problem, each.final)
+    assert found.certificate.lower_bound <= min(values.values())
+    assert value <= min(values.values()) * (1.0 + 1e-4)
+    assert set(values) == {150, 165, 170, 175, 177, 178, 180}
+    free = solve(loaded(tmp_path, COUPLED.split("[[constraints]]")[0] + "[fidelity]\nsamples = 360\n"))
+    assert objective_value(free.problem, free.final) <= value * (1.0 + 1e-4)
+
+
+def test_limits_that_no_angle_keeps_are_named(tmp_path: Path) -> None:
+    for limit, most in (("degree of irregularity", "1/70"), ("peak to peak stored work", "180 J")):
+        text = changed(
+            BARE, "[objective]", f'[[constraints]]\nname = "c"\nlimit = "{limit}"\nmax = "{most}"\n[objective]'
+        )
+        result = solve(loaded(tmp_path, text))
+        assert result.status is Status.INFEASIBLE
+        assert result.conflict == ("c",)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("[objective]", WEIGHT + "[objective]", "no method decides unbalance and lead together"),
-        ('"mean mount force"', '"maximum crank-pin force"', "no method decides lead together"),
+        ('"rms mount force"', '"maximum crank-pin force"', "no method decides lead together"),
+        ('"rms mount force"', '"mean main-bearing force"', "nothing that is asked depends on it"),
     ],
 )  # fmt: skip
 def test_what_is_not_decided_with_leads_is_told(old: str, new: str, said: str, tmp_path: Path) -> None:
+    text = changed(BARE, "[objective]", JOURNALS + "[objective]")
     with pytest.raises((InputError, ModelError)) as caught:
-        solve(loaded(tmp_path, changed(THREE, old, new)))
+        solve(loaded(tmp_path, changed(text, old, new)))
     assert said in str(caught.value)

@@ -123,6 +123,11 @@ class Corners:
         none = np.zeros((len(self.angles), degrees, *self.jumps.shape[2:]))
         return type(self)(self.angles + by, np.concatenate([none, self.jumps], axis=1))
 
+    @property
+    def derivative(self) -> Corners | None:
+        """Of the derivative of a signal that does not jump itself."""
+        return _left(self.angles, self.jumps[:, 1:])
+
     def repeated(self, period: float, times: int) -> Corners | None:
         """Of the same signal counted over so many of its periods."""
         return joined([self.moved(k * period) for k in range(times)])

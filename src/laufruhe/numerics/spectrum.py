@@ -153,6 +153,18 @@ class Spectrum:
         whole[1:] = (self.coefficients[1:].T / (1j * self.orders[1:])).T
         return type(self)(self.base, whole, None if self.corners is None else self.corners.moved(0.0, 1))
 
+    @property
+    def derivative(self) -> Self:
+        """By the angle; where it jumps, the sum of its orders alone has one."""
+        steep = (self.coefficients.T * (1j * self.orders)).T
+        if self.corners is None or self.corners.jumps[:, 0].any():
+            return type(self)(self.base, steep)
+        return type(self)(self.base, steep, self.corners.derivative)
+
+    def extended(self, count: int) -> Self:
+        """With so many coefficients or more."""
+        return self + type(self)(self.base, np.zeros((count, *self.coefficients.shape[1:]), dtype=complex))
+
     def rebased(self, base: Fraction) -> Self:
         """The same signal counted in a finer lowest order."""
         factor = self.base / base

@@ -140,9 +140,10 @@ def _asks_flywheel(problem: Problem) -> bool:
 
 
 def _asks_led(problem: Problem) -> bool:
-    """Whether all that is asked is of loads on block and mounts that come earlier with a shaft, and none of gas."""
-    loads = all(measure.is_load and not measure.is_inside for measure in problem.measures)
-    return loads and _adds_points(problem) and not problem.feels_gas and not problem.fidelity.is_uneven
+    """Whether all that is asked is of loads that what each shaft carries adds up to, or of how evenly these turn."""
+    felt = all(measure.channel.adds_up_by_shafts or measure.is_mass for measure in problem.measures)
+    apart = all(part.facing is None for part in problem.engine.slider_cranks) or not problem.has_gas
+    return felt and apart and _adds_points(problem) and not problem.fidelity.is_uneven
 
 
 def _asks_places(problem: Problem) -> bool:
@@ -189,11 +190,12 @@ METHODS: tuple[Method, ...] = (
     Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
     Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, _torsion),
     Method("boxes of sizes", frozenset({Kind.SIZE}), _asks_sizes, Reach.WHOLE, _sizes),
-    Method("boxes of leads", frozenset({Kind.LEAD}), _asks_led, Reach.WHOLE, solve_leads),
     Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_sharply)),
     Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_sharply)),
+    Method("boxes of leads", frozenset({_U, Kind.LEAD}), _asks_led, Reach.WHOLE,
+           lambda problem: solve_within(problem, solve_leads)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
     Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),

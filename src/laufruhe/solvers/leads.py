@@ -1,11 +1,7 @@
-"""Leads of geared shafts: local searches, and boxes of leads that prove the best of them (P13).
+"""Leads of geared shafts, and of machines coupled on one: boxes of leads, each bounded by its program (P13, P14).
 
-What turns with a shaft loads earlier by as much as the shaft leads: of order h by e^{i h d}. On a box of leads with the
-middle c and half sides r_s the loads are V(c) + sum_s d_s V_s' and a rest, and any dual rows Z of V(c) tell that
-
-    N(V) >= <Z, V(c)> - sum_s r_s |<Z, V_s'>| - sum_s r_s^2 K_s / 2,                              (P13)
-
-K_s no less than the norm of the second derivative of what shaft s brings, wherever it leads.
+What is affine stands in a cone program in the middle of every box, whose dual rows bound the whole of it. Where nothing
+but leads is open, searches from the best points of a grid find a design first.
 """
 
 from __future__ import annotations
@@ -13,186 +9,270 @@ from __future__ import annotations
 import itertools
 import math
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine.leads import led
-from laufruhe.numerics.norms import Grid
-from laufruhe.numerics.spectrum import Spectrum, common_base
-from laufruhe.problem.decision import LeadDrive
+from laufruhe.errors import ModelError
+from laufruhe.load_models.affine import AffineProblem
+from laufruhe.load_models.led_model import LedModel, LedNorm
+from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Limit, Measure, load_rows
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import divide
-from laufruhe.prove.certificate import Reach, room_of
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged
-from laufruhe.solvers.result import Result
+from laufruhe.problem.sets import Value
+from laufruhe.prove.certificate import Multipliers, Reach, best_bound
+from laufruhe.prove.lead_boxes import SLACK, LeadBound, LeadBoxes
+from laufruhe.solvers.box_search import divided
+from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, none_within
+from laufruhe.solvers.conic import solve_cones
+from laufruhe.solvers.equations import on_grid
+from laufruhe.solvers.mount_starts import unbalances_of
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.unbalances import solve_unbalances
 
 Array = NDArray[np.float64]
 
-MOST_BOXES = 20_000
+MOST_BOXES, MOST_PROGRAMS = 20_000, 2_000
+"""Boxes of leads alone, and of those with a cone program each."""
 GRID, POLISHED = 24, 3
 """Steps of every lead, of few at once, that searches start from, and how many of them end in one."""
-MOST_STARTS = 600
-SLACK = 1e-6
+MOST_STARTS, MOST_STEPS = 600, 300
+COARSE, NEAR = 4, 10.0
+"""Part of the angles at which the programs of boxes stand, and the tolerances from which these stand at all."""
+LOOKS, SAME = (0.0, 0.31, 0.67), 1e-6
+"""Places at which a lead is looked at for whether anything asked changes, and the share that is no change."""
+EXACT = 0.02
+"""Of the tolerance, by which parts of a box may still be better."""
+SHARE = 0.25
+"""Of the tolerance that the programs of boxes may use up."""
 
 
 def solve_leads(problem: Problem) -> Result:
-    """The best leads, proven as far as boxes go."""
+    """The best leads, and the unbalances with them, proven as far as boxes go."""
     started = time.perf_counter()
-    search = _Boxes(problem)
-    initial = evaluate(problem)
-    design = _searched(problem, search)
-    value, kept = design.value, design.excess <= KEPT
-    room = room_of(value, problem.tolerance, nothing_of(problem))
-    most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
-    divided = divide(search, search.lower, search.upper, value if kept else math.inf, room, most)
-    bound = divided.bound if kept else 0.0
-    shown = Shown(bound, Reach.WHOLE, math.inf, f"local searches; lower bound on {divided.boxes} boxes of leads")
-    return concluded(design, initial, shown, {"solve": time.perf_counter() - started})
-
-
-def _searched(problem: Problem, search: _Boxes) -> Design:
-    """The best of the searches from the best points of a grid, and of the design as given, by the exact model."""
-    from scipy.optimize import minimize
-
-    count = min(GRID, max(int(MOST_STARTS ** (1.0 / len(search.lower))), 2))
-    sides = [np.linspace(a, b, count) for a, b in zip(search.lower, search.upper, strict=True)]
-    points = [np.array(point) for point in itertools.product(*sides)]
-    points.sort(key=search.penalised)
-    bounds: Any = list(zip(search.lower, search.upper, strict=True))
-    found = []
-    for point in points[:POLISHED]:
-        step = 0.5 * (search.upper - search.lower) / count
-        simplex = np.clip(np.vstack([point, point + np.diag(step)]), search.lower, search.upper)
-        told: Any = {"initial_simplex": simplex, "xatol": 1e-10, "fatol": 1e-12, "maxiter": 2000}
-        end = minimize(search.penalised, point, method="Nelder-Mead", bounds=bounds, options=told).x
-        found.append(np.clip(end, search.lower, search.upper))
-    designs = [judged(problem, [float(x) for x in each]) for each in found]
-    designs.append(judged(problem, problem.start))
-    return min(designs, key=lambda each: each.rank)
+    search, initial = _Search(problem), evaluate(problem)
+    search.check_acts()
+    root = search.box(search.model.lower, search.model.upper)
+    nothing, timing = nothing_of(problem), {"solve": 0.0}
+    best, bound, boxes = search.first(), math.inf, 1
+    if root is not None:
+        most = (MOST_PROGRAMS if search.model.domains else MOST_BOXES) if problem.search.boxes is None else None
+        most = most or problem.search.boxes or 0
+        best, bound, boxes = divided(search, root, best, nothing, problem.tolerance, most, "boxes of leads")
+    timing["solve"] = time.perf_counter() - started
+    if math.isinf(bound) and best.design.rank[0]:
+        return none_within(problem, initial, search.conflict, timing)
+    how = "second-order cones over" if search.model.domains else "local searches; lower bound on"
+    shown = Shown(
+        bound=min(bound, best.design.value) if not best.design.rank[0] else 0.0,
+        reach=Reach.WHOLE,
+        kkt_residual=math.inf,
+        method=f"{how} {boxes} box{'es' * (boxes > 1)} of leads",
+        prices=best.result.prices if best.result is not None else {},
+    )
+    return concluded(best.design, replace(initial, samples=best.design.evaluation.samples), shown, timing)
 
 
 @dataclass(frozen=True, eq=False)
-class _Term:
-    """A measure as spectra: what stands, and what each shaft brings; per operating point."""
+class _Box:
+    """Leads between bounds, and what bounds the objective there."""
 
-    measure: Measure
-    still: list[Spectrum]
-    shafts: list[list[Spectrum]]
-    bent: Array
+    lower: Array
+    upper: Array
+    bound: float
+    at_middle: float
+    side: int
+    is_exact: bool
 
-    def moved(self, leads: Array, derivative: int | None = None) -> list[Spectrum]:
-        """Signals at some leads, or their derivative by one of these."""
-        out = []
-        for p, still in enumerate(self.still):
-            total = still.coefficients if derivative is None else np.zeros_like(still.coefficients)
-            for s, own in enumerate(self.shafts):
-                if derivative in (None, s):
-                    turn = np.exp(1j * own[p].orders * leads[s]) * (1.0 if derivative is None else 1j * own[p].orders)
-                    total = total + own[p].coefficients * turn[:, None, None]
-            out.append(Spectrum(still.base, total))
-        return out
+    @property
+    def middle(self) -> Array:
+        """Of its sides."""
+        return np.asarray(0.5 * (self.lower + self.upper))
 
 
-class _Boxes:
-    """Bounds of boxes of leads."""
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A design, and the result for its unbalances with its leads."""
 
-    what, at_once = "boxes of leads", 32
+    design: Design
+    result: Result | None = None
+
+    @property
+    def value(self) -> float:
+        """The objective of a design that is allowed."""
+        return math.inf if self.design.rank[0] else self.design.value
+
+
+class _Search:
+    """Boxes of the leads of a problem."""
+
+    is_shared = False
 
     def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        self.lower = np.array([d.lower for d in problem.decisions])
-        self.upper = np.array([d.upper for d in problem.decisions])
-        self._start = np.array([d.start_number for d in problem.decisions])
-        self._samples = problem.fidelity.samples
-        self._terms = [(term.weight, self._term(term.measure)) for term in problem.objective]
-        self._limits: list[tuple[Limit, _Term]] = [(limit, self._term(limit.measure)) for limit in problem.limits]
+        self.problem, self.model = problem, LedModel(problem)
+        self.boxes = LeadBoxes(self.model)
+        self.samples = max(problem.fidelity.samples // COARSE, 24) * COARSE
+        self.conflict: tuple[str, ...] = ()
 
-    def _term(self, measure: Measure) -> _Term:
-        engine = self.problem.engine
-        names = [drive.shaft for d in self.problem.decisions for drive in d.drives if isinstance(drive, LeadDrive)]
-        # where every lead is zero, each shaft alone, then what stands whatever they are
-        bare = led(engine, dict(zip(names, -self._start, strict=True)))
-        alone = [
-            replace(bare, slider_cranks=tuple(p for p in bare.slider_cranks if p.shaft.name == name),
-                    rotors=tuple(r for r in bare.rotors if r.shaft.name == name))
-            for name in names
-        ]  # fmt: skip
-        rest = replace(bare, slider_cranks=tuple(p for p in bare.slider_cranks if p.shaft.name not in names),
-                       rotors=tuple(r for r in bare.rotors if r.shaft.name not in names))  # fmt: skip
-        found = [evaluate(self.problem, each).signals(measure.load) for each in (rest, *alone)]
-        base = common_base([engine.cycle.base_order, *(signal.base for each in found for signal in each)])
-        size = max(len(signal.rebased(base).coefficients) for each in found for signal in each)
-        still, *shafts = ([_padded(signal.rebased(base), size) for signal in each] for each in found)
-        shares = measure.shares(self.problem.points)
-        bent = np.array([max((_bend(measure, signal) for signal, w in zip(own, shares, strict=True) if w), default=0.0)
-                         for own in shafts])  # fmt: skip
-        return _Term(measure, still, shafts, bent)
+    @staticmethod
+    def better(best: _Found, found: _Found) -> _Found:
+        """The better of the best design so far and another."""
+        return found if found.design.rank < best.design.rank else best
 
-    def _rows(self, term: _Term, signals: list[Spectrum], averaged: bool = False) -> tuple[Grid, Array]:
-        if averaged and term.measure.norm.averages:
-            signals = [signal.averaged(signal.period / self._samples) for signal in signals]
-        nowhere = [np.zeros(0)] * len(signals)
-        rows = load_rows(term.measure, self.problem.points, signals, self.problem.engine, self._samples, nowhere)
-        return rows.grid, rows.vectors
+    def told(self, conflict: Sequence[str]) -> None:
+        """Limits that were not met in boxes: all of them together tell."""
+        told = {*self.conflict, *conflict}
+        self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in told)
 
-    def _value(self, term: _Term, leads: Array) -> float:
-        grid, vectors = self._rows(term, term.moved(leads))
-        return float(term.measure.norm.value(grid, vectors))
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | None, _Found | None]]:
+        """Halves of a box, each with the best design at its middle where that may be better than a value."""
+        middle, here = box.middle, np.arange(len(box.lower)) == box.side
+        for low, high in (
+            (box.lower, np.where(here, middle, box.upper)), (np.where(here, middle, box.lower), box.upper)
+        ):  # fmt: skip
+            half = self.box(low, high, box.bound, value)
+            worth = half is not None and half.at_middle < value * (1.0 - SHARE * self.problem.tolerance)
+            yield half, self.at(half.middle) if half is not None and worth else None
 
-    def penalised(self, leads: Array) -> float:
+    def box(self, lower: Array, upper: Array, floor: float = 0.0, value: float = math.inf) -> _Box | None:
+        """The bound of a box; None where no design is allowed. Near a value the program stands at all angles."""
+        middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+        found = self._bound(middle, half, COARSE)
+        if self.model.domains and value * (1.0 - NEAR * self.problem.tolerance) < found.value < value:
+            found = self._bound(middle, half, 1)
+        if math.isinf(found.value):
+            self.told(found.broken)
+            return None
+        side = int(np.argmax(found.pull + 1e-12 * half))
+        bound, room = max(found.value, floor), EXACT * self.problem.tolerance * found.at_middle
+        return _Box(lower, upper, bound, found.at_middle, side, found.at_middle - bound <= room < math.inf)
+
+    def _bound(self, middle: Array, half: Array, part: int) -> LeadBound:
+        fine, norms = self.model.at(middle, self.samples, averaged=True)
+        if not self.model.domains:
+            return self._alone(middle, half, fine, norms)
+        coarse, rough = self.model.at(middle, self.samples // part, averaged=True)
+        solution = solve_cones(coarse)
+        if solution.x is None:
+            limits = solution.multipliers.limits
+            found = self._excluded(middle, half, coarse, rough[len(coarse.terms) :], limits)
+            # nothing is known of its halves yet, nor that designs in its middle are allowed
+            return found or LeadBound(0.0, math.inf, half)
+        bound = best_bound(fine, solution.x, on_grid(coarse, fine, solution.multipliers))
+        return self.boxes.bound(middle, half, fine, norms, bound.multipliers)
+
+    def _alone(self, middle: Array, half: Array, program: AffineProblem, norms: tuple[LedNorm, ...]) -> LeadBound:
+        """Where nothing but leads is open: by the rows themselves."""
+        none = tuple(np.zeros_like(norm.constant) for _, norm in program.limits)
+        for k, (most, norm) in enumerate(program.limits):
+            if norm.value(np.zeros(0)) > most * (1.0 + SLACK):
+                only = tuple(norm.subgradient(np.zeros(0)) if j == k else z for j, z in enumerate(none))
+                found = self._excluded(middle, half, program, norms[len(program.terms) :], only)
+                if found is not None:
+                    return found
+        rows = tuple(norm.subgradient(np.zeros(0)) for _, norm in program.terms)
+        return self.boxes.bound(middle, half, program, norms, Multipliers(rows, none))
+
+    def _excluded(
+        self, middle: Array, half: Array, program: AffineProblem, norms: tuple[LedNorm, ...], limits: tuple[Array, ...]
+    ) -> LeadBound | None:  # fmt: skip
+        """That no design in a box is allowed; None where these dual rows do not show it."""
+        stripped = replace(program, terms=())
+        found = self.boxes.bound(middle, half, stripped, norms, Multipliers((), limits))
+        if not math.isinf(found.value):
+            return None
+        self.told([x.name for x, z in zip(self.problem.load_limits, limits, strict=True) if z.any()])
+        return found
+
+    # designs
+
+    def check_acts(self) -> None:
+        """Refuse a lead that nothing asked hangs on: each of its loads is the same, a little earlier."""
+        lower, upper = self.model.lower, self.model.upper
+        for k, decision in enumerate(self.model.leads if not self.model.domains else ()):
+            here = np.arange(len(lower)) == k
+            places = [np.where(here, lower + share * (upper - lower), self.model.start) for share in LOOKS]
+            found = [self._numbers(place) for place in places]
+            if np.ptp(found, axis=0).max() <= SAME * np.abs(found).max():
+                why = "is open, and nothing that is asked depends on it; fix it, or ask for what shafts share"
+                raise ModelError(f"{decision.name} {why}")
+
+    def _numbers(self, leads: Array) -> Array:
+        """Of everything asked."""
+        program, _ = self.model.at(leads, self.samples)
+        norms = [norm.value(np.zeros(0)) for _, norm in (*program.terms, *program.limits)]
+        return np.array([*norms, *self.boxes.numbers(leads)])
+
+    def first(self) -> _Found:
+        """The design as given, and the best that searches find where leads alone are open."""
+        found = [_Found(judged(self.problem, self.problem.start))]
+        if self.model.domains:
+            found += [self.at(self.model.start), self.at(0.5 * (self.model.lower + self.model.upper))]
+        else:
+            found += [_Found(judged(self.problem, [float(x) for x in each])) for each in self._searched()]
+        return min(found, key=lambda each: each.design.rank)
+
+    def at(self, leads: Array) -> _Found:
+        """The best design with its leads given."""
+        where = dict(zip((d.name for d in self.model.leads), (float(x) for x in leads), strict=True))
+        values: dict[str, Value] = {d.name: d.start for d in self.problem.decisions} | where
+        result, samples = None, None
+        if self.problem.unbalances:
+            held = self._held(leads)
+            result = solve_unbalances(held)
+            if result.status is not Status.INFEASIBLE:
+                found = unbalances_of(held, result)
+                values |= dict(zip((d.name for d in self.problem.unbalances), found, strict=True))
+            samples = result.final.samples
+        return _Found(judged(self.problem, list(values.values()), samples), result)
+
+    def _held(self, leads: Array) -> Problem:
+        """The problem with its leads given: what turns with them has turned."""
+        by = dict(zip(self.model.names, leads - self.model.start, strict=True))
+        shafts = {rotor.name: rotor.shaft for rotor in self.problem.engine.rotors}
+
+        def turned(decision: Decision) -> Decision:
+            drives = []
+            for drive in decision.rotor_drives:
+                shaft = shafts[drive.rotor]
+                drives.append(replace(drive, gain=drive.gain * np.exp(1j * shaft.ratio * by.get(shaft.name, 0.0))))
+            return replace(decision, drives=tuple(drives))
+
+        engine = self.problem.design([float(x) for x in leads], self.model.leads)
+        decisions = tuple(turned(d) for d in self.problem.unbalances)
+        tolerance = SHARE * self.problem.tolerance
+        return replace(self.problem, engine=engine, decisions=decisions, tolerance=tolerance)
+
+    def _searched(self) -> list[Array]:
+        """Where searches end that begin at the best points of a grid."""
+        from scipy.optimize import minimize
+
+        lower, upper = self.model.lower, self.model.upper
+        count = min(GRID, max(int(MOST_STARTS ** (1.0 / len(lower))), 2))
+        sides = [np.linspace(a, b, count) for a, b in zip(lower, upper, strict=True)]
+        points = [np.array(point) for point in itertools.product(*sides)]
+        points.sort(key=self._penalised)
+        bounds: Any = list(zip(lower, upper, strict=True))
+        found = []
+        for point in points[:POLISHED]:
+            step = 0.5 * (upper - lower) / count
+            simplex = np.clip(np.vstack([point, point + np.diag(step)]), lower, upper)
+            least = 1e-12 * max(self._penalised(point), 1e-300)
+            told: Any = {"initial_simplex": simplex, "xatol": 1e-8, "fatol": least, "maxiter": MOST_STEPS}
+            end = minimize(self._penalised, point, method="Nelder-Mead", bounds=bounds, options=told).x
+            found.append(np.clip(end, lower, upper))
+        return found
+
+    def _penalised(self, leads: Array) -> float:
         """The objective, and what limits are broken by, many times over."""
-        inside = np.clip(leads, self.lower, self.upper)
-        total = sum(weight * self._value(term, inside) for weight, term in self._terms)
-        over = [max(self._value(term, inside) / (limit.maximum or 1.0) - 1.0, 0.0) for limit, term in self._limits]
-        return float(total * (1.0 + 1e3 * sum(over)) + sum(over))
-
-    def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
-        found, sides = [], []
-        for low, high in zip(lower, upper, strict=True):
-            middle, half = 0.5 * (low + high), 0.5 * (high - low)
-            total, pull = 0.0, np.zeros(len(low))
-            for weight, term in self._terms:
-                least, own = self._least(term, middle, half)
-                total, pull = total + weight * max(least, 0.0), pull + weight * own
-            broken = any(
-                self._least(term, middle, half)[0] > limit.maximum * (1.0 + SLACK) for limit, term in self._limits
-            )
-            found.append(math.inf if broken else total)
-            sides.append(int(np.argmax(pull + 1e-12 * half)))
-        return np.array(found), np.array(sides, dtype=np.intp)
-
-    def _least(self, term: _Term, middle: Array, half: Array) -> tuple[float, Array]:
-        """What a measure does not go under on a box, and what every side takes of it (P13)."""
-        norm = term.measure.norm
-        grid, at = self._rows(term, term.moved(middle), averaged=True)
-        z = norm.dual_feasible(grid, norm.subgradient(grid, at))
-        slopes = np.array([
-            abs(float(np.vdot(z, self._rows(term, term.moved(middle, s), averaged=True)[1]))) for s in range(len(half))
-        ])  # fmt: skip
-        taken = half * slopes + 0.5 * half**2 * term.bent
-        return float(np.vdot(z, at)) - float(taken.sum()), taken
-
-
-def _padded(signal: Spectrum, size: int) -> Spectrum:
-    """With zeros for the orders that it does not have."""
-    out = np.zeros((size, *signal.coefficients.shape[1:]), complex)
-    out[: len(signal.coefficients)] = signal.coefficients
-    return Spectrum(signal.base, out)
-
-
-def _bend(measure: Measure, signal: Spectrum) -> float:
-    """No less than the norm of the second derivative of a signal by its lead, whatever that is."""
-    weights = np.array(measure.direction_weights or (1.0,) * signal.coefficients.shape[2])
-    counted = measure.counted(signal.orders)[:, None, None]
-    sizes = np.linalg.norm(signal.coefficients * weights * counted, axis=-1) * signal.orders[:, None] ** 2
-    if measure.norm.is_euclidean or measure.norm.averages:
-        # neither is more than the root mean square, at the place where that is largest
-        return float(np.sqrt(np.square(sizes).sum(axis=0)).max(initial=0.0))
-    return 2.0 * float(sizes.sum(axis=0).max(initial=0.0))
+        inside = np.clip(leads, self.model.lower, self.model.upper)
+        program, _ = self.model.at(inside, self.samples)
+        (swing, broken), x = self.boxes.degrees(inside, np.zeros_like(inside)), np.zeros(0)
+        total = program.objective(x) + swing
+        over = sum(max(norm.value(x) / (most or 1.0) - 1.0, 0.0) for most, norm in program.limits)
+        over += sum(broken.values())
+        return float(total * (1.0 + 1e3 * over) + over)

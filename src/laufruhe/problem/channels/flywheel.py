@@ -19,7 +19,7 @@ class FlywheelChannel(NumberChannel):
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """The flywheel, discs where it follows from them, and all that moves the torque where that counts."""
-        moving = {Kind.FLYWHEEL} | ({Kind.STAR, Kind.PISTON, Kind.SIZE} if self.of_torque else set())
+        moving = {Kind.FLYWHEEL} | ({Kind.STAR, Kind.PISTON, Kind.SIZE, Kind.LEAD} if self.of_torque else set())
         # a rim is no disc of the crankshaft
         return bool((moving | ({Kind.TORSION} if self.of_inertia else set())) & set(kinds))
 

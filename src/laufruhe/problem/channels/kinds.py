@@ -32,6 +32,8 @@ AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
     (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
 )
 AT_WEBS = (*ON_BLOCK, "webs")
+OF_SHAFTS = frozenset({"cylinders", "webs", "sections"})
+"""Keys of places that belong to one shaft."""
 OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
@@ -159,6 +161,11 @@ class Channel:
         return self.of_wheel is not None
 
     @property
+    def adds_up_by_shafts(self) -> bool:
+        """Whether what each shaft carries adds up to it, and comes earlier as that leads; or the torque moves it."""
+        return self.of_torque
+
+    @property
     def of_inertia(self) -> bool:
         """Whether it goes one way with the inertia of all that turns, whatever that is made of."""
         return self.is_flywheel and self.needs is Needs.FLYWHEEL
@@ -217,6 +224,11 @@ class LoadChannel(Channel):
     def feels_order(self) -> bool:
         """Whether it changes with the firing order of one star, where gas acts: cylinders are felt one by one."""
         return self.is_inside
+
+    @property
+    def adds_up_by_shafts(self) -> bool:
+        """Not where its places are parts that stand on a shaft themselves."""
+        return not OF_SHAFTS & set(self.keys)
 
     @property
     def norms(self) -> Collection[str]:

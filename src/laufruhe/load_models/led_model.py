@@ -1,0 +1,204 @@
+"""A problem whose shafts come earlier by angles that are open: what stands, and what each of them brings (P13).
+
+Every load that adds up over parts is the sum of what stands and of what each shaft carries; that comes earlier by as
+much as its shaft leads, also where gas makes it. Unbalances are columns beside it, as everywhere (P1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
+from laufruhe.machine import Engine
+from laufruhe.numerics.norms import Grid
+from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.problem.decision import Decision, Kind, LeadDrive
+from laufruhe.problem.measure import Measure, bends_of, load_rows, selected
+from laufruhe.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+FINE = 1440
+"""Angles between which a mean is averaged where no program stands at them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Share:
+    """What one shaft brings to a load, or what stands: per operating point, and of one unit of every column."""
+
+    own: list[Spectrum]
+    columns: list[list[Spectrum]]
+
+
+@dataclass(frozen=True, eq=False)
+class LedNorm:
+    """A norm at some leads, and what each lead changes of its rows there.
+
+    Attributes
+    ----------
+    norm
+        Its rows at these leads.
+    moved
+        Of every lead the same rows differentiated by it, (k, d) and (k, d, n), and the slope that its shaft brings.
+    angles
+        Of the rows of one signal, shape (points, steps) [rad]; None where leads change nothing.
+    """
+
+    norm: AffineNorm
+    moved: tuple[tuple[Array, Array, Array], ...]
+    angles: Array | None = None
+
+
+class LedModel:
+    """Loads at any leads.
+
+    Parameters
+    ----------
+    problem
+        Whose decisions are leads and unbalances.
+
+    Attributes
+    ----------
+    lower, upper, start
+        Of the leads [rad].
+    names
+        Of their shafts.
+    whole
+        Of the engine with its leads at their start.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.leads = tuple(d for d in problem.decisions if d.kind is Kind.LEAD)
+        self.lower, self.upper = (np.array([getattr(d, side) for d in self.leads]) for side in ("lower", "upper"))
+        self.start = np.array([d.start_number for d in self.leads])
+        self.names = [drive.shaft for d in self.leads for drive in d.drives if isinstance(drive, LeadDrive)]
+        self.whole = AffineModel(_of(problem, problem.engine, problem.unbalances), True, True)
+        self.domains = self.whole.domains
+        self._shafts = [AffineModel(carried(problem, name.__eq__), True, True) for name in self.names]
+        self._still = AffineModel(carried(problem, lambda name: name not in self.names), True, True)
+        self._known: dict[Measure, tuple[Share, list[Share]]] = {}
+
+    def shares(self, measure: Measure) -> tuple[Share, list[Share]]:
+        """Of a load what stands, and what each shaft brings, over one period that holds all of it."""
+        if measure not in self._known:
+            engine = self.problem.engine
+            found = [_share(model.spectra(measure.load)) for model in (self._still, *self._shafts)]
+            each = [signal for share in found for by in (share.own, *share.columns) for signal in by]
+            base = common_base([engine.cycle.base_order, *(signal.base for signal in each)])
+            count = max(len(signal.rebased(base).coefficients) for signal in each)
+            still, *shafts = (_each(share, lambda own: own.rebased(base).extended(count)) for share in found)
+            self._known[measure] = still, shafts
+        return self._known[measure]
+
+    def norm(self, measure: Measure, leads: Array, samples: int, averaged: bool) -> LedNorm:
+        """A measure at some leads, its means averaged about their angles where asked (P7)."""
+        if not measure.is_load:
+            norm = self.whole.norm(measure, samples)
+            none = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)
+            return LedNorm(norm, (none,) * len(self.names))
+        still, shafts = self.shares(measure)
+        by = leads - self.start
+        led = [_moved(share, float(d)) for share, d in zip(shafts, by, strict=True)]
+        total = _sum(still, led)
+        bends = bends_of(measure, total.own, self.problem.engine)
+        averaged = averaged and measure.norm.averages
+
+        def rows(signals: Sequence[Spectrum]) -> tuple[Grid, Array]:
+            step = signals[0].period / samples
+            signals = [signal.averaged(step) for signal in signals] if averaged else signals
+            found = load_rows(measure, self.problem.points, signals, self.problem.engine, samples, bends)
+            return found.grid, found.vectors
+
+        grid, constant = rows(total.own)
+        slope = _stacked([rows(own)[1] for own in total.columns], constant)
+        moved = []
+        for share in led:
+            steep = _derived(share)
+            own = rows(steep.own)[1]
+            rising, flat = (_stacked([rows(each)[1] for each in by.columns], constant) for by in (steep, share))
+            moved.append((own, rising, flat))
+        steps = total.own[0].period * np.arange(samples) / samples
+        angles = np.array([np.concatenate([steps, own]) for own in bends])
+        return LedNorm(AffineNorm(measure.norm, constant, slope, grid), tuple(moved), angles)
+
+    def at(self, leads: Array, samples: int, averaged: bool = False) -> tuple[AffineProblem, tuple[LedNorm, ...]]:
+        """Terms and limits that are loads or masses at some leads, and all of these norms in their order."""
+
+        def norm(measure: Measure) -> LedNorm:
+            # without a program peaks are sought as finely as results are measured (M6), and means hardly averaged
+            times = 1 if self.domains or not measure.is_load else measure.norm.refinement
+            if times == 1 and averaged and not self.domains:
+                times = max(round(FINE / samples), 1)
+            return self.norm(measure, leads, times * samples, averaged)
+
+        terms = [(term.weight, norm(term.measure)) for term in self.problem.load_terms]
+        limits = [(limit.maximum, norm(limit.measure)) for limit in self.problem.load_limits]
+        program = AffineProblem(
+            tuple((weight, led.norm) for weight, led in terms), tuple((most, led.norm) for most, led in limits),
+            self.domains, samples,
+        )  # fmt: skip
+        return program, tuple(led for _, led in (*terms, *limits))
+
+    def counted(self, measure: Measure, shaft: int) -> list[Spectrum]:
+        """What a shaft brings to what a measure counts, at its start, of every operating point with a weight."""
+        shares = measure.shares(self.problem.points)
+        own = self.shares(measure)[1][shaft].own
+        return [selected(measure, each, self.problem.engine) for each, share in zip(own, shares, strict=True) if share]
+
+
+def carried(problem: Problem, belongs: Callable[[str], bool]) -> Problem:
+    """The problem of what the shafts of some names carry alone, nothing else of the engine in it."""
+    engine = problem.engine
+    parts = tuple(part for part in engine.slider_cranks if belongs(part.shaft.name))
+    # the others stay as places without an unbalance, so that every decision keeps its column
+    rotors = tuple(r if belongs(r.shaft.name) else replace(r, unbalance=0.0) for r in engine.rotors)
+    own = {rotor.name for rotor in rotors if belongs(rotor.shaft.name)}
+    decisions = [
+        replace(d, drives=tuple(v if v.rotor in own else replace(v, gain=0.0) for v in d.rotor_drives))
+        for d in problem.unbalances
+    ]
+    return _of(problem, replace(engine, slider_cranks=parts, rotors=rotors), decisions)
+
+
+def _of(problem: Problem, engine: Engine, decisions: Sequence[Decision]) -> Problem:
+    return replace(problem, engine=engine, decisions=tuple(decisions))
+
+
+def _share(spectra: Sequence[tuple[Spectrum, tuple[Spectrum, ...]]]) -> Share:
+    """From what every operating point has of the design, and of every column."""
+    return Share([own for own, _ in spectra], [list(each) for each in zip(*(by for _, by in spectra), strict=True)])
+
+
+def _moved(share: Share, lead: float) -> Share:
+    """Earlier by a lead [rad]."""
+    return _each(share, lambda signal: signal.later(-lead / signal.period, -lead)) if lead else share
+
+
+def _derived(share: Share) -> Share:
+    """By the lead of its shaft."""
+    return _each(share, lambda signal: signal.derivative)
+
+
+def _each(share: Share, change: Callable[[Spectrum], Spectrum]) -> Share:
+    return Share([change(own) for own in share.own], [[change(own) for own in by] for by in share.columns])
+
+
+def _sum(still: Share, led: Sequence[Share]) -> Share:
+    """Of what stands and what was moved."""
+    own = [reduce(add, each) for each in zip(still.own, *(share.own for share in led), strict=True)]
+    columns = [
+        [reduce(add, each) for each in zip(*by, strict=True)]
+        for by in zip(still.columns, *(share.columns for share in led), strict=True)
+    ]
+    return Share(own, columns)
+
+
+def _stacked(columns: Sequence[Array], constant: Array) -> Array:
+    return np.stack(columns, axis=-1) if columns else np.zeros((*constant.shape, 0))
