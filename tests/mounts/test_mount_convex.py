@@ -145,13 +145,13 @@ def test_what_is_not_convex_is_not_called_so(tmp_path):
 
 def test_a_solver_that_lies_is_found_out(tmp_path, monkeypatch):
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
-    from laufruhe.solvers import mount_convex
+    from laufruhe.solvers import mount_cones
 
-    honest = mount_convex.solve_cones
-    monkeypatch.setattr(mount_convex, "solve_cones", lambda program: (0.9 * honest(program)[0], honest(program)[1]))
+    honest = mount_cones.solve_cones
+    monkeypatch.setattr(mount_cones, "solve_cones", lambda program: (0.9 * honest(program)[0], honest(program)[1]))
     result = solve_convex_mounts(problem)
     assert result.certificate.kind is not Proof.GLOBAL
     assert result.status is Status.FEASIBLE
-    monkeypatch.setattr(mount_convex, "solve_cones", lambda program: (1.1 * honest(program)[0], honest(program)[1]))
+    monkeypatch.setattr(mount_cones, "solve_cones", lambda program: (1.1 * honest(program)[0], honest(program)[1]))
     # what breaks a limit is not taken: the design as given is left
     assert solve_convex_mounts(problem).objective.value == result.objective.initial

@@ -8,13 +8,9 @@ import pytest
 from scipy.optimize import minimize
 
 from laufruhe.numerics.norms import softened_lengths
+from laufruhe.solvers.local_optimum import Ending, distinct, is_explored
 from laufruhe.solvers.mount_starts import spread_starts
-from laufruhe.solvers.nonlinear import (
-    Ending,
-    NonlinearProgram,
-    distinct,
-    solve_nonlinear,
-)
+from laufruhe.solvers.nonlinear import NonlinearProgram, solve_nonlinear
 
 
 def rosenbrock(radius: float = 1.0) -> NonlinearProgram:
@@ -60,7 +56,7 @@ def test_mean_of_lengths_reaches_zero_cleanly(workers):
         parameters=softness, stages=((1e-2,), (1e-5,), (1e-9,)),
     )  # fmt: skip
     found = solve_nonlinear(program, spread_starts(program.lower, program.upper, 4), workers=workers)
-    assert len(found) == 4
+    assert sum(optimum.starts for optimum in found) == 4
     for optimum in found:
         assert optimum.usable
         assert optimum.x == pytest.approx(target, abs=1e-12)
@@ -105,6 +101,39 @@ def test_many_starts_find_the_best_of_several_optima_in_every_order():
         assert [o.value for o in apart] == sorted(o.value for o in apart)
         values.add(round(found[0].value, 8))
     assert len(values) == 1
+
+
+def waves(softness: float = 0.0) -> NonlinearProgram:
+    """Five optima, one of them best, and the same in two stages."""
+    x, e = ca.SX.sym("x", 1), ca.SX.sym("e")
+    return NonlinearProgram(
+        x, ca.sin(5 * x[0]) + 0.1 * (x[0] - e) ** 2, np.array([-4.0]), np.array([4.0]), parameters=e,
+        stages=((softness,), (0.0,)),
+    )  # fmt: skip
+
+
+def test_of_starts_with_one_end_one_goes_on_and_no_optimum_is_lost():
+    """Through all stages from every start there are the same optima, and as many starts lead to each."""
+    starts = spread_starts(np.array([-4.0]), np.array([4.0]), 24)
+    found = solve_nonlinear(waves(0.3), starts, workers=1)
+    alone = [solve_nonlinear(waves(0.3), [start], workers=1)[0] for start in starts]
+    apart = distinct(alone, 1.0, 1e-9)
+    assert [o.value for o in found] == pytest.approx([o.value for o in apart], abs=1e-12)
+    assert [o.starts for o in found] == [sum(abs(o.value - a.value) < 1e-9 for a in alone) for o in apart]
+
+
+def test_a_search_ends_when_it_has_met_every_optimum():
+    """By the rule of Boender and Rinnooy Kan: seven starts where there is one optimum, more where there are several."""
+    x = ca.SX.sym("x", 1)
+    bowl = NonlinearProgram(x, (x[0] - 0.3) ** 2, np.array([-4.0]), np.array([4.0]))
+    starts = spread_starts(np.array([-4.0]), np.array([4.0]), 60)
+    tried = [
+        solve_nonlinear(program, starts, workers=1, enough=lambda optima: is_explored(optima, 1.0))
+        for program in (bowl, waves())
+    ]
+    assert sum(o.starts for o in tried[0]) == 7
+    assert 24 < sum(o.starts for o in tried[1]) <= 60
+    assert len(tried[1]) == len(distinct(solve_nonlinear(waves(), starts, workers=1), 1.0))
 
 
 def test_starts_cover_every_variable_evenly_and_repeat_by_seed():

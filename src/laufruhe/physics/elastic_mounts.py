@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,7 @@ class ElasticMounting:
     block: Block
     mounts: tuple[Mount, ...]
     answering: tuple[int, ...] | None = None
+    _moved: list[tuple[Spectrum, float, ComplexArray]] = field(default_factory=list, repr=False)
 
     @cached_property
     def motions(self) -> Array:
@@ -239,6 +240,12 @@ class ElasticMounting:
         return struck, why
 
     def _modal_motion(self, wrench: Spectrum, speed: float) -> ComplexArray:
+        # forces and travel are of one motion; the wrench is kept, so that it stays itself
+        if not (self._moved and self._moved[0][0] is wrench and self._moved[0][1] == speed):
+            self._moved[:] = [(wrench, speed, self._new_motion(wrench, speed))]
+        return self._moved[0][2]
+
+    def _new_motion(self, wrench: Spectrum, speed: float) -> ComplexArray:
         loaded = np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1))
         out = np.zeros((len(wrench.coefficients), 6), dtype=complex)
         out[loaded] = self.responses(wrench.orders[loaded] * speed, wrench.coefficients[loaded])
@@ -269,7 +276,13 @@ def elastic_mounting(
     """
     if not any(any(spring.stiffness) for _, spring in every_spring(mounts)):
         raise ModelError("no mount has a stiffness; an elastic mounting needs one")
-    return ElasticMounting(block, tuple(mounts), answering)
+    return _elastic_mounting(block, tuple(mounts), answering)
+
+
+@lru_cache(maxsize=4)
+def _elastic_mounting(block: Block, mounts: tuple[Mount, ...], answering: tuple[int, ...] | None) -> ElasticMounting:
+    """One and the same for all that is asked of one design: its modes are found once."""
+    return ElasticMounting(block, mounts, answering)
 
 
 def single_transmissibility(ratio: Array, loss_factor: float = 0.0, damping_ratio: float = 0.0) -> Array:

@@ -14,6 +14,8 @@ from laufruhe.problem.problem import Problem
 
 ROUNDING = 1e-9
 """Share of what cancels that a sum of loads is taken for zero below."""
+SAMPLES = 96
+"""Steps over the cycle at which a size is taken."""
 
 
 def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
@@ -55,7 +57,7 @@ def _parts(engine: Engine) -> Iterator[Engine]:
 def _alone(problem: Problem, part: Engine) -> float:
     """The loads that are minimised, of one part."""
     try:
-        found = evaluate(problem, part)
+        found = evaluate(problem, part, min(problem.fidelity.samples, SAMPLES))
         return sum(term.weight * found.value(term.measure) for term in problem.load_terms if not term.measure.is_mass)
     except ModelError:
         # alone it drives what no mount carries

@@ -166,6 +166,9 @@ def _of_quantity(problem: Problem, quantity: Measure, softest: Softest, model: A
         roots.append({})
         for k in np.flatnonzero(quantity.counted([k * float(base) for k in range(max(len(c) for c in coefficients))])):
             loads = np.array([softest.load @ c[k] if k < len(c) else np.zeros(6) for c in coefficients])
+            if not np.any(loads):
+                # what nothing excites transmits nothing
+                continue
             half = 0.5 if k else 1.0
             metric = softest.metric(quantity.norm, loads)
             order = k * float(base)

@@ -22,6 +22,7 @@ from laufruhe.solvers.assembly import solve_assembly
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.leads import solve_leads
+from laufruhe.solvers.mount_convex import is_convex, solve_convex_mounts
 from laufruhe.solvers.places import solve_places
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.robust import solve_robust
@@ -69,18 +70,6 @@ def kinds_of(problem: Problem) -> frozenset[Kind]:
 def _named(kinds: frozenset[Kind]) -> str:
     """Kinds in words."""
     return " and ".join(kind.name.lower() for kind in sorted(kinds))
-
-
-def _convex_mounts(problem: Problem) -> Result:
-    from laufruhe.solvers.mount_convex import solve_convex_mounts
-
-    return solve_convex_mounts(problem)
-
-
-def _is_convex(problem: Problem) -> bool:
-    from laufruhe.solvers.mount_convex import is_convex
-
-    return is_convex(problem)
 
 
 def _smooth(problem: Problem) -> Result:
@@ -198,7 +187,7 @@ METHODS: tuple[Method, ...] = (
            lambda problem: solve_within(problem, solve_leads)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
-    Method("linear matrix inequalities", frozenset({_K}), _is_convex, Reach.WHOLE, _convex_mounts),
+    Method("linear matrix inequalities", frozenset({_K}), is_convex, Reach.WHOLE, solve_convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _smooth),
     Method("flywheel, crankshaft and the rest apart", frozenset(Kind) - {_S}, is_apart,

@@ -35,7 +35,6 @@ from laufruhe.prove.convex_functions import (
 )
 from laufruhe.solvers.conclusion import Shown, better, concluded, given_design, judged, none_within
 from laufruhe.solvers.conflicts import smallest_conflict
-from laufruhe.solvers.mount_cones import solve_cones
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
@@ -116,6 +115,8 @@ def _limits(limit: Limit, k: int, matrices: Matrices, mounting: ElasticMounting,
 
 def solve_convex_mounts(problem: Problem) -> Result:
     """Global optimum of a problem that `is_convex`, with a certificate from the exact model."""
+    from laufruhe.solvers.mount_cones import solve_cones
+
     started = time.perf_counter()
     program = convex_program(problem)
     initial = evaluate_start(problem)
@@ -168,6 +169,7 @@ def _residual(program: ConvexProgram, x: Array, duals: ConvexDuals, gradient: Ar
 
 def _conflict(program: ConvexProgram, problem: Problem) -> tuple[str, ...]:
     """Limits that no stiffness within the bounds meets together."""
+    from laufruhe.solvers.mount_cones import solve_cones
 
     def excluded(kept: Sequence[Limit]) -> bool:
         limits = tuple(limit for limit in program.limits if problem.limits[limit.source] in kept)

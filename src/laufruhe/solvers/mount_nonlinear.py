@@ -26,10 +26,10 @@ from laufruhe.prove.spring_search import spring_bound
 from laufruhe.prove.subdivision import divided_bound, divides
 from laufruhe.prove.transmitted_bound import transmitted_bound
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, none_within
+from laufruhe.solvers.local_optimum import LocalOptimum, distinct
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mount_search import Found, MountSearch, judged_at
 from laufruhe.solvers.mount_starts import columns_of, unbalances_of
-from laufruhe.solvers.nonlinear import LocalOptimum, distinct
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth_program import SmoothProgram
 from laufruhe.solvers.unbalances import beyond_mounts, solve_unbalances
@@ -217,9 +217,9 @@ def _result(
 
 
 def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, float] | None, divided: Divided) -> str:
-    usable = [o for o in optima if o.usable]
+    starts, usable = (sum(o.starts for o in some) for some in (optima, [o for o in optima if o.usable]))
     apart = distinct(optima, scale)
-    text = f"IPOPT from {len(optima)} start{'s' if len(optima) > 1 else ''}, {len(usable)} of which ended at "
+    text = f"IPOPT from {starts} start{'s' if starts > 1 else ''}, {usable} of which ended at "
     text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
     if len(apart) > 1 and apart[-1].value > WORTH_SAYING * apart[0].value > 0.0:
         text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
@@ -243,7 +243,7 @@ def _none(
     nearest = min(search.optima, key=lambda o: o.violation)
     names = _broken(search.joint, nearest)
     message = (
-        f"no design found: from {len(search.optima)} starts none meets {names or 'the limits'} "
+        f"no design found: from {sum(o.starts for o in search.optima)} starts none meets {names or 'the limits'} "
         f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
     )
     return replace(result, status=Status.FAILED, message=message)

@@ -17,8 +17,9 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBLE, Design, given_design, judged
+from laufruhe.solvers.local_optimum import LocalOptimum, distinct, is_explored
 from laufruhe.solvers.mount_starts import start_points
-from laufruhe.solvers.nonlinear import LocalOptimum, distinct, solve_nonlinear
+from laufruhe.solvers.nonlinear import solve_nonlinear
 from laufruhe.solvers.smooth_program import SmoothProgram
 
 Array = NDArray[np.float64]
@@ -150,9 +151,9 @@ class MountSearch:
         starts = [
             joint.start(mounts, columns, self._nudged(generator, k)) for k, (mounts, columns) in enumerate(points)
         ]
-        optima = solve_nonlinear(joint.program, starts, self._workers, ITERATIONS)
+        optima = solve_nonlinear(joint.program, starts, self._workers, ITERATIONS, enough=self._is_explored)
         around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
-        if around and len(points) > 1 and not passed():
+        if around and len(points) > 1 and not self._is_explored(optima) and not passed():
             decisions = problem.mount_decisions
             low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
             again = []
@@ -164,6 +165,9 @@ class MountSearch:
             more = solve_nonlinear(joint.program, again, self._workers, ITERATIONS)
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._take(optima)
+
+    def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
+        return is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12))
 
     def _take(self, optima: Sequence[LocalOptimum]) -> None:
         """Judge where starts ended; whatever the solver says of an end, the exact model tells."""

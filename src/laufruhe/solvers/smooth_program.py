@@ -42,7 +42,8 @@ from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.gathered import Gathered
-from laufruhe.solvers.nonlinear import LocalOptimum, NonlinearProgram
+from laufruhe.solvers.local_optimum import LocalOptimum
+from laufruhe.solvers.nonlinear import NonlinearProgram
 from laufruhe.solvers.smooth_modes import ModeVariables
 
 Array = NDArray[np.float64]
