@@ -1,0 +1,48 @@
+"""A search whose angles are too few to prove its best star looks again at more of them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import laufruhe
+
+# of a six-cylinder only order 6 is left, along one line: the mean of |cos 6 phi| has corners between the angles
+SIX = """
+title = "Open stars of a six-cylinder"
+[engine]
+layout = "inline"
+cylinders = 6
+cycle = "four-stroke"
+stroke = "100 mm"
+rod_length = "150 mm"
+reciprocating_mass = "1 kg"
+cylinder_spacing = "120 mm"
+throws = "open"
+firing_order = "open"
+[[counterweights]]
+name = "weight"
+opposite_throw = 5
+unbalance = { between = ["0 kg m", "0.05 kg m"] }
+[[operating_points]]
+speed = "3000 rpm"
+[phasing]
+best = 1
+method = "enumeration"
+[objective]
+minimise = "mean shaking force"
+"""
+
+
+@pytest.mark.slow
+def test_corners_between_the_angles_keep_no_gap_open() -> None:
+    result = laufruhe.solve(laufruhe.load(SIX))
+    assert result.certificate is not None
+    assert result.objective is not None
+    assert result.certificate.kind == "global"
+    assert result.certificate.gap <= 1e-4
+    amplitude = result.objective.value * math.pi / 2.0
+    squares = laufruhe.solve(laufruhe.load(SIX.replace("mean shaking", "rms shaking")))
+    assert squares.objective is not None
+    assert math.isclose(amplitude, squares.objective.value * math.sqrt(2.0), rel_tol=3e-5)
