@@ -25,7 +25,7 @@ _LOADS = {"imep": "indicated mean pressure", "bmep": "brake mean pressure", "bra
 _SPEEDS = {"speed": "speed", "mean_piston_speed": "mean piston speed"}
 _SIDES = {"max": "at most", "min": "at least"}
 _AXES = "xyz"
-_NARROW, _WIDE = 0.25, 2.0
+_NARROW, _WIDE, _STEPS = 0.25, 2.0, 200
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,16 @@ class Control:
     open: bool = False
     limit: str = ""
 
+    @property
+    def step(self) -> float:
+        """A round one, of which a slider has some two hundred."""
+        return _round_step((self.high - self.low) / _STEPS)
+
+
+def _round_step(rough: float) -> float:
+    size = 10.0 ** math.floor(math.log10(rough))
+    return float(f"{next(times * size for times in (1, 2, 5, 10) if times * size >= 0.999 * rough):.1g}")
+
 
 def controls_of(tables: Mapping[str, Any], problem: Problem) -> list[Control]:
     """Of the problem as its file has it."""
@@ -70,7 +80,7 @@ def offered_by(tables: Mapping[str, Any], problem: Problem) -> list[str]:
 
 def as_json(controls: list[Control]) -> list[dict[str, Any]]:
     """For the page."""
-    return [asdict(control) for control in controls]
+    return [{**asdict(control), "step": control.step} for control in controls]
 
 
 def _number(given: Any) -> tuple[float, str] | None:
@@ -93,12 +103,9 @@ def _around(name: str, group: str, label: str, given: Any, low: float = _NARROW,
     if found is None or found[0] <= 0.0:
         return []
     value, unit = found
-    return [Control("set", name, group, label, value, _rounded(low * value), _rounded(high * value), unit)]
-
-
-def _rounded(value: float) -> float:
-    """To two figures: an end that can be read."""
-    return float(f"{value:.2g}")
+    step = _round_step((high - low) * value / _STEPS)
+    ends = [float(f"{round(share * value / step) * step:.10g}") for share in (low, high)]
+    return [Control("set", name, group, label, value, ends[0], ends[1], unit)]
 
 
 def _of_points(tables: Mapping[str, Any]) -> Iterator[Control]:

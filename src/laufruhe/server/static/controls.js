@@ -3,11 +3,10 @@ import { element, shown } from "./parts.js";
 
 /**
  * @typedef {{way: string, name: string, group: string, label: string, value: number, low: number, high: number,
- *   unit: string, open: boolean, limit: string}} Control
+ *   step: number, unit: string, open: boolean, limit: string}} Control
  * @typedef {[string, string, any]} Edit
  */
 
-const STEPS = 400;
 const ORDER = ["Limits", "Engine", "Open numbers", "Mounts"];
 
 /** All sliders of a problem, in groups. */
@@ -47,7 +46,7 @@ export class Controls {
   row(control, edit) {
     const id = `c-${control.name}`;
     const value = edit ? parseFloat(edit[2]) : control.value;
-    const limits = { min: control.low, max: control.high, step: (control.high - control.low) / STEPS };
+    const limits = { min: control.low, max: control.high, step: control.step };
     const range = element("input", { type: "range", id, ...limits, "data-control": control.name });
     const number = element("input", { type: "number", step: "any", "aria-label": `${control.label}, ${control.unit || "number"}`,
       "data-number-of": control.name });

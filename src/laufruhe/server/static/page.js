@@ -60,6 +60,7 @@ function changed(name, edit) {
   else state.edits.delete(name);
   // what is held by hand is held no other way
   state.held = state.held.filter((held) => held[1] !== name);
+  byId("optimum").dataset.stage = "asked";
   remember();
   follow();
 }
@@ -267,6 +268,7 @@ async function heard(told) {
   state.version = told.version;
   if (told.complaint) return;
   state.held = [];
+  byId("optimum").dataset.stage = "asked";
   await begin();
   follow();
 }
@@ -295,6 +297,7 @@ function back() {
   state.edits.clear();
   state.held = [];
   remember();
+  byId("optimum").dataset.stage = "asked";
   byId("follows").checked = true;
   begin().then(follow).catch(failed);
 }
@@ -318,6 +321,7 @@ async function showKept() {
   if (!kept) return;
   state.edits = new Map(kept.edits);
   state.held = [...kept.held];
+  byId("optimum").dataset.stage = "asked";
   remember();
   byId("follows").checked = false;
   await begin();

@@ -1,0 +1,248 @@
+"""The served page in a browser: the optimum follows, what cannot be is said, and it outlives its server."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+import laufruhe
+from browser.chromium import serious
+from problem_files import PROBLEMS, changed
+
+pytestmark = pytest.mark.slow
+RUN = "from laufruhe.cli import main; main()"
+TEXT = (PROBLEMS / "tractor-four-lanchester.toml").read_text(encoding="utf-8")
+TEXT += '\n[[constraints]]\nlimit = "maximum mount force"\nmax = "1500 N"\n'
+PATIENCE = 30_000
+MASS, FORCE = "constraints.1.max", "constraints.2.max"
+
+
+@contextmanager
+def served(path: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """The address of a page, and its server."""
+    words = [sys.executable, "-c", RUN, "page", str(path), "--no-browser"]
+    running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    assert running.stdout is not None
+    try:
+        yield running.stdout.readline().partition(": ")[2].strip(), running
+    finally:
+        running.terminate()
+        running.wait(30)
+        running.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("served") / "mine.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def address(file: Path) -> Iterator[str]:
+    with served(file) as (found, _):
+        yield found
+
+
+@pytest.fixture
+def shown(page: Page, address: str) -> Page:
+    page.goto(address)
+    settled(page)
+    return page
+
+
+def settled(page: Page) -> float:
+    """The optimum, once it is proven."""
+    place = page.locator('#optimum[data-stage="settled"]')
+    place.wait_for(timeout=PATIENCE)
+    return float(place.get_attribute("data-value") or "nan")
+
+
+def slide(page: Page, control: str, value: float) -> None:
+    """As a mouse does."""
+    page.locator(f'[data-control="{control}"]').evaluate(
+        "(slider, value) => { slider.value = value; slider.dispatchEvent(new Event('input', { bubbles: true })); }",
+        value,
+    )
+
+
+def live(page: Page) -> float:
+    """The objective of the design that is shown."""
+    return float(page.locator('#live [data-measure="objective"]').get_attribute("data-value") or "nan")
+
+
+def solved(path: Path, **values: str) -> float:
+    problem = laufruhe.load(path).with_values({name.replace("__", "."): value for name, value in values.items()})
+    objective = laufruhe.solve(problem).objective
+    assert objective is not None
+    return objective.value
+
+
+def test_the_optimum_follows_a_limit_and_is_proven_when_it_rests(shown: Page, file: Path) -> None:
+    free = settled(shown)
+    assert free == pytest.approx(solved(file), rel=1e-6)
+    slide(shown, MASS, 0.5)
+    following = shown.locator('#optimum[data-stage="following"]')
+    bound = float(following.get_attribute("data-bound") or "nan")
+    tight = settled(shown)
+    assert bound <= tight == pytest.approx(solved(file, constraints__1__max="0.5 kg"), rel=1e-6)
+    assert tight > 1.5 * free
+    expect(shown.locator("#optimum")).to_contain_text("proven: no design has less than")
+    # weights have moved to that design, and the page's own sum of it is that value
+    shown.wait_for_timeout(100)
+    assert live(shown) == pytest.approx(tight, rel=1e-4)
+    expect(shown.locator(f'.control:has([data-control="{MASS}"]) .said')).to_contain_text("N per kg")
+
+
+def test_limits_that_contradict_each_other_are_marked_and_stay_usable(shown: Page) -> None:
+    slide(shown, FORCE, 600.0)
+    slide(shown, MASS, 0.2)
+    expect(shown.locator(".infeasible")).to_contain_text(
+        "'balancer mass' and 'maximum mount force' contradict each other"
+    )
+    assert shown.locator(".control.conflict").count() == 2
+    expect(shown.locator(f'[data-control="{MASS}"]')).to_be_enabled()
+    slide(shown, MASS, 4.0)
+    assert settled(shown) > 0.0
+    assert shown.locator(".control.conflict").count() == 0
+
+
+def test_it_is_used_by_keys_alone(shown: Page) -> None:
+    before = settled(shown)
+    slider = shown.locator('[data-control="operating_points.1.speed"]')
+    for _ in range(60):
+        shown.keyboard.press("Tab")
+        if slider.evaluate("own => own === document.activeElement"):
+            break
+    expect(slider).to_be_focused()
+    for _ in range(3):
+        shown.keyboard.press("PageUp")
+    assert settled(shown) > before
+    shown.keyboard.press("Tab")
+    shown.keyboard.press("Tab")
+    shown.keyboard.press("Enter")
+    expect(shown.locator(".control.changed")).to_have_count(0)
+    assert settled(shown) == pytest.approx(before, rel=1e-6)
+
+
+def test_the_state_is_in_the_address_and_the_token_is_not(shown: Page, address: str) -> None:
+    slide(shown, "engine.rod_ratio", 0.3)
+    tight = settled(shown)
+    assert address.partition("#t=")[2] not in shown.url
+    assert "rod_ratio" in shown.url
+    shown.reload()
+    assert settled(shown) == pytest.approx(tight, rel=1e-9)
+    shown.locator("#back").click()
+    assert settled(shown) != pytest.approx(tight, rel=1e-3)
+    assert "rod_ratio" not in shown.url
+
+
+def test_who_comes_without_the_token_is_told_so(page: Page, address: str) -> None:
+    page.goto(address.partition("#")[0])
+    expect(page.locator("#complaint")).to_contain_text("open the page by the address that laufruhe printed")
+
+
+def test_a_bad_number_is_a_line_and_nothing_is_lost(shown: Page) -> None:
+    figure = shown.locator('[data-number-of="engine.rod_ratio"]')
+    figure.fill("1.4")
+    figure.press("Enter")
+    expect(shown.locator("#complaint")).to_contain_text("engine.rod_ratio")
+    figure.fill("0.27")
+    figure.press("Enter")
+    expect(shown.locator("#complaint")).to_be_hidden()
+    assert settled(shown) > 0.0
+
+
+def test_two_designs_stand_side_by_side(shown: Page) -> None:
+    first = settled(shown)
+    shown.locator("#keep").click()
+    slide(shown, MASS, 0.5)
+    second = settled(shown)
+    shown.wait_for_timeout(200)
+    row = shown.locator("#compared tr").nth(1).inner_text()
+    a, b = re.findall(r"([\d.]+) N", row)
+    assert (float(a), float(b)) == pytest.approx((first, second), rel=1e-3)
+    assert shown.locator("#kept svg").count() >= 3
+    shown.locator("#show-a").click()
+    assert settled(shown) == pytest.approx(first, rel=1e-6)
+
+
+def test_the_front_fills_in_and_a_point_is_a_design(shown: Page) -> None:
+    shown.locator("#across").select_option("balancer mass")
+    shown.locator("#draw").click()
+    shown.locator("#front circle").nth(6).wait_for()
+    expect(shown.locator("#front-state")).to_contain_text("done", timeout=PATIENCE)
+    assert shown.locator("#front circle").count() >= 20
+    point = shown.locator("#front circle").nth(10)
+    told = point.get_attribute("aria-label") or ""
+    point.focus()
+    shown.keyboard.press("Enter")
+    shown.wait_for_timeout(200)
+    value = re.search(r": ([\d.]+) N,", told)
+    assert value is not None
+    assert live(shown) == pytest.approx(float(value[1]), rel=2e-3)
+    expect(shown.locator("#follows")).not_to_be_checked()
+
+
+def test_the_engine_turns(shown: Page) -> None:
+    before = shown.locator("#engine").inner_html()
+    shown.locator("#turn").click()
+    shown.wait_for_timeout(300)
+    shown.locator("#turn").click()
+    after = shown.locator("#engine").inner_html()
+    assert after != before
+    assert shown.locator("#engine .piston").count() >= 8
+
+
+def test_the_state_is_saved(shown: Page, tmp_path: Path) -> None:
+    slide(shown, MASS, 0.5)
+    tight = settled(shown)
+    with shown.expect_download() as download:
+        shown.locator("#save").click()
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    found = laufruhe.evaluate(path).objective
+    assert found is not None
+    assert found.value == pytest.approx(tight, rel=1e-4)
+
+
+def test_the_page_has_no_serious_finding(shown: Page) -> None:
+    shown.locator("#keep").click()
+    assert serious(shown) == []
+
+
+def test_it_watches_the_file_and_outlives_the_server(page: Page, tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    with served(path) as (address, server):
+        page.goto(address)
+        before = settled(page)
+        path.write_text(changed(TEXT, '"2500 rpm"', "2500 rpm"), encoding="utf-8")
+        expect(page.locator("#banner")).to_contain_text("is no TOML")
+        expect(page.locator("#banner")).to_contain_text("at line 22")
+        slide(page, MASS, 0.9)
+        assert settled(page) > 0.0
+        path.write_text(changed(TEXT, '"2500 rpm"', '"3000 rpm"'), encoding="utf-8")
+        expect(page.locator("#banner")).to_be_hidden()
+        expect(page.locator('[data-number-of="operating_points.1.speed"]')).to_have_value("3000")
+        assert settled(page) > before
+        server.kill()
+        expect(page.locator("#banner[data-gone]")).to_contain_text("laufruhe page own.toml", timeout=PATIENCE)
+        expect(page.locator(f'[data-control="{MASS}"]')).to_be_disabled()
+        value = live(page)
+        weight = page.locator('#live [data-decision="left.unbalance"]')
+        weight.focus()
+        for _ in range(5):
+            page.keyboard.press("PageUp")
+        deadline = time.monotonic() + 10.0
+        while live(page) == value and time.monotonic() < deadline:
+            page.wait_for_timeout(50)
+        assert live(page) > value
