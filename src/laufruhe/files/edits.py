@@ -65,12 +65,15 @@ def _is_negative(value: Any) -> bool:
 def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
     """Keys and places that lead to a number: by the name that a result shows, or by a path as studies have it."""
     first, _, rest = name.partition(".")
-    if first in ProblemFile.model_fields and rest:
+    if name.replace(" ", "_") in tables.get("engine", {}):
+        # masses of all cylinders are called by their key alone
+        return "engine", name.replace(" ", "_")
+    named = list(_named(tables))
+    if first in ProblemFile.model_fields and rest and (first in tables or first not in {label for label, _ in named}):
         parent, _, last = name.rpartition(".")
         keys = keys_of(dict(tables), parent)
         here = _at(tables, keys)
         return (*keys, last) if isinstance(here, dict) else keys_of(dict(tables), name)
-    named = list(_named(tables))
     known = [(label, keys) for label, keys in named if name.startswith(f"{label}.")]
     for label, keys in sorted(known, key=lambda pair: -len(pair[0])):
         found = _below(_at(tables, keys), name.removeprefix(f"{label}.").split("."))

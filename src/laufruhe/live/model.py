@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
 HOW = "laufruhe page {file} moves it"
 OBJECTIVE = "objective"
+NOTHING = "Nothing is open here that the loads are affine in."
 
 
 def live_model(problem: Problem, result: Result) -> LiveModel:
@@ -50,19 +51,16 @@ def live_model(problem: Problem, result: Result) -> LiveModel:
     file = f"{problem.name}.toml"
     bare = LiveModel(
         problem.name, problem.title, file, tuple(point.name for point in problem.points), problem.engine.cycle.turns,
-        objective=result.problem.objective_name, unit=result.problem.objective_unit or "",
+        objective=replace(result.problem, over=None).objective_name, unit=result.problem.objective_unit or "",
     )  # fmt: skip
     values = _decided(result)
     moving = _moving(result.problem, values)
-    still = tuple((d.name, _stays(file)) for d in result.problem.decisions if not d.is_affine)
-    if result.problem.phasing is not None:
-        still = (*((name, _star(file)) for name in result.problem.phasing.open_names), *still)
-    if not moving.decisions:
-        return replace(bare, unmoved=still, why_not="Nothing is open here that the loads are affine in.")
+    still = tuple(_still(result.problem, file))
+    bare = replace(bare, unmoved=still, why_not="" if moving.decisions else NOTHING)
     try:
-        found = _filled(replace(bare, unmoved=still), moving, result, values)
+        found = _filled(bare, moving, result, values)
     except ModelError as error:
-        return replace(bare, unmoved=still, why_not=f"The loads cannot be shown while decisions move: {error}.")
+        return replace(bare, why_not=f"The loads cannot be shown while decisions move: {error}.")
     return replace(found, save=saved(problem, result, moving, values))
 
 
@@ -117,7 +115,7 @@ class _Collected:
         self.model, self.kinds, self.file = model, kinds, file
         self.signals: dict[Measure, Signal] = {}
         self.unmoved: list[tuple[str, str]] = []
-        self.asked: list[Measure] = []
+        self.asked: list[Measure | None] = []
 
     def signal(self, measure: Measure) -> int:
         """Number of the signal whose norm a measure is; one for all norms."""
@@ -146,7 +144,7 @@ class _Collected:
         if not stays and not is_affine:
             self.unmoved.append((name, f"no affine map of what is open says it; {HOW.format(file=self.file)}"))
             return []
-        self.asked.append(measure)
+        self.asked.append(None if stays else measure)
         base = Shown(role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit))
         if not stays:
             return [replace(base, signal=self.signal(measure))]
@@ -182,12 +180,13 @@ def _slider(domain: Domain) -> Slider:
 
 
 def _vector(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
-    return np.concatenate([domain.columns_of(value) for domain, value in zip(domains, values, strict=True)])
+    columns = (domain.columns_of(value) for domain, value in zip(domains, values, strict=True))
+    return np.concatenate([np.zeros(0), *columns])
 
 
 def _between(domains: Sequence[Domain]) -> Array:
     """Somewhere inside, in no special place."""
-    parts = []
+    parts = [np.zeros(0)]
     for k, domain in enumerate(domains):
         low, high = domain.set.lower, domain.set.upper
         size = low + (0.31 + 0.37 * ((0.618 * k) % 1.0)) * (high - low)
@@ -197,10 +196,11 @@ def _between(domains: Sequence[Domain]) -> Array:
     return np.concatenate(parts)
 
 
-def _design(name: str, x: Array, moving: Problem, domains: Sequence[Domain], asked: Sequence[Measure]) -> Design:
+def _design(name: str, x: Array, moving: Problem, domains: Sequence[Domain], asked: Sequence[Measure | None]) -> Design:
     """A design as `evaluate` finds it."""
     found = evaluate(moving, moving.design([domain.complex_value(x) for domain in domains]))
-    return Design(name, tuple(map(float, x)), tuple(float(found.value(measure)) for measure in asked))
+    told = (None if measure is None else float(found.value(measure)) for measure in asked)
+    return Design(name, tuple(map(float, x)), tuple(told))
 
 
 def _proved(result: Result) -> Proved | None:
@@ -216,10 +216,15 @@ def _proved(result: Result) -> Proved | None:
     return Proved(objective.value, certificate.lower_bound, certificate.gap, str(certificate.kind))
 
 
-def _stays(file: str) -> str:
-    """Why a decision has no slider."""
-    return f"loads are not affine in it, so it stays as it was decided; {HOW.format(file=file)}"
-
-
-def _star(file: str) -> str:
-    return f"stars are chosen and not slid, so the one decided stays; {HOW.format(file=file)}"
+def _still(problem: Problem, file: str) -> Iterator[tuple[str, str]]:
+    """What is open and has no slider, and why."""
+    how = HOW.format(file=file)
+    names = problem.phasing.open_names if problem.phasing is not None else ()
+    yield from ((name, f"stars are chosen and not slid, so the one decided stays; {how}") for name in names)
+    for decision in problem.decisions:
+        if not decision.is_affine:
+            yield decision.name, f"loads are not affine in it, so it stays as it was decided; {how}"
+    lots = problem.assembly.lots if problem.assembly is not None else ()
+    yield from ((f"the {lot.kind} of every cylinder", "parts are chosen and not slid") for lot in lots)
+    if problem.over is not None:
+        yield problem.objective_name, "shown of the drawing, without its tolerances, so no optimum stands beside it"

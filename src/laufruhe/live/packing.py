@@ -33,7 +33,7 @@ class Block:
     def text(self) -> str:
         """All of them, deflated, as base64."""
         whole = np.concatenate([np.zeros(0), *self._parts]).astype("<f8")
-        return base64.b64encode(zlib.compress(whole.tobytes(), 9)).decode("ascii")
+        return base64.b64encode(zlib.compress(whole.tobytes(), 6)).decode("ascii")
 
 
 def with_unit(unit: str) -> dict[str, Any]:
@@ -61,6 +61,7 @@ def _point(point: PointSignal, block: Block) -> dict[str, Any]:
         "series": _waves(point.series, block),
         "bends": None if point.bends is None else _bends(point.bends, block),
         "slope": _waves(point.slope, block),
+        "bent": [{"column": column, **_bends(bends, block)} for column, bends in point.bent],
     }
 
 

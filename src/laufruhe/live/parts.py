@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from laufruhe.live.packing import Block, packed, with_unit
-from laufruhe.live.saving import Saved
+from laufruhe.live.saving import NOT_SAVED, Saved
 from laufruhe.live.signals import Signal
 
 VERSION = 1
@@ -90,11 +90,11 @@ class Curve:
 
 @dataclass(frozen=True)
 class Design:
-    """Values of the decision vector, and every measure that the exact model finds for it."""
+    """Values of the decision vector, and every measure that the exact model finds for it; None of what stays."""
 
     name: str
     x: tuple[float, ...]
-    measured: tuple[float, ...]
+    measured: tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ class LiveModel:
     unit: str = ""
     proved: Proved | None = None
     unmoved: tuple[tuple[str, str], ...] = ()
-    save: Saved = field(default_factory=Saved)
+    save: Saved = NOT_SAVED
     why_not: str = ""
 
     @property
@@ -203,4 +203,5 @@ def _measure(shown: Shown) -> dict[str, Any]:
 
 def _design(design: Design) -> dict[str, Any]:
     # on a resonance there is no number
-    return {"x": design.x, "measured": [value if np.isfinite(value) else None for value in design.measured]}
+    told = [None if value is None or not np.isfinite(value) else value for value in design.measured]
+    return {"x": design.x, "measured": told}

@@ -45,10 +45,13 @@ class Saved:
     note: str = "The problem was made in code, so there is no file to save."
 
 
+NOT_SAVED = Saved()
+
+
 def saved(problem: Problem, result: Result, moving: Problem, values: Mapping[str, Value]) -> Saved:
     """The file of a design whose moving decisions are to be filled in; none that does not read as that design."""
     if problem.origin is None:
-        return Saved()
+        return NOT_SAVED
     tables, path = problem.origin.file
     marks = _marks(moving.decisions)
     try:

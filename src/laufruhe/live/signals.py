@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum, common_base
@@ -74,12 +75,15 @@ class PointSignal:
         Its corners; None where it has none.
     slope
         Of one unit of every column, shape (orders, places, d, columns).
+    bent
+        Columns that bend by themselves, and how.
     """
 
     share: float
     series: Waves
     bends: Bends | None
     slope: Waves
+    bent: tuple[tuple[int, Bends], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +114,7 @@ class Signal:
 
 
 def signal_of(model: AffineModel, measure: Measure) -> Signal:
-    """The rows whose norm a measure is; `ModelError` where what is open bends them."""
+    """The rows whose norm a measure is."""
     return _of_load(model, measure) if measure.is_load else _of_masses(model, measure)
 
 
@@ -121,15 +125,14 @@ def _of_load(model: AffineModel, measure: Measure) -> Signal:
     # the period of one evaluation, in whose steps its means and peaks are sought
     base = common_base([problem.engine.cycle.base_order, *(signal.base for signal in every)])
     bare = over(base, [own for own, _ in pairs])
-    # those of every norm: a mean has no need of them
-    bends = bends_of(replace(measure, norm=PEAK), bare, problem.engine)
-    shares = measure.shares(problem.points)
+    columns = [over(base, by) for _, by in pairs]
+    # those of every norm, a mean has no need of them, and of all that may bend
+    whole = [reduce(add, by, own) for own, by in zip(bare, columns, strict=True)]
+    bends = bends_of(replace(measure, norm=PEAK), whole, problem.engine)
     points = []
-    for own, (_, by), share, at in zip(bare, pairs, shares, bends, strict=True):
-        columns = [selected(measure, signal.rebased(base), problem.engine) for signal in by]
-        if any(column.corners is not None for column in columns):
-            raise ModelError(f"{channel} bends with what is open")
-        points.append(_point(float(share), selected(measure, own, problem.engine), columns, at))
+    for share, own, by, at in zip(measure.shares(problem.points), bare, columns, bends, strict=True):
+        counted = [selected(measure, signal, problem.engine) for signal in (own, *by)]
+        points.append(_point(float(share), counted[0], counted[1:], at))
     names = channel.places(problem.engine)
     places = tuple(names[k] for k in measure.places(names)) or ("block",)
     return Signal(channel.name, channel.unit, places, float(base), problem.fidelity.samples, tuple(points))
@@ -141,10 +144,16 @@ def _point(share: float, own: Spectrum, columns: Sequence[Spectrum], at: Array) 
     slope = np.zeros((most, *shape, len(columns)), dtype=complex)
     for k, column in enumerate(columns):
         slope[: len(column.coefficients), ..., k] = column.coefficients
-    bends = None
-    if own.corners is not None:
-        bends = Bends(Waves.of(own.smooth.coefficients), own.corners.angles, own.corners.pieces(own.period), at)
-    return PointSignal(share, Waves.of(own.coefficients), bends, Waves.of(slope))
+    bent = tuple((k, _bends(column, at)) for k, column in enumerate(columns) if column.corners is not None)
+    bends = _bends(own, at) if bent or own.corners is not None else None
+    return PointSignal(share, Waves.of(own.coefficients), bends, Waves.of(slope), bent)
+
+
+def _bends(signal: Spectrum, at: Array) -> Bends:
+    smooth, corners = Waves.of(signal.smooth.coefficients), signal.corners
+    if corners is None:
+        return Bends(smooth, np.zeros(0), np.zeros((1, 0, *signal.coefficients.shape[1:])), at)
+    return Bends(smooth, corners.angles, corners.pieces(signal.period), at)
 
 
 def _of_masses(model: AffineModel, measure: Measure) -> Signal:

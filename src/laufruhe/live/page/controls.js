@@ -14,18 +14,20 @@ class Slider {
     this.range.addEventListener("input", () => told(name, this.range.valueAsNumber / unit.factor, false));
     this.range.addEventListener("change", () => told(name, this.range.valueAsNumber / unit.factor, true));
     this.number.addEventListener("change", () => this.typed(told));
-    const rail = element("div", { class: "live-rail" }, this.range);
-    for (const [kind, value] of marks) rail.append(this.mark(kind, value));
+    this.rail = element("div", { class: "live-rail" }, this.range);
+    this.marks = {};
+    for (const [kind, value] of marks) this.setMark(kind, value);
     const ends = element("span", { class: "live-ends" }, `${trimmed(lower * unit.factor)} to ${trimmed(upper * unit.factor)} ${unit.shown}`.trimEnd());
     this.root = element("div", { class: "live-slider" },
-      element("label", { for: id }, name, ends), rail, element("span", { class: "live-typed" }, this.number, element("span", { "aria-hidden": "true" }, unit.shown)));
+      element("label", { for: id }, name, ends), this.rail, element("span", { class: "live-typed" }, this.number, element("span", { "aria-hidden": "true" }, unit.shown)));
   }
 
   /** Where a known design stands. */
-  mark(kind, value) {
-    const { lower, upper } = this.field, made = element("i", { class: `live-mark ${kind}`, "aria-hidden": "true" });
-    made.style.left = `${(100 * (value - lower)) / (upper - lower || 1)}%`;
-    return made;
+  setMark(kind, value) {
+    const { lower, upper } = this.field, made = this.marks[kind] ??= element("i", { class: `live-mark ${kind}`, "aria-hidden": "true" });
+    if (!made.parentNode) this.rail.append(made);
+    // the middle of a thumb runs from one half of it to the other
+    made.style.left = `calc(8px + (100% - 16px) * ${(value - lower) / (upper - lower || 1)})`;
   }
 
   /** Arrows move by a thousandth of the range, pages by a twentieth. */
@@ -40,16 +42,18 @@ class Slider {
 
   typed(told) {
     const value = this.number.valueAsNumber / this.field.unit.factor;
-    if (!Number.isFinite(value)) { this.show(this.value); return; }
-    told(this.field.name, Math.min(Math.max(value, this.field.lower), this.field.upper), true);
+    const kept = Number.isFinite(value) ? Math.min(Math.max(value, this.field.lower), this.field.upper) : this.value;
+    this.value = NaN;
+    told(this.field.name, kept, true);
   }
 
   show(value) {
     const { unit } = this.field;
+    if (value === this.value) return;
     this.value = value;
     this.range.value = value * unit.factor;
     this.range.setAttribute("aria-valuetext", figure(value, unit));
-    if (document.activeElement !== this.number || this.number.value !== "") this.number.value = trimmed(value * unit.factor, 5);
+    this.number.value = trimmed(value * unit.factor, 4);
   }
 }
 
@@ -57,9 +61,8 @@ class Slider {
 class Limits {
   constructor(measures) {
     this.rows = measures.map((measure) => this.row(measure));
-    const head = element("tr", {}, ...["limit", "value", "", "use"].map((text) => element("th", { scope: "col" }, text)));
+    const head = element("tr", {}, ...["limit", "value", "bound", "used"].map((text) => element("th", { scope: "col" }, text)));
     this.root = element("table", { class: "live-limits" }, element("thead", {}, head), element("tbody", {}, ...this.rows.map((row) => row.root)));
-    this.root.hidden = measures.length === 0;
   }
 
   row(measure) {

@@ -28,11 +28,18 @@ function label(x, y, text, anchor = "middle", kind = "tick") {
   return drawn("text", { x, y, "text-anchor": anchor, class: kind }, String(text));
 }
 
-/** A path through points: x and y of every index. */
+const FINE = 10;
+
+/** A path through points, x and y of every index, in tenths: whole numbers are quick to write and to read. */
 function pathOf(count, x, y, isClosed = false) {
-  let text = "";
-  for (let i = 0; i < count; i++) text += `${i ? "L" : "M"}${x(i).toFixed(1)} ${y(i).toFixed(1)}`;
-  return isClosed && count ? `${text}Z` : text;
+  const parts = new Array(count);
+  for (let i = 0; i < count; i++) parts[i] = `${Math.round(FINE * x(i))} ${Math.round(FINE * y(i))}`;
+  return count ? `M${parts.join("L")}${isClosed ? "Z" : ""}` : "";
+}
+
+/** A path in tenths. */
+function line(kind) {
+  return drawn("path", { class: kind, transform: `scale(${1 / FINE})`, "vector-effect": "non-scaling-stroke" });
 }
 
 /** So many even steps of a longer row, for drawing. */
@@ -48,8 +55,12 @@ function colour(k) {
 /** A scale that grows with what is drawn, and shrinks only when it is far too large. */
 class Scale {
   constructor() { this.top = 0; }
-  of(value) {
-    if (value > this.top || value < 0.3 * this.top) this.top = roundUp(value);
-    return this.top;
+  /** Whether it has changed. */
+  follow(value) {
+    const stays = this.top > 0 && value <= this.top && value >= 0.3 * this.top;
+    if (stays) return false;
+    const before = this.top;
+    this.top = roundUp(value);
+    return this.top !== before;
   }
 }

@@ -3,48 +3,83 @@
 const POINTS = 360;
 
 /**
- * What is drawn of a curve at one design: per place its rows at every step, means and peaks.
+ * What is drawn of a load at one design: per place its rows at every step, its mean and its peak.
  * @returns {{length: number, places: {name: string, rows: Float64Array[], lengths: Float64Array, mean: number, most: number}[]}}
  */
 function drawnOf(signal, k, x) {
-  const coarse = gridOf(signal, 1).points[k], fine = gridOf(signal, 8).points[k];
+  const coarse = rowsAt(signal, 1, x).points[k].groups, fine = rowsAt(signal, 8, x).points[k].groups;
   const places = signal.places.map((name, place) => {
-    const own = groupAt(signal, coarse, place, x);
-    const mean = own.lengths.reduce((sum, value) => sum + value, 0) / own.lengths.length;
-    return { name, ...own, mean, most: largest(groupAt(signal, fine, place, x).lengths) };
+    const { lengths, rows } = coarse[place];
+    let sum = 0;
+    for (let i = 0; i < lengths.length; i++) sum += lengths[i];
+    return { name, lengths, rows, mean: sum / lengths.length, most: largest(fine[place].lengths) };
   });
-  return { length: coarse.length, places };
+  return { length: gridOf(signal, 1).points[k].length, places };
+}
+
+/** The same in arrays of its own. */
+function keptOf(signal, k, x) {
+  const { length, places } = drawnOf(signal, k, x);
+  return { length, places: places.map((place) => ({ ...place, lengths: place.lengths.slice(), rows: place.rows.map((row) => row.slice()) })) };
+}
+
+/** Largest peak of two designs. */
+function peakOf(now, was) {
+  return Math.max(largest(now.places.map((place) => place.most)), largest(was.places.map((place) => place.most)));
+}
+
+/** A figure of a design beside another, whose lines and marks are drawn when these or the scale change. */
+class Compared {
+  constructor(signal, was) {
+    Object.assign(this, { signal, was, scale: new Scale(), isNew: true });
+  }
+
+  compare(was) {
+    this.was = was;
+    this.isNew = true;
+  }
+
+  /** Whether more than the design has to be drawn. */
+  follow(now) {
+    const isNew = this.scale.follow(peakOf(now, this.was)) || this.isNew;
+    this.isNew = false;
+    return isNew;
+  }
 }
 
 /** Tips of forces, seen from the front: a panel for every place. */
-class Polar {
-  constructor(signal) {
-    this.scale = new Scale();
-    this.signal = signal;
+class Polar extends Compared {
+  constructor(signal, was) {
+    super(signal, was);
     this.panels = signal.places.map((name, place) => this.panel(name, place));
     this.root = element("div", { class: "live-polars" }, ...this.panels.map((panel) => panel.root));
   }
 
   panel(name, place) {
     const svg = picture(200, 200, "");
-    const was = drawn("path", { class: "was" }), now = drawn("path", { class: `now ${colour(place)}` });
+    const was = line("was"), now = line(`now ${colour(place)}`);
     const start = drawn("circle", { r: 3.4, class: `dot ${colour(place)}` }), tick = label(194, 94, "", "end");
     for (const r of [45, 90]) svg.append(drawn("circle", { cx: 100, cy: 100, r, class: "grid" }));
     svg.append(drawn("path", { d: "M10 100H190M100 10V190", class: "axis" }), was, now, start, tick);
     return { svg, was, now, start, tick, name, root: element("figure", { class: "live-polar" }, svg, element("figcaption", {}, name)) };
   }
 
-  update(now, was) {
-    const top = this.scale.of(largest([...now.places, ...was.places].map((place) => place.most)));
+  update(now) {
+    const isNew = this.follow(now), { top } = this.scale;
     this.panels.forEach((panel, k) => {
-      panel.now.setAttribute("d", this.path(now.places[k], now.length, top));
-      panel.was.setAttribute("d", this.path(was.places[k], was.length, top));
       const [y, z] = this.across(now.places[k]);
-      panel.start.setAttribute("cx", 100 + (90 * y[0]) / top);
-      panel.start.setAttribute("cy", 100 - (90 * z[0]) / top);
+      panel.now.setAttribute("d", this.path(now.places[k], now.length));
+      panel.start.setAttribute("transform", `translate(${100 + (90 * y[0]) / top} ${100 - (90 * z[0]) / top})`);
+      if (!isNew) return;
+      panel.was.setAttribute("d", this.path(this.was.places[k], this.was.length));
       panel.tick.textContent = figure(top, this.signal, 2);
+    });
+  }
+
+  say(now) {
+    this.panels.forEach(({ svg, name }, k) => {
       const { mean, most } = now.places[k];
-      panel.svg.setAttribute("aria-label", `Path of the force on ${panel.name}: mean ${figure(mean, this.signal)}, maximum ${figure(most, this.signal)}.`);
+      svg.setAttribute("aria-label", `Path of the force on ${name}: mean ${figure(mean, this.signal)}, maximum ${figure(most, this.signal)}.`);
     });
   }
 
@@ -53,86 +88,89 @@ class Polar {
     return place.rows.slice(-2);
   }
 
-  path(place, length, top) {
-    const [y, z] = this.across(place), step = thinned(length, POINTS), count = Math.floor(length / step);
-    return pathOf(count, (i) => 100 + (90 * y[i * step]) / top, (i) => 100 - (90 * z[i * step]) / top, true);
+  path(place, length) {
+    const [y, z] = this.across(place), step = thinned(length, POINTS), count = Math.floor(length / step), share = 90 / this.scale.top;
+    return pathOf(count, (i) => 100 + share * y[i * step], (i) => 100 - share * z[i * step], true);
   }
 }
 
 /** Size over the crank angle, a line for every place; of one component with its sign. */
-class OverAngle {
-  constructor(signal, turns) {
-    this.scale = new Scale();
-    this.signal = signal;
-    this.isSigned = signal.parts === 1;
-    this.svg = picture(640, 250, "");
-    this.lines = signal.places.map((_, k) => drawn("path", { class: `now ${colour(k)}` }));
-    this.was = drawn("path", { class: "was" });
-    this.top = label(44, 18, "", "end");
-    this.middle = label(44, this.y(0) + 4, "0", "end");
-    const grid = drawn("g", { class: "grid" });
-    const most = 360 * turns / signal.base / turns;
+class OverAngle extends Compared {
+  constructor(signal, was, width) {
+    super(signal, was);
+    Object.assign(this, { wide: width - 64, isSigned: signal.parts === 1 });
+    this.root = picture(width, 300, "");
+    this.lines = signal.places.map((_, k) => line(`now ${colour(k)}`));
+    this.before = line("was");
+    this.top = label(46, 18, "", "end");
+    const zero = label(46, this.y(0) + 4, "0", "end"), grid = drawn("g", { class: "grid" }), most = 360 / signal.base;
     for (let k = 0; k <= 4; k++) {
-      const x = 52 + (576 * k) / 4;
-      grid.append(drawn("path", { d: `M${x} 12V214` }), label(x, 230, trimmed((most * k) / 4)));
+      const x = 52 + (this.wide * k) / 4;
+      grid.append(drawn("path", { d: `M${x} 12V264` }), label(x, 280, trimmed((most * k) / 4)));
     }
-    grid.append(drawn("path", { d: `M52 ${this.y(0)}H628M52 ${this.y(1)}H628`, class: "axis" }));
-    this.svg.append(grid, label(340, 247, "crank angle [deg]"), this.top, this.middle, this.was, ...this.lines);
-    this.root = this.svg;
+    grid.append(drawn("path", { d: `M52 ${this.y(0)}h${this.wide}M52 ${this.y(1)}h${this.wide}`, class: "axis" }));
+    this.root.append(grid, label(52 + this.wide / 2, 297, "crank angle [deg]"), this.top, zero, this.before, ...this.lines);
   }
 
   /** Height of a share of the largest. */
   y(share) {
-    return this.isSigned ? 113 - 99 * share : 212 - 198 * share;
+    return this.isSigned ? 138 - 124 * share : 262 - 248 * share;
   }
 
-  update(now, was) {
-    const top = this.scale.of(largest([...now.places, ...was.places].map((place) => place.most)));
-    this.top.textContent = number(top * this.signal.factor, 2);
-    this.lines.forEach((line, k) => line.setAttribute("d", this.path(now.places[k], now.length, top)));
-    this.was.setAttribute("d", was.places.length === 1 ? this.path(was.places[0], was.length, top) : "");
+  update(now) {
+    const isNew = this.follow(now);
+    this.lines.forEach((own, k) => own.setAttribute("d", this.path(now.places[k], now.length)));
+    if (!isNew) return;
+    this.top.textContent = number(this.scale.top * this.signal.factor, 2);
+    this.before.setAttribute("d", this.was.places.length === 1 ? this.path(this.was.places[0], this.was.length) : "");
+  }
+
+  say(now) {
     const most = now.places.reduce((a, b) => (b.most > a.most ? b : a));
-    this.svg.setAttribute("aria-label", `${this.signal.name} over the crank angle, at most ${figure(most.most, this.signal)} (${most.name}).`);
+    this.root.setAttribute("aria-label", `${this.signal.name} over the crank angle, at most ${figure(most.most, this.signal)} (${most.name}).`);
   }
 
-  path(place, length, top) {
-    const values = this.isSigned ? place.rows[0] : place.lengths, step = thinned(length, 2 * POINTS), count = Math.floor(length / step) + 1;
-    return pathOf(count, (i) => 52 + (576 * i * step) / length, (i) => this.y(values[(i * step) % length] / top));
+  path(place, length) {
+    const values = this.isSigned ? place.rows[0] : place.lengths, step = thinned(length, POINTS), count = Math.floor(length / step) + 1;
+    const { top } = this.scale, wide = (this.wide * step) / length;
+    return pathOf(count, (i) => 52 + wide * i, (i) => this.y(values[(i * step) % length] / top));
   }
 }
 
 /** Mean and maximum of every place, the optimum's marked. */
-class Bars {
-  constructor(signal) {
-    this.signal = signal;
-    this.scale = new Scale();
+class Bars extends Compared {
+  constructor(signal, was) {
+    super(signal, was);
     const height = 16 + 30 * signal.places.length;
-    this.svg = picture(420, height + 20, "");
+    this.root = picture(420, height + 20, "");
     this.rows = signal.places.map((name, k) => this.row(name, k));
     this.top = label(410, height + 14, "", "end");
-    this.svg.append(drawn("path", { d: `M120 8V${height}`, class: "axis" }), this.top);
-    this.root = this.svg;
+    this.root.append(drawn("path", { d: `M120 8V${height}`, class: "axis" }), this.top);
   }
 
   row(name, k) {
-    const y = 12 + 30 * k, [most, mean] = ["most", "mean"].map((kind) => drawn("rect", { x: 120, y: kind === "most" ? y : y + 3, height: kind === "most" ? 20 : 14, class: `${kind} ${colour(k)}` }));
+    const y = 12 + 30 * k, most = drawn("rect", { x: 120, y, height: 20, class: `most ${colour(k)}` });
+    const mean = drawn("rect", { x: 120, y: y + 3, height: 14, class: `mean ${colour(k)}` });
     const marks = [drawn("path", { class: "mark" }), drawn("path", { class: "mark" })];
-    const short = name.length > 17 ? `${name.slice(0, 16)}…` : name;
-    this.svg.append(label(112, y + 14, short, "end", "name"), most, mean, ...marks);
+    this.root.append(label(112, y + 14, name.length > 17 ? `${name.slice(0, 16)}…` : name, "end", "name"), most, mean, ...marks);
     return { most, mean, marks, y };
   }
 
-  update(now, was) {
-    const top = this.scale.of(largest([...now.places, ...was.places].map((place) => place.most)));
-    const x = (value) => (290 * value) / top;
+  update(now) {
+    const isNew = this.follow(now), x = (value) => ((290 * value) / this.scale.top).toFixed(1);
     this.rows.forEach((row, k) => {
-      row.most.setAttribute("width", x(now.places[k].most).toFixed(2));
-      row.mean.setAttribute("width", x(now.places[k].mean).toFixed(2));
-      [was.places[k].mean, was.places[k].most].forEach((value, j) => row.marks[j].setAttribute("d", `M${(120 + x(value)).toFixed(2)} ${row.y - 3}v26`));
+      row.most.setAttribute("width", x(now.places[k].most));
+      row.mean.setAttribute("width", x(now.places[k].mean));
+      if (!isNew) return;
+      const { mean, most } = this.was.places[k];
+      [mean, most].forEach((value, j) => row.marks[j].setAttribute("d", `M${120 + Number(x(value))} ${row.y - 3}v26`));
     });
-    this.top.textContent = figure(top, this.signal, 2);
+    if (isNew) this.top.textContent = figure(this.scale.top, this.signal, 2);
+  }
+
+  say(now) {
     const words = now.places.map((place) => `${place.name}: mean ${figure(place.mean, this.signal)}, maximum ${figure(place.most, this.signal)}`);
-    this.svg.setAttribute("aria-label", `${words.join("; ")}.`);
+    this.root.setAttribute("aria-label", `${words.join("; ")}.`);
   }
 }
 
@@ -141,51 +179,48 @@ const MOST_ORDERS = 12;
 /** Amplitude of every order that counts in one of the designs known, a bar for every place. */
 class Orders {
   constructor(signal, k, designs) {
-    this.signal = signal;
-    this.point = signal.points[k];
-    this.scale = new Scale();
+    Object.assign(this, { signal, point: signal.points[k], scale: new Scale() });
     this.orders = this.counted(designs);
-    this.svg = picture(420, 190, "");
+    this.root = picture(420, 190, "");
     this.width = 360 / this.orders.length;
     this.bars = this.orders.map((order, j) => this.column(order, j));
     this.top = label(40, 20, "", "end");
-    this.svg.append(drawn("path", { d: "M44 160H410", class: "axis" }), this.top, label(227, 186, "order of crank speed"));
-    this.root = this.svg;
+    this.root.append(drawn("path", { d: "M44 160H410", class: "axis" }), this.top, label(227, 186, "order of crank speed"));
   }
 
+  /** Orders above a share of the largest in one of the designs, the largest of them. */
   counted(designs) {
-    const most = new Map();
+    const { signal, point } = this, all = ordersOf(signal, point), most = all.map(() => 0);
     for (const x of designs) {
-      this.signal.places.forEach((_, place) => {
-        for (const [order, value] of amplitudesAt(this.signal, this.point, place, x)) most.set(order, Math.max(value, most.get(order) ?? 0));
-      });
+      signal.places.forEach((_, place) => amplitudesAt(signal, point, place, x, all).forEach((value, j) => { most[j] = Math.max(most[j], value); }));
     }
-    const top = largest(most.values()), felt = [...most].filter(([, value]) => value > 0.01 * top);
-    return felt.sort((a, b) => b[1] - a[1]).slice(0, MOST_ORDERS).map(([order]) => order).sort((a, b) => a - b);
+    const top = largest(most), felt = all.map((order, j) => [order, most[j]]).filter(([, value]) => value > 0.01 * top);
+    return felt.sort((p, q) => q[1] - p[1]).slice(0, MOST_ORDERS).map(([order]) => order).sort((p, q) => p - q);
   }
 
   column(order, j) {
     const left = 48 + this.width * j, each = (0.8 * this.width) / this.signal.places.length;
-    this.svg.append(label(left + 0.4 * this.width, 174, trimmed(order)));
+    this.root.append(label(left + 0.4 * this.width, 174, trimmed(order)));
     return this.signal.places.map((_, place) => {
       const bar = drawn("rect", { x: left + each * place, width: Math.max(each - 0.6, 0.8), class: `mean ${colour(place)}` });
-      this.svg.append(bar);
+      this.root.append(bar);
       return bar;
     });
   }
 
   update(x) {
-    const found = this.signal.places.map((_, place) => amplitudesAt(this.signal, this.point, place, x));
-    const value = (order, place) => found[place].get(order) ?? 0;
-    const most = this.orders.map((order) => largest(found.map((_, place) => value(order, place))));
-    const top = this.scale.of(largest(most));
-    this.orders.forEach((order, j) => this.bars[j].forEach((bar, place) => {
-      const height = (146 * value(order, place)) / top;
-      bar.setAttribute("y", (160 - height).toFixed(2));
-      bar.setAttribute("height", height.toFixed(2));
+    this.found = this.signal.places.map((_, place) => amplitudesAt(this.signal, this.point, place, x, this.orders));
+    const isNew = this.scale.follow(largest(this.found.map(largest)));
+    this.orders.forEach((_, j) => this.bars[j].forEach((bar, place) => {
+      const height = ((146 * this.found[place][j]) / this.scale.top).toFixed(1);
+      bar.setAttribute("y", 160 - height);
+      bar.setAttribute("height", height);
     }));
-    this.top.textContent = number(top * this.signal.factor, 2);
-    const words = this.orders.map((order, j) => `order ${trimmed(order)}: ${figure(most[j], this.signal)}`);
-    this.svg.setAttribute("aria-label", `Largest amplitudes. ${words.join("; ")}.`);
+    if (isNew) this.top.textContent = number(this.scale.top * this.signal.factor, 2);
+  }
+
+  say() {
+    const words = this.orders.map((order, j) => `order ${trimmed(order)}: ${figure(largest(this.found.map((own) => own[j])), this.signal)}`);
+    this.root.setAttribute("aria-label", `Largest amplitudes. ${words.join("; ")}.`);
   }
 }

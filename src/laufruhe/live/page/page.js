@@ -1,6 +1,6 @@
 // The page: a model, a state and a drawing, kept apart. `show` brings them together.
 
-const KEPT = 1e-5;
+const KEPT = 1e-5, AT = 5e-5;
 
 /** A model with its numbers. */
 async function opened(model) {
@@ -73,6 +73,7 @@ class Page {
     this.history = new History({ ...this.values });
     this.build();
     this.drawNow();
+    this.draw.say(this.found.x);
     document.addEventListener("keydown", this.keys);
     window.addEventListener("hashchange", this.hash);
     return this;
@@ -96,9 +97,10 @@ class Page {
     this.said = element("p", { class: "live-note" });
     const objective = model.objective.name;
     const card = element("div", { class: "live-card" }, element("p", { class: "live-name" }, objective || "No objective"), this.value, this.regret, this.ranks);
-    const controls = element("div", { class: "live-controls" }, card, this.buttons(),
-      element("div", { class: "live-sliders", role: "group", "aria-label": "Decisions" }, ...this.sliders.map((slider) => slider.root)),
-      element("div", { class: "live-scroll", tabindex: "0", role: "region", "aria-label": "Limits" }, this.limits.root), this.said, this.spoken);
+    const limits = element("div", { class: "live-scroll", tabindex: "0", role: "region", "aria-label": "Limits" }, this.limits.root);
+    limits.hidden = this.limits.rows.length === 0;
+    const controls = element("div", { class: "live-controls" }, card, limits, this.buttons(), this.said,
+      element("div", { class: "live-sliders", role: "group", "aria-label": "Decisions" }, ...this.sliders.map((slider) => slider.root)), this.spoken);
     this.figures = element("div", { class: "live-figures" });
     this.root.replaceChildren(element("div", { class: "live" }, controls, element("div", { class: "live-views" }, this.choices(), this.figures)), this.notes());
     this.draw = this.drawing();
@@ -110,11 +112,13 @@ class Page {
   }
 
   buttons() {
-    const { optimum, given, model } = this;
+    const { given, model } = this;
+    this.best = button("optimum", "Back to the optimum", "The design that was decided", () => this.set(this.optimum));
+    this.best.hidden = !this.optimum;
     this.undo = button("undo", "Undo", "Ctrl+Z", () => this.set(this.history.undo(), { isOld: true }));
     this.redo = button("redo", "Redo", "Ctrl+Shift+Z", () => this.set(this.history.redo(), { isOld: true }));
     const made = [
-      ...(optimum ? [button("optimum", "Back to the optimum", "The design that was decided", () => this.set(this.optimum))] : []),
+      this.best,
       ...(given ? [button("given", "As given", "Where the file starts", () => this.set(this.given))] : []),
       this.undo, this.redo,
       button("link", "Copy link", "The address holds the design", () => this.copyLink()),
@@ -131,10 +135,12 @@ class Page {
 
   /** The figures of the load that is chosen, and what brings them to a design. */
   drawing() {
-    const { model, point } = this, curve = model.curves[this.curve], signal = model.signals[curve.signal];
+    const { model, point } = this, curve = model.curves[this.curve], signal = model.signals[curve?.signal];
+    if (!signal) return { compare() {}, update() {}, say() {} };
     const known = Object.values(model.designs).map((design) => Float64Array.from(design.x));
-    const polar = signal.parts > 1 ? new Polar(signal) : null;
-    const over = new OverAngle(signal, model.turns), bars = new Bars(signal), orders = new Orders(signal, point, known);
+    const was = keptOf(signal, point, this.markedAt());
+    const polar = signal.parts > 1 ? new Polar(signal, was) : null;
+    const over = new OverAngle(signal, was, this.root.clientWidth < 560 ? 430 : 860), bars = new Bars(signal, was), orders = new Orders(signal, point, known);
     const boxes = [
       polar && ["polar", "Path of the tip over one cycle, seen from the front", polar.root],
       ["angle", `${signal.parts > 1 ? "Size" : "Value"} over the crank angle [${signal.shown}]`, over.root],
@@ -143,13 +149,22 @@ class Page {
     ].filter(Boolean);
     const legend = element("p", { class: "live-legend", "aria-hidden": "true" }, ...signal.places.map((name, k) => element("span", { class: colour(k) }, name)));
     this.figures.replaceChildren(legend, ...boxes.map(([key, title, root]) => element("figure", { "data-figure": key, class: `live-figure ${key}` }, element("figcaption", {}, title), root)));
-    const was = drawnOf(signal, point, this.markedAt());
-    return (x) => {
-      const now = drawnOf(signal, point, x);
-      polar?.update(now, was);
-      over.update(now, was);
-      bars.update(now, was);
-      orders.update(x);
+    const forces = [polar, over, bars].filter(Boolean);
+    return {
+      compare: () => {
+        const other = keptOf(signal, point, this.markedAt());
+        forces.forEach((each) => each.compare(other));
+      },
+      update: (x) => {
+        const now = drawnOf(signal, point, x);
+        forces.forEach((each) => each.update(now));
+        orders.update(x);
+      },
+      say: (x) => {
+        const now = drawnOf(signal, point, x);
+        forces.forEach((each) => each.say(now));
+        orders.say();
+      },
     };
   }
 
@@ -161,6 +176,7 @@ class Page {
   redraw() {
     this.draw = this.drawing();
     this.drawNow();
+    this.draw.say(this.found.x);
   }
 
   notes() {
@@ -168,7 +184,9 @@ class Page {
     this.error = error;
     const notes = [`Numbers of this page are float64. Held against the exact model at ${Object.keys(model.designs).length} designs as it opened, they differ by ${error < 1e-15 ? "less than 1e-15" : exponential(error, 2)} of their size at the most.`];
     if (error > 1e-6) notes.push("More than the figures shown can bear: take the numbers of laufruhe evaluate.");
-    if (this.optimum) notes.push("Thin grey lines and marks are the design that was decided; rings on the sliders show it, bars the design as given.");
+    const kept = this.optimum ? "the design that was decided, as rings on the sliders do; bars on them show the one given" : "the design as given, as bars on the sliders do";
+    if (this.given) notes.push(`Thin grey lines and black marks show ${kept}.`);
+    if (model.whyNot) notes.unshift(model.whyNot);
     for (const { names, why } of grouped(model.unmoved)) notes.push(`${names.join(", ")}: ${why}.`);
     if (!model.save.text && model.save.note) notes.push(model.save.note);
     return element("div", { class: "live-notes" }, ...notes.map((text) => element("p", {}, text)));
@@ -185,9 +203,14 @@ class Page {
   set(values, { isPassing = false, isOld = false, quiet = false } = {}) {
     this.values = fitting(this.model, values, this.values);
     if (!isPassing && !isOld) this.history.add({ ...this.values });
-    if (!this.frame) this.frame = requestAnimationFrame(() => { this.frame = 0; this.drawNow(); });
+    this.askFrame();
     if (!isPassing) this.settle(quiet);
     if (!quiet) this.listeners.forEach((listener) => listener({ ...this.values }, { isPassing }));
+  }
+
+  /** Draw once, at the next frame. */
+  askFrame() {
+    if (!this.frame) this.frame = requestAnimationFrame(() => { this.frame = 0; this.drawNow(); });
   }
 
   /** After a change: the address, and what is read aloud. */
@@ -196,11 +219,15 @@ class Page {
     this.waiting = setTimeout(() => {
       if (!quiet) toAddress(this.values);
       this.spoken.textContent = this.sentence();
+      this.draw.say(this.found.x);
     }, 250);
   }
 
   drawNow() {
-    const { values, model } = this, found = judged(model, values);
+    const { values, model } = this;
+    if (this.isMoved) this.draw.compare();
+    this.isMoved = false;
+    const found = judged(model, values);
     this.found = found;
     this.sliders.forEach((slider) => slider.show(values[slider.field.name]));
     this.value.textContent = found.objective === null ? "" : figure(found.objective, model.objective);
@@ -210,25 +237,33 @@ class Page {
     this.ranks.textContent = found.ranks.map(({ measure, value }) => `${measure.name}: ${figure(value, measure)}`).join("; ");
     this.undo.disabled = !this.history.canUndo;
     this.redo.disabled = !this.history.canRedo;
-    this.draw(found.x);
+    this.draw.update(found.x);
   }
 
   showRegret(found) {
-    const { bound, model } = this, broken = found.limits.filter((limit) => !limit.met).length;
-    this.regret.classList.toggle("broken", broken > 0);
-    const limits = broken ? `Breaks ${broken} limit${broken > 1 ? "s" : ""}. ` : "";
+    const { bound, model } = this, broken = this.broken();
+    this.regret.classList.toggle("broken", broken.length > 0);
+    const more = broken.length > 2 ? ` and ${broken.length - 2} more` : "";
+    const limits = broken.length ? `Breaks ${broken.slice(0, 2).join(", ")}${more}. ` : "";
     if (!bound || found.objective === null) { this.regret.textContent = limits; return; }
     const share = bound.value > 0 ? found.objective / bound.value - 1 : found.objective - bound.value;
-    const more = Math.abs(share) < 5e-7 ? "at the optimum" : bound.value > 0 ? `${percent(share)} against the optimum` : `${figure(share, model.objective)} over the optimum`;
     const proof = bound.kind === "global" ? "proven" : bound.kind === "global within gap" ? `proven to ${trimmed(100 * bound.gap, 2)} %` : "a local one";
+    const away = bound.value > 0 ? percent(share) : figure(share, model.objective);
+    const best = `the optimum of ${figure(bound.value, model.objective)} (${proof})`;
     this.regret.setAttribute("data-value", share);
-    this.regret.textContent = `${limits}${more} of ${figure(bound.value, model.objective)} (${proof})`;
+    const isThere = Math.abs(found.objective - bound.value) <= AT * Math.abs(bound.value);
+    this.regret.textContent = limits + (isThere ? `${limits ? "As much as" : "This is"} ${best}.` : `${away} against ${best}.`);
+  }
+
+  /** Names of the limits that are broken. */
+  broken() {
+    const limits = this.model.measures.filter((measure) => measure.role === "limit");
+    return limits.filter((_, k) => !this.found.limits[k].met).map((measure) => measure.name);
   }
 
   sentence() {
-    const { model, found } = this, broken = model.measures.filter((measure) => measure.role === "limit").filter((_, k) => !found.limits[k].met);
-    const limits = broken.length ? `Broken: ${broken.map((measure) => measure.name).join(", ")}.` : found.limits.length ? "All limits are kept." : "";
-    return `${model.objective.name} ${this.value.textContent}. ${limits}`;
+    const broken = this.broken(), kept = this.found.limits.length ? "All limits are kept." : "";
+    return `${this.model.objective.name} ${this.value.textContent}. ${broken.length ? `Broken: ${broken.join(", ")}.` : kept}`;
   }
 
   key(event) {
@@ -266,16 +301,19 @@ class Page {
   text() { return savedText(this.model, this.values); }
 
   measures() {
-    const objective = { name: "objective", value: this.found.objective, unit: this.model.objective.unit, met: true };
+    const { model } = this, objective = { ...unitOf(model.objective), name: "objective", words: model.objective.name, value: this.found.objective, met: true };
     const limits = this.model.measures.filter((measure) => measure.role === "limit");
-    return [objective, ...limits.map((measure, k) => ({ name: measure.name, unit: measure.unit, value: this.found.limits[k].value, met: this.found.limits[k].met }))];
+    return [objective, ...limits.map((measure, k) => ({ ...unitOf(measure), name: measure.name, words: measure.name, value: this.found.limits[k].value, met: this.found.limits[k].met }))];
   }
 
   /** Another optimum of the same loads, as limits move. */
-  setOptimum({ design, value, bound, kind = "global", gap = 0 }) {
+  setOptimum({ design, value, bound, kind, proof, gap = 0 }) {
     this.optimum = fitting(this.model, design, this.optimum ?? this.given);
-    this.bound = { value, bound: bound ?? value, kind, gap };
-    this.redraw();
+    this.bound = { value, bound: bound ?? value, kind: kind ?? proof ?? "global", gap };
+    this.sliders.forEach((slider) => slider.setMark("optimum", this.optimum[slider.field.name]));
+    this.best.hidden = false;
+    this.isMoved = true;
+    this.askFrame();
   }
 
   /** Other edges of limits: at most what is told. */
@@ -284,7 +322,14 @@ class Page {
       const measure = this.model.measures.find((own) => own.role === "limit" && own.name === name);
       if (measure) measure.sides = measure.sides.map(([sense, edge]) => [sense, sense === "at most" ? maximum : edge]);
     }
-    this.drawNow();
+    this.askFrame();
+  }
+
+  /** All of these at once, drawn in one frame. */
+  update({ limits, optimum, design }) {
+    if (limits) this.setLimits(limits);
+    if (optimum) this.setOptimum(optimum);
+    if (design) this.setDesign(design, { quiet: true });
   }
 
   /** Another model; values of sliders that it still has stay. */
@@ -300,6 +345,11 @@ class Page {
     document.removeEventListener("keydown", this.keys);
     window.removeEventListener("hashchange", this.hash);
   }
+}
+
+/** SI unit, the one that is shown, and its factor. */
+function unitOf({ unit, shown, factor }) {
+  return { unit, shown, factor };
 }
 
 /** Names that have the same to be said of them. */

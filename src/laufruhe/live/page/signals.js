@@ -24,6 +24,16 @@ function wavesOf(block, waves) {
   return { orders: arrayOf(block, waves.orders).values, values, shape };
 }
 
+/** A smooth series, and pieces of polynomials between corners. */
+function bendsOf(block, bends) {
+  return {
+    smooth: wavesOf(block, bends.smooth),
+    corners: arrayOf(block, bends.corners).values,
+    pieces: arrayOf(block, bends.pieces),
+    at: arrayOf(block, bends.at).values,
+  };
+}
+
 /**
  * A signal with its numbers.
  * @returns what JSON tells of it, the numbers of every point, and its counts of places, components and columns
@@ -33,12 +43,8 @@ function decoded(signal, block) {
     share: point.share,
     series: wavesOf(block, point.series),
     slope: wavesOf(block, point.slope),
-    bends: point.bends && {
-      smooth: wavesOf(block, point.bends.smooth),
-      corners: arrayOf(block, point.bends.corners).values,
-      pieces: arrayOf(block, point.bends.pieces),
-      at: arrayOf(block, point.bends.at).values,
-    },
+    bends: point.bends && bendsOf(block, point.bends),
+    bent: point.bent.map((bends) => ({ column: bends.column, ...bendsOf(block, bends) })),
   }));
   const [, places, parts, columns] = points[0].slope.shape;
   return { ...signal, points, places: signal.places, count: places, parts, columns, grids: new Map() };
@@ -123,14 +129,11 @@ function pointGrid(signal, point, steps, isFine) {
   const bends = isFine ? point.bends : null;
   const between = bends ? bends.at : new Float64Array(0);
   const length = steps + between.length;
-  const constant = [];
-  for (let place = 0; place < signal.count; place++) {
-    for (let part = 0; part < signal.parts; part++) {
-      constant.push(constantOf(signal, point, bends, place * signal.parts + part, steps, between));
-    }
-  }
+  const parts = Array.from({ length: signal.count * signal.parts }, (_, at) => at);
+  const constant = parts.map((at) => constantOf(signal, point, bends, at, steps, between));
+  const bent = (isFine ? point.bent : []).map((own) => ({ column: own.column, rows: parts.map((at) => constantOf(signal, point, own, at, steps, between)) }));
   const waves = Array.from(point.slope.orders, (order) => waveOf(order, signal.base, steps, between));
-  return { share: point.share, length, constant, waves, point };
+  return { share: point.share, length, constant, bent, waves, point };
 }
 
 /** One component without the columns, at equal steps and at the angles between. */
@@ -200,8 +203,17 @@ function component(signal, own, at, x, out) {
   const constant = own.constant[at];
   let any = constant !== null;
   if (constant) out.set(constant); else out.fill(0);
+  let smooth = x;
+  for (const { column, rows } of own.bent) {
+    const row = rows[at], by = x[column];
+    if (smooth === x) smooth = x.slice();
+    smooth[column] = 0;
+    if (!row || by === 0) continue;
+    any = true;
+    for (let i = 0; i < own.length; i++) out[i] += by * row[i];
+  }
   for (let j = 0; j < own.waves.length; j++) {
-    const [a, b] = slopeAt(signal, own.point, j, at, x);
+    const [a, b] = slopeAt(signal, own.point, j, at, smooth);
     if (a === 0 && b === 0) continue;
     const { cosine, sine } = own.waves[j];
     any = true;
@@ -211,49 +223,68 @@ function component(signal, own, at, x, out) {
 }
 
 /**
- * Rows of a signal at x.
+ * Rows of a signal at x. They stand in arrays that the next design writes over.
  * @returns {{adds: boolean, points: {share: number, groups: {lengths: Float64Array, rows: Float64Array[]}[]}[]}}
  */
 function rowsAt(signal, times, x) {
   const grid = gridOf(signal, times);
-  const points = grid.points.map((own) => {
-    const groups = [];
-    for (let place = 0; place < signal.count; place++) groups.push(groupAt(signal, own, place, x));
-    return { share: own.share, groups };
-  });
-  return { adds: signal.adds, steps: grid.steps, points };
+  if (grid.x !== x) {
+    grid.x = x;
+    grid.rows = { adds: signal.adds, points: grid.points.map((own) => pointAt(signal, own, x)) };
+  }
+  return grid.rows;
 }
 
-function groupAt(signal, own, place, x) {
-  const lengths = new Float64Array(own.length), rows = [];
+function pointAt(signal, own, x) {
+  const groups = own.groups ??= signal.places.map(() => groupOf(signal, own.length));
+  groups.forEach((group, place) => fill(signal, own, place, x, group));
+  return { share: own.share, groups };
+}
+
+/** Arrays of one place. */
+function groupOf(signal, length) {
+  return { lengths: new Float64Array(length), rows: Array.from({ length: signal.parts }, () => new Float64Array(length)) };
+}
+
+/** Components and lengths of one place at x. */
+function fill(signal, own, place, x, { lengths, rows }) {
+  let used = 0;
   for (let part = 0; part < signal.parts; part++) {
-    const row = new Float64Array(own.length);
-    const any = component(signal, own, place * signal.parts + part, x, row);
-    rows.push(row);
-    if (any) for (let i = 0; i < own.length; i++) lengths[i] += row[i] * row[i];
+    const row = rows[part];
+    if (!component(signal, own, place * signal.parts + part, x, row)) continue;
+    if (used++ === 0) for (let i = 0; i < own.length; i++) lengths[i] = row[i] * row[i];
+    else for (let i = 0; i < own.length; i++) lengths[i] += row[i] * row[i];
   }
+  if (used === 0) lengths.fill(0);
   for (let i = 0; i < own.length; i++) lengths[i] = Math.sqrt(lengths[i]);
-  return { lengths, rows };
+}
+
+/** Number of the wave of an order among waves; -1 where they have none. */
+function waveNumber(signal, waves, order) {
+  return waves.orders.findIndex((own) => Math.abs(own * signal.base - order) < 1e-9);
+}
+
+/** All orders of a point that are not nothing. */
+function ordersOf(signal, point) {
+  return [...new Set([...point.series.orders, ...point.slope.orders])].map((order) => order * signal.base);
 }
 
 /**
- * Amplitude of every order at a place, the long half axis of the ellipse that the vector turns on (M5).
- * @returns {Map<number, number>} by order of crank speed
+ * Amplitude of orders at a place, the long half axis of the ellipse that the vector turns on (M5).
+ * @returns {number[]}
  */
-function amplitudesAt(signal, point, place, x) {
-  const sums = new Map();
-  const add = (order, part, a, b) => {
-    if (!sums.has(order)) sums.set(order, new Float64Array(2 * signal.parts));
-    sums.get(order)[2 * part] += a;
-    sums.get(order)[2 * part + 1] += b;
-  };
-  const stride = signal.count * signal.parts;
-  for (let part = 0; part < signal.parts; part++) {
-    const at = place * signal.parts + part, { series, slope } = point;
-    series.orders.forEach((order, j) => add(order, part, series.values[2 * (j * stride + at)], series.values[2 * (j * stride + at) + 1]));
-    slope.orders.forEach((order, j) => add(order, part, ...slopeAt(signal, point, j, at, x)));
-  }
-  return new Map([...sums].map(([order, c]) => [order * signal.base, longAxis(c)]));
+function amplitudesAt(signal, point, place, x, orders) {
+  const stride = signal.count * signal.parts, { series, slope } = point;
+  return orders.map((order) => {
+    const j = waveNumber(signal, series, order), k = waveNumber(signal, slope, order), c = new Float64Array(2 * signal.parts);
+    for (let part = 0; part < signal.parts; part++) {
+      const at = place * signal.parts + part, [a, b] = k < 0 ? [0, 0] : slopeAt(signal, point, k, at, x);
+      const from = 2 * (j * stride + at);
+      c[2 * part] = a + (j < 0 ? 0 : series.values[from]);
+      c[2 * part + 1] = b + (j < 0 ? 0 : series.values[from + 1]);
+    }
+    return longAxis(c);
+  });
 }
 
 function longAxis(c) {
