@@ -50,7 +50,6 @@ mass = { between = ["0 kg", "2 kg"] }
     + 'mounts = ["mount 2"]\noperating_points = ["fast"]\nmax = "3 kN"\n'
     + '[[constraints]]\nlimit = "counterweight mass"\nmax = "1 kg"\n'
 )
-READY = ("vee-two-90", "tractor-four-bearings", "soft-single-run-up", "geared-inertia")
 
 
 def problem_of(name: str) -> Problem:

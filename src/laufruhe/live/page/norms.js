@@ -36,22 +36,33 @@ function largest(numbers) {
 function diameter({ rows }) {
   const used = rows.filter((row) => row.some((value) => value !== 0));
   if (used.length === 0) return 0;
-  if (used.length === 1) {
-    let low = Infinity, high = -Infinity;
-    for (const value of used[0]) { if (value < low) low = value; if (value > high) high = value; }
-    return high - low;
-  }
-  return 2 * ballOf(Array.from(used[0], (_, i) => used.map((row) => row[i])));
+  if (used.length > 1) return 2 * ballOf(used);
+  let low = Infinity, high = -Infinity;
+  for (const value of used[0]) { if (value < low) low = value; if (value > high) high = value; }
+  return high - low;
 }
 
 const distance = (a, b) => Math.hypot(...a.map((value, k) => value - b[k]));
 
+/** Number of the point farthest from a centre, rows being its components. */
+function farthest(rows, centre) {
+  let best = 0, most = -1;
+  for (let i = 0; i < rows[0].length; i++) {
+    let square = 0;
+    for (let k = 0; k < rows.length; k++) square += (rows[k][i] - centre[k]) ** 2;
+    if (square > most) { most = square; best = i; }
+  }
+  return best;
+}
+
 /** Radius of the smallest ball: the farthest point joins those that hold it, until none is outside. */
-function ballOf(points) {
-  let held = [points[0]], ball = { centre: points[0], radius: 0 };
-  for (let round = 0; round < points.length; round++) {
-    const far = points.reduce((best, point) => (distance(point, ball.centre) > distance(best, ball.centre) ? point : best));
-    if (distance(far, ball.centre) <= ball.radius * (1 + 1e-13) || held.includes(far)) break;
+function ballOf(rows) {
+  const at = (i) => rows.map((row) => row[i]);
+  let held = [at(0)], ball = { centre: at(0), radius: 0 };
+  for (let round = 0; round < rows[0].length; round++) {
+    const far = at(farthest(rows, ball.centre));
+    if (distance(far, ball.centre) <= ball.radius * (1 + 1e-13)) break;
+    if (held.some((point) => distance(point, far) === 0)) break;
     [held, ball] = ballOfFew([...held, far]);
   }
   return ball.radius;

@@ -69,11 +69,14 @@ class Page {
     this.optimum = this.known("optimum");
     this.given = this.known("given");
     this.bound = this.model.proved;
-    this.values = fitting(this.model, { ...this.values, ...fromAddress() }, this.optimum ?? this.given);
+    // the address is that of the first model, whatever was moved since stays
+    this.values = fitting(this.model, this.history ? this.values : fromAddress() ?? {}, this.optimum ?? this.given);
     this.history = new History({ ...this.values });
     this.build();
     this.drawNow();
     this.draw.say(this.found.x);
+    // after the first picture
+    this.checked = new Promise((done) => { this.checking = setTimeout(() => done(this.check())); });
     document.addEventListener("keydown", this.keys);
     window.addEventListener("hashchange", this.hash);
     return this;
@@ -180,16 +183,24 @@ class Page {
   }
 
   notes() {
-    const { model } = this, error = difference(model);
-    this.error = error;
-    const notes = [`Numbers of this page are float64. Held against the exact model at ${Object.keys(model.designs).length} designs as it opened, they differ by ${error < 1e-15 ? "less than 1e-15" : exponential(error, 2)} of their size at the most.`];
-    if (error > 1e-6) notes.push("More than the figures shown can bear: take the numbers of laufruhe evaluate.");
-    const kept = this.optimum ? "the design that was decided, as rings on the sliders do; bars on them show the one given" : "the design as given, as bars on the sliders do";
-    if (this.given) notes.push(`Thin grey lines and black marks show ${kept}.`);
-    if (model.whyNot) notes.unshift(model.whyNot);
-    for (const { names, why } of grouped(model.unmoved)) notes.push(`${names.join(", ")}: ${why}.`);
-    if (!model.save.text && model.save.note) notes.push(model.save.note);
-    return element("div", { class: "live-notes" }, ...notes.map((text) => element("p", {}, text)));
+    const { model } = this, kept = this.optimum ? "the design that was decided, as rings on the sliders do; bars on them show the one given" : "the design as given, as bars on the sliders do";
+    const notes = [
+      ...(model.whyNot ? [model.whyNot] : []),
+      ...(this.given && model.sliders.length ? [`Thin grey lines and black marks show ${kept}.`] : []),
+      ...grouped(model.unmoved).map(({ names, why }) => `${names.join(", ")}: ${why}.`),
+      ...(!model.save.text && model.save.note && model.sliders.length ? [model.save.note] : []),
+    ];
+    this.accuracy = element("p", { "data-role": "accuracy" });
+    return element("div", { class: "live-notes" }, ...notes.map((text) => element("p", {}, text)), this.accuracy);
+  }
+
+  /** Hold the page's own numbers against those that came with the model. */
+  check() {
+    this.error = difference(this.model);
+    const size = this.error < 1e-15 ? "less than 1e-15" : exponential(this.error, 2);
+    const bad = this.error > 1e-6 ? " That is more than the figures shown can bear: take the numbers of laufruhe evaluate." : "";
+    this.accuracy.textContent = `Numbers of this page are float64. Held against the exact model at ${Object.keys(this.model.designs).length} designs as it opened, they differ by ${size} of their size at the most.${bad}`;
+    return this.error;
   }
 
   // what is done
@@ -341,6 +352,7 @@ class Page {
   end() {
     cancelAnimationFrame(this.frame);
     clearTimeout(this.waiting);
+    clearTimeout(this.checking);
     this.frame = 0;
     document.removeEventListener("keydown", this.keys);
     window.removeEventListener("hashchange", this.hash);
