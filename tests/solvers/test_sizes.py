@@ -290,6 +290,29 @@ def test_what_is_not_decided_is_refused_in_a_line(text: str, rule: str, tmp_path
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("quantity", "rule"),
+    [
+        ("maximum web stress", "none are given; add .running_gear."),
+        ("maximum rod stress", "none are given"),
+        ("running-gear mass", "none are given"),
+        ("maximum crank-pin bending stress", "cylinder 1 has no big end"),
+        ("maximum journal stress", "bearing .* has no diameter or no width"),
+    ],
+)  # fmt: skip
+def test_sizes_that_are_not_given_are_refused_when_the_file_is_read(quantity: str, rule: str, tmp_path: Path) -> None:
+    """Also beside a limit that nothing keeps, which would be told first otherwise."""
+    head = TEXT.split("[engine.big_end]")[0]
+    bearings = '[[main_bearings]]\nx = "60 mm"\n[[main_bearings]]\nx = "-60 mm"\n'
+    limits = (
+        f'[[constraints]]\nlimit = "mean roll moment"\nmax = "0 N m"\n[[constraints]]\nlimit = "{quantity}"\nmax = 1\n'
+    )
+    text = f'{head}[[operating_points]]\nspeed = "{SPEED} rad/s"\n{bearings}{limits}'
+    with pytest.raises(InputError, match=rule) as refused:
+        loaded(tmp_path, text)
+    assert "constraints[2]" in str(refused.value)
+
+
 @pytest.mark.slow
 def test_an_open_rod_is_a_local_optimum_and_says_so(solved: Result) -> None:
     """More freedom is never worse; nothing is claimed of what else there may be."""

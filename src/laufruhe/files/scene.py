@@ -9,12 +9,12 @@ from typing import Literal, TypeVar
 
 from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, nearest
+from laufruhe.files.complaints import Refused, blamed_on, nearest
 from laufruhe.files.fields import Open, Table
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.clearances import shafts_of
 from laufruhe.problem.channels import Channel, Needs
-from laufruhe.problem.measure import MEASURES, Measure, counted_rotors, radius_of
+from laufruhe.problem.measure import MEASURES, Measure, counted_parts, counted_rotors, radius_of
 
 T = TypeVar("T")
 Motion = Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]
@@ -81,6 +81,8 @@ class Scene:
         at, of = where.rsplit(".", 1)[0], getattr(table, "of", None)
         if not self._has(channel.needs):
             raise Refused(where, name, *_NEEDS[channel.needs])
+        with blamed_on(where):
+            channel.check_sizes(self.engine, self.points[0])
         self._check_keys(channel, table, at)
         weights = table.direction_weights
         found = Measure(
@@ -158,7 +160,7 @@ class Scene:
         rotors = self.engine.rotors
         _known(of, [rotor.name for rotor in rotors], f"{at}.of", "counterweight or balancer")
         counted = counted_rotors(measure, rotors)
-        if not counted:
+        if not counted and not counted_parts(measure, self.engine.slider_cranks):
             raise Refused(f"{at}", measure.name, "counts nothing in this engine", "add what it counts, or leave it out")
         for rotor in counted:
             try:

@@ -256,8 +256,12 @@ class AffineModel:
             only = Rows(MEAN, np.array([[self.bare.value(measure)]]), Grid(np.ones(1), 1))
             return _stacked(only, [np.zeros((1, 1))] * len(self._changes), self._keep_all)
         if not isinstance(channel, LoadChannel):
-            bare = mass_rows(measure, self.bare.engine.rotors)
-            slopes = [mass_rows(measure, _only(self.bare.engine, change.rotors)).vectors for change in self._changes]
+            engine = self.bare.engine
+            bare = mass_rows(measure, engine.rotors, engine.slider_cranks)
+            slopes = [
+                mass_rows(measure, _only(engine, change.rotors), _alone(engine, change).slider_cranks).vectors
+                for change in self._changes
+            ]
             return _stacked(bare, slopes, self._keep_all)
         averaged = averaged and measure.norm.averages
         pairs = self.spectra(channel)

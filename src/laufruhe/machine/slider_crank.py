@@ -258,6 +258,11 @@ class SliderCrank:
         rod = (-kinematics.rod_rate(*shape), -kinematics.rod_acceleration(*shape))
         return Motion(((self.reciprocating_mass, piston),), ((self.rod_inertia_deficit, rod),))
 
+    @property
+    def counterweight_mass(self) -> float | None:
+        """Of what it carries against its other masses [kg]; None where it has no place for that."""
+        return None
+
     def only(self, masses: Mapping[str, float]) -> Self:
         """The same mechanism without any mass but these, by the names of its fields."""
         told: dict[str, Any] = {**self.weightless, **masses}

@@ -87,6 +87,11 @@ class SwingingYoke(SliderCrank):
         lean = math.asin(self.crank_radius / self.pivot)
         return (math.pi + 2.0 * lean) / (math.pi - 2.0 * lean)
 
+    @property
+    def counterweight_mass(self) -> float | None:
+        """Behind the pivot."""
+        return self.lever_weight if self.lever_weight_radius > 0.0 else None
+
     def lever(self, lib: Any, alpha: Any) -> tuple[Any, tuple[Any, Any]]:
         """Its direction as a unit number, and first and second derivative of its angle (K14)."""
         r, e = 0.0 * alpha + self.crank_radius, 0.0 * alpha + self.pivot

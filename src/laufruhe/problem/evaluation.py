@@ -67,7 +67,7 @@ class Evaluation:
     def rows(self, measure: Measure, samples: int | None = None, bends: Sequence[Array] | None = None) -> Rows:
         """Rows whose norm a measure is, over the whole cycle; of a peak where it bends too, or at angles given."""
         if not measure.is_load:
-            return mass_rows(measure, self.engine.rotors)
+            return mass_rows(measure, self.engine.rotors, self.engine.slider_cranks)
         return load_rows(
             measure,
             [loads.point for loads in self.loads],

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Engine, OperatingPoint, Rotor
+from laufruhe.machine import Engine, OperatingPoint, Role, Rotor, SliderCrank
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, orders_equal
 from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel
@@ -294,22 +294,31 @@ def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
     return signal if measure.orders is None else signal.only(measure.orders)
 
 
-def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
-    """The rotors whose masses a measure adds up."""
+def _roles(measure: Measure) -> tuple[Role, ...]:
+    """Of the rotors whose masses it adds up."""
     if not isinstance(measure.channel, MassChannel):
         raise TypeError(f"{measure.name} is no mass")
-    roles = measure.channel.roles
+    return measure.channel.roles
+
+
+def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
+    """The rotors whose masses a measure adds up."""
+    roles = _roles(measure)
     return tuple(r for r in rotors if (r.role in roles if measure.rotors is None else r.name in measure.rotors))
 
 
-def mass_rows(measure: Measure, rotors: Sequence[Rotor]) -> Rows:
-    """Rows U / radius of the counted rotors, shape (rotors, 2) [kg]; of none one row of nothing."""
+def counted_parts(measure: Measure, parts: Sequence[SliderCrank]) -> list[float]:
+    """The weights of mechanisms that a measure adds up: of all, or none where rotors are named [kg]."""
+    counts = Role.COUNTERWEIGHT in _roles(measure) and measure.rotors is None
+    return [mass for part in parts if counts and (mass := part.counterweight_mass) is not None]
+
+
+def mass_rows(measure: Measure, rotors: Sequence[Rotor], parts: Sequence[SliderCrank] = ()) -> Rows:
+    """Rows U / radius of the counted rotors, and those of mechanisms, shape (rows, 2) [kg]; of none one of nothing."""
     counted = counted_rotors(measure, rotors)
-    if not counted:
-        return Rows(MEAN, np.zeros((1, 2)), Grid(np.ones(1), 1))
-    vectors = np.array([[r.unbalance.real, r.unbalance.imag] for r in counted])
-    radii = np.array([[radius_of(r)] for r in counted])
-    return Rows(MEAN, vectors / radii, Grid(np.ones(len(counted)), 1))
+    vectors = [[r.unbalance.real / radius_of(r), r.unbalance.imag / radius_of(r)] for r in counted]
+    vectors += [[mass, 0.0] for mass in counted_parts(measure, parts)]
+    return Rows(MEAN, np.array(vectors or [[0.0, 0.0]]), Grid(np.ones(max(len(vectors), 1)), 1))
 
 
 def radius_of(rotor: Rotor) -> float:

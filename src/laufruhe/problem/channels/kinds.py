@@ -170,6 +170,17 @@ class Channel:
         """Whether it goes one way with the inertia of all that turns, whatever that is made of."""
         return self.is_flywheel and self.needs is Needs.FLYWHEEL
 
+    def check_sizes(self, engine: Engine, _: OperatingPoint) -> None:
+        """Ask for the sizes that are in it, if there are such.
+
+        Raises
+        ------
+        ModelError
+            If one of them is not given.
+        """
+        if self.of_engine is not None:
+            self.of_engine(engine)
+
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """Whether it may change with decisions of these kinds."""
         return bool(set(kinds) - UNFELT)
@@ -220,6 +231,10 @@ class LoadChannel(Channel):
         found = self.of_sizes(engine, point)
         return found if found.ndim > 1 else found[:, None]
 
+    def check_sizes(self, engine: Engine, point: OperatingPoint) -> None:
+        """Of its places, at an operating point."""
+        self.factors_of(engine, point)
+
     @property
     def feels_order(self) -> bool:
         """Whether it changes with the firing order of one star, where gas acts: cylinders are felt one by one."""
@@ -265,8 +280,8 @@ class MassChannel(Channel):
     is_mass: ClassVar[bool] = True
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Unbalances, and shafts that may be left out."""
-        return Kind.UNBALANCE in kinds or Kind.STAR in kinds
+        """Unbalances, weights of levers, and shafts that may be left out."""
+        return bool({Kind.UNBALANCE, Kind.PISTON, Kind.STAR} & set(kinds))
 
 
 @dataclass(frozen=True, eq=False)
