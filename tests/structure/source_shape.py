@@ -5,6 +5,7 @@ with `--prune` takes out of `exceptions.toml` what no longer breaks its rule (it
 """
 
 import ast
+import re
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -38,8 +39,13 @@ HEAVY = {
 LATE_ROOMS = ("", "cli")
 # Modules whose objects answer for themselves: nobody outside asks which one it is.
 NORMS, CHANNELS = "laufruhe.numerics.norms", "laufruhe.problem.channels"
-LAYOUTS = {"inline", "vee", "boxer", "opposed-piston", "parts"}
 LAYOUT_ROOM = "laufruhe.machine"
+NAMED = re.compile(r'^    name = "([a-z-]+)"$', re.MULTILINE)
+LAYOUTS = {
+    name
+    for path in (SOURCE / "laufruhe/machine/layouts").glob("*.py")
+    for name in NAMED.findall(path.read_text(encoding="utf-8"))
+}
 
 Trees = dict[str, ast.Module]
 Function = ast.FunctionDef | ast.AsyncFunctionDef

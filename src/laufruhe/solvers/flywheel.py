@@ -133,7 +133,7 @@ def solve_flywheel(problem: Problem) -> Result:
     program = _WheelProgram(problem, *whole.bounds, whole.asked(initial, problem.limits))
     unfinished = "" if found.complete else ", some of them not finished"
     method = f"monotone quantities, bounded on {found.boxes} boxes of the flywheel's numbers{unfinished}"
-    proof = shown(program, design, program.shares(design.values), found.bound, Reach.WHOLE, method)
+    proof = shown(program, design, found.bound, Reach.WHOLE, method)
     return concluded(design, initial, proof, timing)
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Self
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,19 @@ from laufruhe.errors import ModelError
 from laufruhe.numerics.budget import passed
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.conclusion import KEPT, Design, Shown
+from laufruhe.prove.best_first import Divided
+from laufruhe.prove.certificate import Reach, room_of
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, judged
 
 Array = NDArray[np.float64]
 
 # designs looked at for each start of the search; step of a slope, room that is none, and an objective that is far off
 LOOKS, STEP, HELD, FAR = 4, 1e-6, 1e-6, 1e3
+# searches from where boxes are least
+TRIES = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,9 +123,54 @@ def _local(program: LocalProgram, place: Array) -> Array:
     return np.asarray(np.clip(found.x, 0.0, 1.0))
 
 
-def shown(program: LocalProgram, design: Design, best: Array, bound: float, reach: Reach, method: str) -> Shown:
-    """A bound, with multipliers of the limits and bounds that hold a design, and how far these are from balance."""
+Bounded: TypeAlias = Callable[[float, float], Divided]
+"""What no design goes under, where one of this value is known and another by less than this room no better."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proven:
+    """The best design, as shares of its bounds and by the exact model, and what boxes tell of all others."""
+
+    shares: Array
+    design: Design
+    divided: Divided
+
+    @property
+    def excludes_all(self) -> bool:
+        """Whether no design keeps the limits."""
+        return self.design.excess > KEPT and self.divided.bound == math.inf
+
+    @property
+    def bound(self) -> float:
+        """Of the objective; of a design that breaks a limit nothing is proven."""
+        return self.divided.bound if self.design.excess <= KEPT else 0.0
+
+
+def proven(program: LocalProgram, best: Array, bounded: Bounded) -> Proven:
+    """A design and its bound, sought once more where boxes promise more than what was found."""
     problem = program.problem
+    found = Proven(best, judged(problem, program.values(best)), Divided(0.0, 0))
+    for _ in range(TRIES):
+        if passed():
+            break
+        value, room = math.inf, 0.0
+        if found.design.excess <= KEPT:
+            value = found.design.value
+            room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine))
+        found = replace(found, divided=bounded(value, room))
+        places = [program.shares(x) for x in found.divided.places]
+        if not places or found.divided.bound >= value - room:
+            break
+        again = searched(program, [found.shares, *places], len(places) + 1)
+        if program.rank(again) >= program.rank(found.shares):
+            break
+        found = Proven(again, judged(problem, program.values(again)), found.divided)
+    return found
+
+
+def shown(program: LocalProgram, design: Design, bound: float, reach: Reach, method: str) -> Shown:
+    """A bound, with multipliers of the limits and bounds that hold a design, and how far these are from balance."""
+    problem, best = program.problem, program.shares(design.values)
     slopes = program.slopes(best)
     rooms = program.numbers(best)[1:]
     size = float(np.abs(slopes[0]).max()) or 1.0

@@ -11,21 +11,19 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.sized_model import SizeModel
-from laufruhe.numerics.budget import passed
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided
-from laufruhe.prove.certificate import Reach, room_of
+from laufruhe.prove.certificate import Reach
 from laufruhe.prove.size_boxes import MOST_BOXES, SizeBoxes, divided_sizes
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, judged, none_within
+from laufruhe.solvers.conclusion import concluded, none_within
 from laufruhe.solvers.conflicts import smallest_conflict
-from laufruhe.solvers.local_programs import LocalProgram, looks, searched, shown
+from laufruhe.solvers.local_programs import LocalProgram, looks, proven, searched, shown
 from laufruhe.solvers.result import Result
 
 Array = NDArray[np.float64]
 
-STARTS, TRIES = 3, 2
+STARTS = 3
 # relative room that local programs leave inside limits, a part of what counts as kept
 INSIDE = 1e-7
 
@@ -59,24 +57,18 @@ def solve_sizes(problem: Problem) -> Result:
     given = program.shares(problem.start)
     starts = [given, np.ones(len(given)), *looks(problem)]
     best = searched(program, starts, min(problem.search.starts, STARTS))
-    design, divided, boxes = judged(problem, program.values(best)), Divided(0.0, 0), _boxes(model)
-    for _ in range(TRIES):
-        if boxes is None or passed():
-            break
-        met = design.excess <= KEPT
-        divided = _divided(boxes, design if met else None)
-        if not met and divided.bound == math.inf:
-            names = _conflict(problem, boxes)
-            return none_within(problem, initial, names, {"solve": time.perf_counter() - started})
-        if met and divided.bound >= design.value - room_of(design.value, problem.tolerance, 0.0):
-            break
-        places = [program.shares(x) for x in divided.places]
-        again = searched(program, [best, *places], len(places) + 1)
-        if program.rank(again) >= program.rank(best):
-            break
-        best, design = again, judged(problem, program.values(again))
-    proof = _shown(program, boxes, divided, design, best)
-    return concluded(design, initial, proof, {"solve": time.perf_counter() - started})
+    boxes = _boxes(model)
+
+    def bounded(value: float, room: float) -> Divided:
+        most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
+        return Divided(0.0, 0) if boxes is None else divided_sizes(boxes, value, room, most)
+
+    found = proven(program, best, bounded)
+    if boxes is not None and found.excludes_all:
+        return none_within(problem, initial, _conflict(problem, boxes), {"solve": time.perf_counter() - started})
+    told = _why(problem) if boxes is None else f"local programs; lower bound on {found.divided.boxes} boxes of sizes"
+    proof = shown(program, found.design, found.bound, Reach.ASIDE if boxes is None else Reach.WHOLE, told)
+    return concluded(found.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 def _boxes(model: SizeModel) -> SizeBoxes | None:
@@ -85,15 +77,6 @@ def _boxes(model: SizeModel) -> SizeBoxes | None:
         return SizeBoxes(model)
     except ValueError:
         return None
-
-
-def _divided(boxes: SizeBoxes, design: Design | None) -> Divided:
-    problem = boxes.model.problem
-    most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
-    if design is None:
-        return divided_sizes(boxes, math.inf, 0.0, most)
-    room = room_of(design.value, problem.tolerance, nothing_of(problem, design.evaluation.engine))
-    return divided_sizes(boxes, design.value, room, most)
 
 
 def _conflict(problem: Problem, boxes: SizeBoxes) -> tuple[str, ...]:
@@ -113,13 +96,6 @@ def _check_acts(model: SizeModel) -> None:
             raise ModelError(f"{decision.name} is open, and nothing that is asked depends on it; fix it, or limit it")
 
 
-def _shown(program: LocalProgram, boxes: SizeBoxes | None, divided: Divided, design: Design, best: Array) -> Shown:
-    if boxes is None:
-        why = "local programs; nothing bounds the length of the rod" if _has_rod(program) else "local programs"
-        return shown(program, design, best, 0.0, Reach.ASIDE, why)
-    method = f"local programs; lower bound on {divided.boxes} boxes of sizes"
-    return shown(program, design, best, divided.bound if design.excess <= KEPT else 0.0, Reach.WHOLE, method)
-
-
-def _has_rod(program: LocalProgram) -> bool:
-    return any(decision.name == "engine.rod_length" for decision in program.problem.decisions)
+def _why(problem: Problem) -> str:
+    has_rod = any(decision.name == "engine.rod_length" for decision in problem.decisions)
+    return "local programs; nothing bounds the length of the rod" if has_rod else "local programs"
