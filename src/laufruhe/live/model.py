@@ -33,7 +33,7 @@ from laufruhe.solvers.result import Result
 Array = NDArray[np.float64]
 
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
-HOW = "laufruhe page {file} moves it"
+HOW = "laufruhe page {file} follows it"
 OBJECTIVE = "objective"
 NOTHING = "Nothing is open here that the loads are affine in."
 
@@ -142,7 +142,8 @@ class _Collected:
         stays = not measure.channel.is_moved_by(self.kinds)
         is_affine = measure.is_mass or (measure.is_load and not measure.channel.feels_inertia)
         if not stays and not is_affine:
-            self.unmoved.append((name, f"no affine map of what is open says it; {HOW.format(file=self.file)}"))
+            why = f"it is not affine in what is open, so it is not shown here; {HOW.format(file=self.file)}"
+            self.unmoved.append((name, why))
             return []
         self.asked.append(None if stays else measure)
         base = Shown(role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit))

@@ -78,7 +78,7 @@ class Limits {
       root.setAttribute("data-value", value);
       root.setAttribute("data-met", met);
       row.value.textContent = figure(value, measure);
-      row.edge.textContent = side ? `${side[0]} ${figure(side[1], measure)}` : "";
+      row.edge.textContent = side ? `${side[0]} ${trimmed(side[1] * measure.factor)} ${measure.shown}`.trimEnd() : "";
       row.bar.style.width = `${side && side[1] ? Math.min(100, (100 * value) / side[1]) : 0}%`;
       row.met.textContent = met ? (measure.signal === null ? "kept, stays" : "kept") : "broken";
     });
@@ -93,9 +93,9 @@ function button(what, text, title, pressed) {
 }
 
 /** One of several to choose from. */
-function choice(name, texts, chosen) {
+function choice(name, texts, first, chosen) {
   const list = texts.map((text, k) => {
-    const input = element("input", { type: "radio", name, value: k, ...(k === 0 ? { checked: true } : {}) });
+    const input = element("input", { type: "radio", name, value: k, checked: k === first });
     input.addEventListener("change", () => chosen(k));
     return element("label", {}, input, element("span", {}, text));
   });

@@ -51,6 +51,12 @@ function difference(model) {
   return most;
 }
 
+/** Number of the curve that the objective is of; else the first. */
+function ownCurve(model) {
+  const asked = model.measures.find((measure) => measure.role === "objective" && measure.signal !== null);
+  return Math.max(model.curves.findIndex((curve) => asked && model.signals[curve.signal].name === model.signals[asked.signal].name), 0);
+}
+
 /** A page of a model in an element, and a handle to it. */
 class Page {
   constructor(root) {
@@ -64,7 +70,7 @@ class Page {
 
   async open(model) {
     this.model = await opened(model);
-    this.curve = 0;
+    this.curve = ownCurve(this.model);
     this.point = 0;
     this.optimum = this.known("optimum");
     this.given = this.known("given");
@@ -131,8 +137,8 @@ class Page {
   }
 
   choices() {
-    const curves = choice("Load shown", this.model.curves.map((curve) => curve.title), (k) => { this.curve = k; this.redraw(); });
-    const points = choice("Operating point", this.model.points, (k) => { this.point = k; this.redraw(); });
+    const curves = choice("Load shown", this.model.curves.map((curve) => curve.title), this.curve, (k) => { this.curve = k; this.redraw(); });
+    const points = choice("Operating point", this.model.points, this.point, (k) => { this.point = k; this.redraw(); });
     return element("div", { class: "live-choices" }, curves, points);
   }
 
@@ -142,7 +148,7 @@ class Page {
     if (!signal) return { compare() {}, update() {}, say() {} };
     const known = Object.values(model.designs).map((design) => Float64Array.from(design.x));
     const was = keptOf(signal, point, this.markedAt());
-    const polar = signal.parts > 1 ? new Polar(signal, was) : null;
+    const polar = signal.parts > 1 && signal.unit.startsWith("N") ? new Polar(signal, was) : null;
     const over = new OverAngle(signal, was, this.root.clientWidth < 560 ? 430 : 860), bars = new Bars(signal, was), orders = new Orders(signal, point, known);
     const boxes = [
       polar && ["polar", "Path of the tip over one cycle, seen from the front", polar.root],
