@@ -14,6 +14,7 @@ import pytest
 
 from cli import scenes
 from laufruhe.files.reader import load
+from laufruhe.physics.torque import torque_parts
 from laufruhe.physics.torsion import chain_of, shaft_torque
 from laufruhe.present.pictures import CURVES, PRINTED, PRINTED_SHEETS, SHEETS
 from laufruhe.problem.evaluation import measured
@@ -154,3 +155,35 @@ def test_pages_of_a_workbook_have_names_that_it_takes(tmp_path: Path) -> None:
     book = openpyxl.load_workbook(tmp_path / "book.xlsx")
     assert book.sheetnames == ["mean force over 'speed-", "a" * 31, "A" * 29 + " 2", "n-a -kg-", "-quoted-"]
     assert [cell.value for cell in book["n-a -kg-"]["A"]] == ["x", 1.5]
+
+
+@pytest.mark.slow
+def test_indicator_diagrams_enclose_the_work_of_the_gas() -> None:
+    """What the forces on the rods do over a turn is what the torque of the gas does."""
+    result = state(load(PROBLEMS / "waterworks-steam-pump.toml"))
+    sheet = sheets_of(result)["indicator"]
+    stroke = {part.name: part.stroke for part in result.final.engine.slider_cranks}
+    work = 0.0
+    for name in stroke:
+        rows = np.array([row[2:6] for row in sheet.rows if row[1] == name])
+        if len(rows):
+            travel, force = (np.append(column, column[0]) for column in rows[:, 1:3].T)
+            work += np.trapezoid(force, travel) * stroke[name]
+    torque = torque_parts(result.final.engine, result.problem.points[0], result.problem.fidelity)["gas"]
+    assert work == pytest.approx(abs(float(torque.at(0).real)) * math.tau, rel=5e-3)
+    # the low pressure has its own cylinder: the other's cells are empty
+    assert {math.isnan(row[-1]) for row in sheet.rows} == {True, False}
+
+
+@pytest.mark.slow
+def test_chambers_of_rotors_make_the_torque_of_the_gas() -> None:
+    result = state(load(PROBLEMS / "rotary-two.toml"))
+    sheet, point = sheets_of(result)["chambers"], result.problem.points[0]
+    rows = np.array([row[2:] for row in sheet.rows if row[0] == point.name], dtype=float)
+    steps = len(np.unique(rows[:, 1]))
+    mean = rows[:, 4].reshape(-1, steps)[:, :-1].mean(axis=1).sum()
+    torque = torque_parts(result.final.engine, point, result.problem.fidelity)["gas"]
+    assert mean == pytest.approx(float(torque.at(0).real), rel=1e-3)
+    volumes = rows[:, 2].reshape(-1, steps)
+    assert volumes.min(axis=1) == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(volumes.max(axis=1)) < 1e-12

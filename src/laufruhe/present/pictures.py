@@ -29,7 +29,9 @@ SHEETS = (
     "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "run-up", "rankings",
 )  # fmt: skip
 """Curves and tables of a result as files: `report.tables` fills them in full precision."""
-CURVES = ("torque", "twist-response", "twist-modes", "critical-speeds", "uneven-firing", "shares")
+CURVES = (
+    "torque", "indicator", "chambers", "twist-response", "twist-modes", "critical-speeds", "uneven-firing", "shares",
+)  # fmt: skip
 """Further ones, which `report.curves` fills."""
 PRINTED = ("weights", "assembly", "ranks", "robust", "torque", "torsion", "run_up")
 """Sections of the report whose tables are files as they are printed, and how many each may have."""

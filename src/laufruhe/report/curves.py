@@ -1,4 +1,4 @@
-"""Curves of pictures as sheets: torque over a cycle, twist over speed, modes of the crankshaft, shares of engines."""
+"""Curves of pictures as sheets: torque over a cycle, chambers, twist over speed, modes of the crankshaft, shares."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from laufruhe.physics.irregularity import swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import torque_parts
 from laufruhe.physics.torsion import chain_of
+from laufruhe.present.chambers import indicator_of, points_with_chambers, rotor_chambers, rotors_of
 from laufruhe.present.measures import Array, has_loads, has_ranking, objective_unit, ranking_of
 from laufruhe.present.torque import asks_torque
 from laufruhe.present.torsion import facts_of, is_twisted, speed_range, speeds_between, torque_over_speed
@@ -23,6 +24,7 @@ from laufruhe.solvers.robust_result import SHARES
 from laufruhe.units import readable
 
 RPM = readable("rad/s")[1]
+TURN = math.tau * np.arange(STEPS) / STEPS
 
 
 def _torque(result: Result) -> Sheet | None:
@@ -127,8 +129,47 @@ def _shares(result: Result) -> Sheet | None:
     return Sheet(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows) if columns else None
 
 
+def _indicator(result: Result) -> Sheet | None:
+    """Pressure in every chamber on both sides of pistons, and what drives the rods, of the final design."""
+    parts, rows, named = result.final.engine.slider_cranks, [], dict[str, None]()
+    found = [
+        (point.name, part.name, indicator_of(gas, part, point, TURN))
+        for point, gas in points_with_chambers(result)
+        for part in parts
+        if gas.of(part)
+    ]
+    for _, _, one in found:
+        named |= dict.fromkeys(one.pressures)
+    for point, part, one in found:
+        # a cylinder has not every chamber
+        pressures = (one.pressures.get(name, np.full(STEPS, math.nan)) for name in named)
+        columns = np.column_stack([np.degrees(TURN), one.travel, one.force, one.needed, *pressures])
+        rows += [[point, part, *row] for row in columns.tolist()]
+    head = ["point", "cylinder", "angle from its dead centre [deg]", "part of the stroke", "force of the chambers [N]",
+            "force that accelerates the rod [N]", *(f"pressure in {name} [Pa]" for name in named)]  # fmt: skip
+    return Sheet(head, rows) if rows else None
+
+
+def _chambers(result: Result) -> Sheet | None:
+    """Volume, pressure and torque of every chamber of every rotor, of the final design."""
+    rows = []
+    for point in result.problem.points:
+        for part in rotors_of(result.final.engine):
+            found = rotor_chambers(result.problem, part, point, STEPS * len(part.swept.lags) + 1)
+            nothing = np.full_like(found.volume, math.nan)
+            pressure, torque = (nothing if each is None else each for each in (found.pressure, found.torque))
+            for k, columns in enumerate(zip(found.volume, pressure, torque, strict=True)):
+                values = np.column_stack([np.degrees(found.angles), *columns]).tolist()
+                rows += [[point.name, part.name, k + 1, *row] for row in values]
+    head = ["point", "rotor", "chamber", "angle [deg]", "volume over the least [m^3]",
+            "pressure over the crankcase [Pa]", "torque [N m]"]  # fmt: skip
+    return Sheet(head, rows) if rows else None
+
+
 CURVES: dict[str, Callable[[Result], Sheet | None]] = {
     "torque": _torque,
+    "indicator": _indicator,
+    "chambers": _chambers,
     "twist-response": _twist_response,
     "twist-modes": _twist_modes,
     "critical-speeds": _critical_speeds,

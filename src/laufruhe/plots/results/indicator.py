@@ -10,11 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from laufruhe.machine import Chambers, OperatingPoint, SliderCrank
-from laufruhe.physics.cylinder_volume import dead_centres, swept_volume
-from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
+from laufruhe.physics.cylinder_volume import dead_centres
 from laufruhe.plots.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, entry, headed, page, styled
 from laufruhe.plots.words import FAINT, INK
-from laufruhe.present.measures import has_loads
+from laufruhe.present.chambers import indicator_of, points_with_chambers
 from laufruhe.solvers.result import Result
 
 STEPS, MOST_ROWS = 1440, 6
@@ -25,22 +24,20 @@ BAR, KILO = 1e-5, 1e-3
 
 def applies(result: Result) -> bool:
     """Whether chambers on both sides of pistons are told."""
-    return has_loads(result) and any(isinstance(point.gas, Chambers) for point in result.problem.points)
+    return bool(points_with_chambers(result))
 
 
 @styled()
 def figure(result: Result) -> Figure:
     """Of every cylinder that a page holds its diagrams on the left, and the force on its rod on the right."""
-    point = next(point for point in result.problem.points if isinstance(point.gas, Chambers))
-    gas, parts = point.gas, result.final.engine.slider_cranks
-    assert isinstance(gas, Chambers)
-    shown = [part for part in parts if gas.of(part)][:MOST_ROWS]
+    point, gas = points_with_chambers(result)[0]
+    shown = [part for part in result.final.engine.slider_cranks if gas.of(part)][:MOST_ROWS]
     # names of chambers stand above their diagram, two a row
     lead = 0.12 + 0.17 * max(-(-len(gas.of(part)) // 2) for part in shown)
     drawn = page(len(shown), 2, (WIDE, HIGH), gap=0.3, lead=lead, across=0.75)
     for k, part in enumerate(shown):
         left, right = drawn.panels[2 * k], drawn.panels[2 * k + 1]
-        _diagrams(left, gas, part)
+        _diagrams(left, gas, part, point)
         _force(right, gas, part, point)
         for axes in (left, right):
             axes.set(
@@ -53,12 +50,10 @@ def figure(result: Result) -> Figure:
     return headed(drawn, result, f"Indicator diagrams at {point.name}", told, legend)
 
 
-def _diagrams(axes: Axes, gas: Chambers, part: SliderCrank) -> None:
-    angles = np.linspace(0.0, math.tau, STEPS + 1)
-    travel = swept_volume(part, angles)
-    for k, chamber in enumerate(gas.of(part)):
-        pressures = BAR * chamber_pressure(chamber, part, angles)
-        axes.plot(travel, pressures, color=COLOURS[k % len(COLOURS)], linewidth=1.2, label=chamber.name)
+def _diagrams(axes: Axes, gas: Chambers, part: SliderCrank, point: OperatingPoint) -> None:
+    drawn = indicator_of(gas, part, point, np.linspace(0.0, math.tau, STEPS + 1))
+    for k, (name, pressure) in enumerate(drawn.pressures.items()):
+        axes.plot(drawn.travel, BAR * pressure, color=COLOURS[k % len(COLOURS)], linewidth=1.2, label=name)
     axes.set_ylim(bottom=0.0)
     above: Any = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 2}
     axes.legend(frameon=False, handlelength=1.2, borderpad=0.0, **above)
@@ -68,10 +63,7 @@ def _force(axes: Axes, gas: Chambers, part: SliderCrank, point: OperatingPoint) 
     """On the way out from the head end and on the way back, beside what the reciprocating mass takes of it."""
     top, bottom = dead_centres(part)
     for begin, end in ((top, bottom), (bottom, top + math.tau)):
-        angles = np.linspace(begin, end, STEPS // 2 + 1)[1:-1]
-        travel, alpha = swept_volume(part, angles), part.fires_at + part.shaft.ratio * angles
-        mass, (_, _, acceleration) = part.motion(np, alpha).points[0]
-        needed = -mass * (part.shaft.ratio * point.speed) ** 2 * acceleration.real
-        axes.plot(travel, -KILO * chambers_thrust(gas, part, angles), color=INK, linewidth=1.4)
-        axes.plot(travel, KILO * needed, color=FAINT, linewidth=1.0, linestyle=(0, (4, 1.6)))
+        drawn = indicator_of(gas, part, point, np.linspace(begin, end, STEPS // 2 + 1)[1:-1])
+        axes.plot(drawn.travel, KILO * drawn.force, color=INK, linewidth=1.4)
+        axes.plot(drawn.travel, KILO * drawn.needed, color=FAINT, linewidth=1.0, linestyle=(0, (4, 1.6)))
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
