@@ -13,8 +13,9 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.machine import Block, Mount
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import elastic_mounting
-from laufruhe.physics.run_up import periodic_state, run_through, time_model
+from laufruhe.physics.run_up import periodic_state, run_through
 from laufruhe.physics.speed_map import split_loads
+from laufruhe.physics.time_model import time_model
 from laufruhe.physics.time_mounting import INTEGRATION
 from laufruhe.problem.channels import mounting_in
 from laufruhe.report.json_result import as_dict

@@ -270,6 +270,7 @@ OpenPositiveLength: TypeAlias = Annotated[float | Open, Number("m", above=0.0, o
 OpenNonNegativeLength: TypeAlias = Annotated[float | Open, Number("m", least=0.0, openable=True)]
 OpenLength: TypeAlias = Annotated[float | Open, Number("m", openable=True)]
 OpenStiffness: TypeAlias = Annotated[float | Open, Number("N/m", least=0.0, openable=True)]
+Damping: TypeAlias = Annotated[float, Number("N s/m", least=0.0)]
 Delay: TypeAlias = Annotated[float, Number("s", least=0.0)]
 OpenDelay: TypeAlias = Annotated[float | Open, Number("s", least=0.0, openable=True)]
 OpenDamping: TypeAlias = Annotated[float | Open, Number("N s/m", least=0.0, openable=True)]
@@ -289,6 +290,11 @@ class Table(BaseModel):
     """A TOML table that knows its keys and takes no others."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
+
+
+def needed(text: str) -> Any:
+    """A field that may not be left out, and what an editor says of it."""
+    return Field(description=text)
 
 
 def told(text: str, default: Any = None) -> Any:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
 
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, all_different, blamed_on, nearest, none_of
+from laufruhe.files.dynamic_mounts import DynamicStiffnessTable, FluidTrackTable, dynamic_of
 from laufruhe.files.fields import Name, Open, Table
-from laufruhe.machine import Block, Mount, Run
+from laufruhe.machine import Block, Mount
+from laufruhe.machine.dynamic import Dynamic
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.modes import free_motion
 from laufruhe.problem.decision import (
@@ -39,7 +42,8 @@ _FIELDS = {
 # what mirroring in y = 0 does to each number of a mount
 _MIRRORED = [1.0] * 8 + [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0]
 _OF_ALL = ("stiffness", "loss_factor", "damping_per_stiffness")
-_ELASTIC = ("stiffness", "loss_factor", "damping", "damping_per_stiffness", "like", "mirror_of", "joined_to", "stop")
+_DYNAMIC = ("fluid_track", "dynamic_stiffness")
+_ELASTIC = (*_OF_ALL, *_DYNAMIC, "damping", "like", "mirror_of", "joined_to", "stop")
 _NOT_RIGID = ('is for kind = "elastic" only', "leave it out, or set the kind")
 _NOT_ELASTIC = ('is for kind = "rigid" only', "give stiffness instead")
 
@@ -87,6 +91,8 @@ class MountTable(Table):
     )
     like: Name | None = f.told("Stiffness, loss and damping follow those of this mount.")
     mirror_of: Name | None = f.told("All follows this mount, mirrored in the plane y = 0.")
+    fluid_track: FluidTrackTable | None = None
+    dynamic_stiffness: DynamicStiffnessTable | None = None
     joined_to: Name | None = f.told("It stands where this mount stands, and their forces count together as one.")
     stop: StopTable | None = None
 
@@ -119,7 +125,7 @@ class MountsFound:
     decisions: tuple[Decision, ...] = ()
 
 
-def mounts_of(table: MountsTable | None, block: BlockTable | None) -> MountsFound:
+def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path) -> MountsFound:
     """Rigid mounts, or elastic ones with the block on them."""
     if table is None or table.kind == "rigid":
         if block is not None:
@@ -127,7 +133,7 @@ def mounts_of(table: MountsTable | None, block: BlockTable | None) -> MountsFoun
         return MountsFound(_rigid(table)) if table else MountsFound()
     if block is None:
         raise Refused("block", None, "is missing, and elastic mounts carry it", "add [block] with mass and inertia")
-    return _elastic(table, _block(block))
+    return _elastic(table, _block(block), folder)
 
 
 def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
@@ -181,7 +187,7 @@ def _block(table: BlockTable) -> Block:
         return Block(table.mass, ((a, xy, xz), (xy, b, yz), (xz, yz, c)), (x, y, z), table.turning_inertia)
 
 
-def _elastic(table: MountsTable, block: Block) -> MountsFound:
+def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsFound:
     none_of(table, ("relative_stiffness",), "mounts", *_NOT_ELASTIC)
     places, names = _places(table)
     read, joins = _Numbers([], []), list[int]()
@@ -192,14 +198,15 @@ def _elastic(table: MountsTable, block: Block) -> MountsFound:
         joins.append(joined)
         read.rows.append([0.0] * NUMBERS_OF_MOUNT)
         if leader is not None:
-            read.follow(leader, [key for key in followed if key != _AT or joined == k], place.mirror_of is not None)
+            keys = [key for key in followed if key in _FIELDS and (key != _AT or joined == k)]
+            read.follow(leader, keys, mirrored=place.mirror_of is not None)
         if joined != k:
             read.follow(joined, [_AT], mirrored=False)
         for key in _FIELDS:
             if key not in followed and (key != _AT or joined == k):
                 read.take(name, key, _values(table, place, key, where, "add it, or like, or mirror_of"))
-    stops = [place.stop or table.stop for place in places]
-    bare = map(_bare, names, stops)
+    stops, laws = [place.stop or table.stop for place in places], _laws(places, names, folder)
+    bare = [replace(spring, dynamic=law) for spring, law in zip(map(_bare, names, stops), laws, strict=True)]
     springs = [mount_of(spring, row) for spring, row in zip(bare, read.rows, strict=True)]
     mounts = tuple(
         replace(springs[k], joined=tuple(springs[j] for j in range(k + 1, len(joins)) if joins[j] == k))
@@ -212,6 +219,16 @@ def _elastic(table: MountsTable, block: Block) -> MountsFound:
         remedy = "add a mount or a stiffness there; an open stiffness may be given a start"
         raise Refused("mounts", None, f"leave the block free in {loose}", remedy)
     return MountsFound(mounts, block, tuple(map(tuple, read.rows)), tuple(read.decisions))
+
+
+def _laws(places: Sequence[MountTable], names: list[str], folder: Path) -> list[tuple[Dynamic, ...]]:
+    """Of every mount what depends on frequency, that of the one it follows where it follows one."""
+    found: list[tuple[Dynamic, ...]] = []
+    for k, place in enumerate(places):
+        leader, where = place.like or place.mirror_of, f"mounts.places[{k + 1}]"
+        own = dynamic_of(place.fluid_track, place.dynamic_stiffness, folder, where)
+        found.append(own if leader is None else found[names.index(leader)])
+    return found
 
 
 def _bare(name: str, stop: StopTable | None) -> Mount:
@@ -250,8 +267,8 @@ def _joined(place: MountTable, names: list[str], k: int, joins: Sequence[int]) -
 
 def _followed(place: MountTable) -> tuple[str, ...]:
     if place.mirror_of is not None:
-        return tuple(_FIELDS)
-    return (*_OF_ALL, "damping") if place.like is not None else ()
+        return (*_FIELDS, *_DYNAMIC)
+    return (*_OF_ALL, "damping", *_DYNAMIC) if place.like is not None else ()
 
 
 @dataclass
@@ -289,29 +306,3 @@ class _Numbers:
                 drives = [v for v in decision.mount_drives if v.mount == leader and v.number == number]
                 new = (MountDrive(last, number, gain * drive.gain) for drive in drives)
                 self.decisions[d] = replace(decision, drives=(*decision.drives, *new))
-
-
-class RunUpTable(Table):
-    """From rest to a speed and back, through resonance."""
-
-    up_to: f.Speed
-    time: f.Time = f.told("Time in which the engine runs up from rest.", 3.0)
-    shut_down_time: f.Time | None = f.told("Time in which the engine is shut down; by default that of the run-up.")
-    operating_point: str | None = f.told(
-        "Operating point whose gas drives the engine during the run; the slowest by default."
-    )
-
-
-def run_of(table: RunUpTable | None, block: Block | None, points: Sequence[str]) -> Run | None:
-    """How the engine is run up and shut down."""
-    if table is None:
-        return None
-    if block is None:
-        raise Refused(
-            "run_up", None, "needs elastic mounts, that have resonances", 'add [mounts] with kind = "elastic"'
-        )
-    if table.operating_point is not None and table.operating_point not in points:
-        raise Refused(
-            "run_up.operating_point", table.operating_point, "is none here", nearest(table.operating_point, points)
-        )
-    return Run(table.up_to, table.time, table.shut_down_time or table.time, table.operating_point or "")

@@ -20,10 +20,11 @@ from laufruhe.files.friction import FrictionTable
 from laufruhe.files.gas import GasTable
 from laufruhe.files.geared import GearedInertiaTable
 from laufruhe.files.hover import explained
-from laufruhe.files.mounts import BlockTable, MountsTable, RunUpTable
+from laufruhe.files.mounts import BlockTable, MountsTable
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
+from laufruhe.files.run_up import RunUpTable
 from laufruhe.files.running_gear import RunningGearTable
 from laufruhe.files.tolerances import RobustTable, TolerancesTable
 from laufruhe.files.torsion import TorsionTable

@@ -30,12 +30,13 @@ from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.geared import geared_of
 from laufruhe.files.leads import leads_of
-from laufruhe.files.mounts import mounts_of, run_of
+from laufruhe.files.mounts import mounts_of
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.piston_masses import check_factors, piston_masses
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
+from laufruhe.files.run_up import run_of
 from laufruhe.files.running_gear import size_decisions, weighed
 from laufruhe.files.scene import Scene
 from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbers
@@ -267,12 +268,12 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
-    found, cycle = mounts_of(file.mounts, file.block), cycle_of(table)
+    found, cycle = mounts_of(file.mounts, file.block, path.parent), cycle_of(table)
     rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
     chain, of_chain = torsion_of(file.torsion, cylinders, throws)
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(told, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
-    run = run_of(file.run_up, found.block, [point.name for point in points])
+    run = run_of(file.run_up, found.block, found.mounts, [point.name for point in points])
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
         file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run, gear, geared

@@ -83,6 +83,7 @@ class Scene:
             raise Refused(where, name, *_NEEDS[channel.needs])
         with blamed_on(where):
             channel.check_sizes(self.engine, self.points[0])
+        self._check_stiffness(channel, name, where)
         self._check_keys(channel, table, at)
         weights = table.direction_weights
         found = Measure(
@@ -117,6 +118,13 @@ class Scene:
             Needs.ARMS: rim is not None and rim.arms is not None,
         }
         return has[needs]
+
+    def _check_stiffness(self, channel: Channel, name: str, where: str) -> None:
+        """Refuse what is of one stiffness where mounts have another at every frequency."""
+        for mount in self.engine.mounts if channel.of_constant_stiffness else ():
+            if mount.depends_on_frequency:
+                rule = f"is of one stiffness, and that of mount '{mount.name}' depends on frequency"
+                raise Refused(where, name, rule, "ask for transmissibility, mount force or mount travel")
 
     def _check_keys(self, channel: Channel, table: QuantityTable, at: str) -> None:
         """Refuse keys that mean nothing for a channel, and names of what is not there."""

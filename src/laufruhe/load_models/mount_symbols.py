@@ -8,7 +8,7 @@ closed form; its derivatives are exact.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine.block import Block
+from laufruhe.machine.dynamic import Dynamic
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.namespaces import symbols
 from laufruhe.physics.rigid_body import along_axes, carried, point_motion, turned_axes
@@ -37,6 +38,11 @@ class SymbolicMounts:
         G R' of all mounts, stacked, shape (3 mounts, 6) (E1).
     springs, losses, dampers
         Mount forces per motion, stacked alike (E5).
+    rows, directions
+        Of the springs whose stiffness depends on frequency: travel per motion, shape (n, 6), and where their forces
+        act, (3 mounts, n) (E50).
+    laws
+        Their stiffness.
     """
 
     stiffness: Any
@@ -46,6 +52,15 @@ class SymbolicMounts:
     springs: Any
     losses: Any
     dampers: Any
+    rows: Any
+    directions: Any
+    laws: tuple[Dynamic, ...] = ()
+
+    def added(self, omegas: Array) -> tuple[Any, Any]:
+        """Stiffness over that at rest, real and imaginary part, shape (n, frequencies)."""
+        found = [law.at(omegas) - law.static for law in self.laws]
+        values = np.array(found, dtype=complex).reshape(len(self.laws), len(omegas))
+        return ca.DM(values.real.copy()), ca.DM(values.imag.copy())
 
 
 def mount_matrices(problem: Problem, block: Block) -> Any:
@@ -56,27 +71,37 @@ def mount_matrices(problem: Problem, block: Block) -> Any:
     totals = [ca.SX(6, 6) for _ in range(3)]
     maps: list[list[Any]] = [[], [], [], []]
     found = problem.numbers([decisions[k] for k in range(len(problem.mount_decisions))], problem.mount_decisions)
-    places = [place for place, _ in every_spring(problem.engine.mounts)]
-    for place, numbers in zip(places, found.mounts or problem.mount_numbers, strict=True):
+    rows, directions, mounts = [], [], len(problem.engine.mounts)
+    springs = every_spring(problem.engine.mounts)
+    for (place, given), numbers in zip(springs, found.mounts or problem.mount_numbers, strict=True):
         axes = turned_axes(lib, numbers[TURNED])
         arm = [p - c for p, c in zip(numbers[POSITION], block.centre_of_gravity, strict=True)]
         motion = ca.SX(point_motion(lib, arm))
         spring = along_axes(lib, axes, numbers[STIFFNESS])
+        held = spring
+        for law in given.dynamic:
+            axis = ca.SX(axes)[law.axis, :]
+            held = held + law.static * (axis.T @ axis)
+            rows.append(axis @ motion @ root.T)
+            directions.append(ca.vertcat(ca.SX(3 * place, 1), axis.T, ca.SX(3 * (mounts - place - 1), 1)))
         drag = along_axes(lib, axes, numbers[DAMPING]) + numbers[LAG] * spring
         if place == len(maps[0]):
             maps[0].append(motion @ root.T)
-        for k, matrix in enumerate((spring, numbers[LOSS] * spring, drag)):
+        for k, matrix in enumerate((held, numbers[LOSS] * spring, drag)):
             totals[k] += carried(motion, matrix)
             felt = matrix @ motion @ root.T
             # springs that are joined count together
             maps[k + 1][place:] = [sum(maps[k + 1][place:], felt)]
     stacked = [ca.vertcat(*parts) for parts in maps]
-    return ca.Function("mounts", [decisions], [*(root @ total @ root.T for total in totals), *stacked])
+    told = [ca.vertcat(*rows) if rows else ca.SX(0, 6), ca.horzcat(*directions) if rows else ca.SX(3 * mounts, 0)]
+    return ca.Function("mounts", [decisions], [*(root @ total @ root.T for total in totals), *stacked, *told])
 
 
 def symbolic_mounts(problem: Problem, block: Block, decisions: Any) -> SymbolicMounts:
     """Matrices at symbolic decisions."""
-    return SymbolicMounts(*mount_matrices(problem, block)(decisions))
+    laws = tuple(law for _, spring in every_spring(problem.engine.mounts) for law in spring.dynamic)
+    found = mount_matrices(problem, block)(decisions)
+    return replace(SymbolicMounts(*found), laws=laws)
 
 
 def elimination() -> Any:
@@ -135,17 +160,25 @@ class SymbolicResponse:
 def response(mounts: SymbolicMounts, omegas: Array, real: Any, imaginary: Any) -> SymbolicResponse:
     """Response to loads R w, real and imaginary parts of shape (6, n), at omegas of shape (n,)."""
     count, one = len(omegas), ca.DM.eye(6)
-    reactance = ca.horzcat(*(mounts.stiffness - float(w) ** 2 * one for w in omegas))
+    stiffer, dragging = mounts.added(omegas)
     lossy = [float(w > 0.0) for w in omegas]
-    resistance = ca.horzcat(
-        *(on * mounts.loss + float(w) * mounts.damping for on, w in zip(lossy, omegas, strict=True))
-    )
+    reactances = [mounts.stiffness - float(w) ** 2 * one for w in omegas]
+    resistances = [on * mounts.loss + float(w) * mounts.damping for on, w in zip(lossy, omegas, strict=True)]
+    if mounts.laws:
+        for k in range(count):
+            reactances[k] += mounts.rows.T @ ca.diag(stiffer[:, k]) @ mounts.rows
+            resistances[k] += mounts.rows.T @ ca.diag(dragging[:, k]) @ mounts.rows
+    reactance, resistance = ca.horzcat(*reactances), ca.horzcat(*resistances)
     eliminate = elimination().map(count)
     yr, yi = eliminate(reactance, resistance, real, imaginary)
     firm = eliminate(ca.repmat(mounts.stiffness, 1, count), ca.MX(6, 6 * count), real, imaginary)
     on, speeds = ca.DM(np.tile(lossy, (6, 1))), ca.DM(np.tile(omegas, (6, 1)))
     force_real = mounts.springs @ yr - mounts.losses @ (yi * on) - mounts.dampers @ (yi * speeds)
     force_imaginary = mounts.springs @ yi + mounts.losses @ (yr * on) + mounts.dampers @ (yr * speeds)
+    if mounts.laws:
+        along, across = mounts.rows @ yr, mounts.rows @ yi
+        force_real += mounts.directions @ (stiffer * along - dragging * across)
+        force_imaginary += mounts.directions @ (stiffer * across + dragging * along)
     return SymbolicResponse(
         (force_real, force_imaginary),
         (mounts.travels @ yr, mounts.travels @ yi),

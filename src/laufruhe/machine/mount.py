@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
+from laufruhe.machine.dynamic import Dynamic
 
 Vector3 = tuple[float, float, float]
 Matrix3 = tuple[Vector3, Vector3, Vector3]
@@ -36,6 +37,8 @@ class Mount:
         Viscous, along its own three axes [N s/m].
     lag
         Further viscous damping over stiffness, along each axis [s] (E48).
+    dynamic
+        Further springs along its own axes, whose stiffness depends on frequency (E50, E51).
     joined
         Further springs at the same place, whose forces count with its own as one (E49).
     stop_gap
@@ -54,6 +57,7 @@ class Mount:
     stop_stiffness: float = 0.0
     lag: float = 0.0
     joined: tuple[Mount, ...] = ()
+    dynamic: tuple[Dynamic, ...] = ()
 
     def __post_init__(self) -> None:
         for what, value in (("stiffness", min(self.stiffness)), ("damping", min(self.damping)),
@@ -69,6 +73,19 @@ class Mount:
         """All of the place, each by itself."""
         return (replace(self, joined=()), *self.joined) if self.joined else (self,)
 
+    @property
+    def at_rest(self) -> Vector3:
+        """Stiffness along its own three axes, with that of what depends on frequency (E50) [N/m]."""
+        if not self.dynamic:
+            return self.stiffness
+        x, y, z = (k + sum(law.static for law in self.dynamic if law.axis == a) for a, k in enumerate(self.stiffness))
+        return x, y, z
+
+    @property
+    def depends_on_frequency(self) -> bool:
+        """Whether any spring of the place does."""
+        return any(spring.dynamic for spring in self.springs)
+
     def each(self, change: Callable[[Mount], Mount]) -> Mount:
         """With every spring of the place changed."""
         own = change(replace(self, joined=())) if self.joined else change(self)
@@ -76,8 +93,8 @@ class Mount:
 
     @property
     def stiffness_matrix(self) -> NDArray[np.float64]:
-        """3 x 3 stiffness in the axes of C2 (E2)."""
-        return self._in_c2(lambda spring: spring.stiffness)
+        """3 x 3 stiffness at rest in the axes of C2 (E2)."""
+        return self._in_c2(lambda spring: spring.at_rest)
 
     @property
     def loss_matrix(self) -> NDArray[np.float64]:

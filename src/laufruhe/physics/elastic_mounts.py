@@ -25,6 +25,7 @@ from laufruhe.machine.block import Block
 from laufruhe.machine.mount import Mount, every_spring
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.dynamic_springs import DynamicSprings, dynamic_springs
 from laufruhe.physics.modes import Modes, modes_of
 from laufruhe.physics.rigid_body import carried, moved_wrench, point_motion
 
@@ -90,13 +91,25 @@ class ElasticMounting:
         return self.total(self.springs)
 
     @cached_property
+    def dynamic(self) -> DynamicSprings:
+        """Springs whose stiffness depends on frequency (E50, E51)."""
+        return dynamic_springs(self.mounts, self.motions)
+
+    @cached_property
     def modes(self) -> Modes:
-        """Undamped natural modes (E6)."""
+        """Undamped natural modes, of the stiffness at rest (E6)."""
         return modes_of(self.block.mass_matrix, self.stiffness, self.total(self.losses))
 
     @cached_property
     def _loss(self) -> Array:
         return self._modal(self.total(self.losses))
+
+    @cached_property
+    def _met(self) -> NDArray[np.bool_]:
+        """Modes that springs whose stiffness depends on frequency couple, shape (6, 6)."""
+        seen = np.abs(self.dynamic.rows @ self.modes.shapes)
+        felt = (seen > UNDRIVEN * seen.max(axis=1, keepdims=True, initial=0.0)).astype(int)
+        return np.asarray(felt.T @ felt > 0)
 
     @cached_property
     def _damping(self) -> Array:
@@ -133,7 +146,7 @@ class ElasticMounting:
         return self._reached(self.drives(wrench.coefficients))
 
     def _reached(self, drive: ComplexArray) -> tuple[int, ...]:
-        coupled = ((self._loss != 0.0) | (self._damping != 0.0)) & self._answers
+        coupled = ((self._loss != 0.0) | (self._damping != 0.0) | self._met) & self._answers
         reached = np.any(drive != 0.0, axis=0)
         while True:
             further = reached | np.any(coupled[reached], axis=0)
@@ -174,13 +187,16 @@ class ElasticMounting:
         squares, damped = self.modes.squares[kept], (omegas > 0.0)
         loss, damping = self._loss[np.ix_(kept, kept)], self._damping[np.ix_(kept, kept)]
         reactance = squares - omegas[:, None] ** 2
-        if not (_coupled(loss) or _coupled(damping)):
+        if not (_coupled(loss) or _coupled(damping) or self.dynamic):
             impedance = reactance + 1j * (damped[:, None] * np.diag(loss) + omegas[:, None] * np.diag(damping))
             out[:, kept] = drive[:, kept] / np.where(impedance == 0.0, 1.0, impedance)
             return out
         full = 1j * (damped[:, None, None] * loss + omegas[:, None, None] * damping)
         diagonal = np.arange(len(kept))
         full[:, diagonal, diagonal] += reactance
+        if self.dynamic:
+            full += self.dynamic.impedance(omegas, self.modes.shapes[:, kept])
+            _refuse_singular(omegas, np.asarray(full, dtype=np.complex128), drive)
         # a free mode under no steady load stays where it is
         still = (omegas == 0.0)[:, None] & (squares == 0.0)
         full[:, diagonal, diagonal] += still
@@ -191,7 +207,8 @@ class ElasticMounting:
         square = omegas[:, None] ** 2
         near = np.abs(self.modes.squares - square) <= RESONANCE * square
         undamped = np.diag(self._loss) + omegas[:, None] * np.diag(self._damping) <= RESONANCE * square
-        struck = near & undamped & (drive != 0.0)
+        # what springs that depend on frequency make of a mode is seen with its whole impedance
+        struck = near & undamped & (drive != 0.0) & ~(np.diag(self._met) & (omegas[:, None] > 0.0))
         if not np.any(struck):
             return
         k, mode = (int(j) for j in np.argwhere(struck)[0])
@@ -227,6 +244,8 @@ class ElasticMounting:
             out[still] = amplitudes[still] @ elastic
         if np.any(viscous):
             out += (1j * omegas)[:, None] * (amplitudes @ viscous)
+        if self.dynamic:
+            out += np.einsum("wrj,wj->wr", self.dynamic.forces(omegas, self.modes.shapes), amplitudes)
         return np.asarray(out.reshape(len(omegas), -1, 3))
 
     def resonant(self, wrench: Spectrum, speed: float) -> tuple[NDArray[np.bool_], str]:
@@ -260,6 +279,16 @@ class ElasticMounting:
         return self.springs @ self._travels, self.losses @ self._travels, self.dampers @ self._travels
 
 
+def _refuse_singular(omegas: Array, impedance: ComplexArray, drive: ComplexArray) -> None:
+    """Refuse a frequency at which the block and the fluid of its mounts move by themselves."""
+    for omega, matrix, own in zip(omegas, impedance, drive, strict=True):
+        if omega > 0.0 and np.any(own) and np.linalg.svd(matrix, compute_uv=False)[-1] <= RESONANCE * omega**2:
+            raise ResonanceError(
+                f"block and fluid tracks are driven at {omega / math.tau:.6g} Hz, a natural frequency of theirs, and "
+                "nothing damps it; give the tracks damping, or the mounts a loss factor"
+            )
+
+
 def _coupled(matrix: Array) -> bool:
     return bool(np.any(matrix[~np.eye(len(matrix), dtype=bool)]))
 
@@ -274,7 +303,7 @@ def elastic_mounting(
     ModelError
         Without a mount that has a stiffness.
     """
-    if not any(any(spring.stiffness) for _, spring in every_spring(mounts)):
+    if not any(any(spring.at_rest) for _, spring in every_spring(mounts)):
         raise ModelError("no mount has a stiffness; an elastic mounting needs one")
     return _elastic_mounting(block, tuple(mounts), answering)
 

@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.physics.run_up import TimeModel
+from laufruhe.physics.time_model import TimeModel
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -56,7 +56,8 @@ class LinearRun:
 
     def __init__(self, model: TimeModel, first: float, gain: float, step: float, count: int) -> None:
         self._model, self._first, self._gain, self._step, self._count = model, first, gain, step, count
-        matrix = np.block([[np.zeros((6, 6)), np.eye(6)], [-model.stiffness, -model.damping]])
+        one = np.eye(model.size)
+        matrix = np.block([[np.zeros_like(one), one], [-model.stiffness, -model.damping]])
         rates, shapes = np.linalg.eig(matrix)
         self._rates, self._shapes = rates.astype(complex), shapes.astype(complex)
 
@@ -70,15 +71,15 @@ class LinearRun:
         """Under loads by order: the first grows with the square of speed, others do not (E28)."""
         model, driven = self._model, self._driven(loads)
         states = (self._shapes @ self._stepped(driven)).real
-        y, rate = states[:6], states[6:]
+        y, rate = np.split(states, 2)
         travel = model.mount_travels(y)
         return Response(model.mount_forces(y, rate), travel, (model.roll @ y)[:, None, None])
 
     def _driven(self, loads: Loads) -> ComplexArray:
-        """What every step adds to the modes, shape (12, steps)."""
-        inverse = np.linalg.inv(self._shapes)[:, 6:]
+        """What every step adds to the modes, shape (2 n, steps)."""
+        inverse = np.linalg.inv(self._shapes)[:, self._model.size :]
         nodes, weights = _weights(np.asarray(self._rates * self._step, dtype=complex))
-        out = np.zeros((12, self._count), dtype=complex)
+        out = np.zeros((len(self._rates), self._count), dtype=complex)
         for k in range(0, self._count, _AT_ONCE):
             starts = self._step * np.arange(k, min(k + _AT_ONCE, self._count))
             for node, weight in zip(nodes, weights.T, strict=True):
@@ -87,9 +88,9 @@ class LinearRun:
         return out
 
     def _load(self, times: Array, loads: Loads) -> Array:
-        """Shape (times, 6), in the coordinates of the model."""
+        """Shape (times, n), in the coordinates of the model."""
         speed, angle = self._first + self._gain * times, self._first * times + 0.5 * self._gain * times**2
-        total = np.zeros((len(times), 6))
+        total = np.zeros((len(times), self._model.size))
         for k, (orders, coefficients) in enumerate(loads):
             kept = np.any(coefficients != 0.0, axis=1)
             part = (np.exp(1j * np.outer(angle, orders[kept])) @ coefficients[kept]).real
@@ -97,8 +98,8 @@ class LinearRun:
         return total
 
     def _stepped(self, driven: ComplexArray) -> ComplexArray:
-        """Modes after every step, from rest, shape (12, steps + 1)."""
-        out = np.zeros((self._count + 1, 12), dtype=complex)
+        """Modes after every step, from rest, shape (2 n, steps + 1)."""
+        out = np.zeros((self._count + 1, len(self._rates)), dtype=complex)
         decay, state = np.exp(self._rates * self._step), out[0]
         for k, own in enumerate(np.ascontiguousarray(driven.T), 1):
             state = decay * state + own

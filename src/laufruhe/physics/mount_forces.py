@@ -109,8 +109,8 @@ def _rigid_mounting(mounts: tuple[Mount, ...]) -> RigidMounting:
     geometry = np.array([point_motion(NUMBERS, position) for position in positions]) / scales
     # K = L^T L, and A = L G instead of A^T A: half the digits that stiffness ratios cost are kept
     places, springs = zip(*every_spring(mounts), strict=True)
-    largest = max(max(spring.stiffness) for spring in springs)
-    roots = np.array([np.sqrt(np.divide(m.stiffness, largest))[:, None] * np.array(m.orientation) for m in springs])
+    largest = max(max(spring.at_rest) for spring in springs)
+    roots = np.array([np.sqrt(np.divide(m.at_rest, largest))[:, None] * np.array(m.orientation) for m in springs])
     stretches = np.einsum("mab,mbj->maj", roots, geometry[list(places)])
     left, values, right = np.linalg.svd(stretches.reshape(-1, 6), full_matrices=True)
     rank = int(np.sum(values > FREE_STRETCH * values[0]))

@@ -20,11 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting
-from laufruhe.physics.rigid_body import moved_wrench
+from laufruhe.physics.time_model import TimeModel, time_model
 
 Array = NDArray[np.float64]
 
@@ -35,103 +33,6 @@ MOST_SHOTS = 60
 CLOSED = 1e-9
 # what integration over a period makes of its tolerance
 ROUNDING = 100.0
-
-
-@dataclass(frozen=True, eq=False)
-class TimeModel:
-    """Matrices of E25 in coordinates in which the mass is one, q = R' y.
-
-    Attributes
-    ----------
-    load
-        From a wrench about the origin to y.
-    travels
-        From y to travel along the own axes of the springs, shape (3 springs, 6).
-    forces, drag
-        From y and y' to the mount forces in the axes of C2, shape (3 mounts, 6).
-    gaps, stops
-        Of the bump stops along every own axis, shape (3 springs,).
-    turns
-        Own axes of the springs, shape (springs, 3, 3).
-    places
-        Number of the mount of every spring, shape (springs,).
-    roll
-        From y to the turn of the block about x, shape (6,).
-    """
-
-    stiffness: Array
-    damping: Array
-    load: Array
-    travels: Array
-    forces: Array
-    drag: Array
-    gaps: Array
-    stops: Array
-    turns: Array
-    places: NDArray[np.intp]
-    roll: Array
-
-    @property
-    def has_stops(self) -> bool:
-        """Whether any bump stop can be met."""
-        return bool(np.any((self.stops > 0.0) & np.isfinite(self.gaps)))
-
-    def stop_forces(self, y: Array) -> Array:
-        """Forces of the stops along the own axes, shape (3 mounts, n) of y (6, n) (E27)."""
-        travel = self.travels @ y
-        gaps = self.gaps[:, None]
-        return np.asarray(self.stops[:, None] * (travel - np.clip(travel, -gaps, gaps)))
-
-    def mount_forces(self, y: Array, rate: Array) -> Array:
-        """Forces of the engine on its mounts, shape (n, mounts, 3) of y, y' (6, n)."""
-        out = np.array((self.forces @ y + self.drag @ rate).T.reshape(y.shape[1], -1, 3))
-        if self.has_stops:
-            own = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
-            np.add.at(out.swapaxes(0, 1), self.places, np.einsum("nma,mab->mnb", own, self.turns))
-        return out
-
-    def mount_travels(self, y: Array) -> Array:
-        """Travel of the mounts in the axes of C2, shape (n, mounts, 3) of y (6, n)."""
-        first = np.unique(self.places, return_index=True)[1]
-        own = (self.travels @ y).T.reshape(y.shape[1], -1, 3)[:, first]
-        return np.asarray(np.einsum("nma,mab->nmb", own, self.turns[first]))
-
-    def accelerations(self, y: Array, rate: Array, load: Array) -> Array:
-        """y'' of columns (6, n)."""
-        out = load - self.stiffness @ y - self.damping @ rate
-        return out - self.travels.T @ self.stop_forces(y) if self.has_stops else out
-
-
-def time_model(mounting: ElasticMounting) -> TimeModel:
-    """E25 of a mounting, hysteretic loss as the viscous damping of E26.
-
-    A mount's loss in a mode becomes its loss over that mode's natural frequency, so each
-    mode keeps the loss factor that the mounts give it, and forces and motion agree.
-    """
-    modes = mounting.modes
-    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
-    vectors = np.linalg.solve(root.T, modes.shapes)
-    motions = mounting.motions @ root.T
-    places, springs = zip(*every_spring(mounting.mounts), strict=True)
-    turns = np.array([spring.orientation for spring in springs])
-    own = np.einsum("mab,mbj->maj", turns, motions[list(places)])
-    spread = np.where(modes.squares > 0.0, 1.0 / np.sqrt(np.where(modes.squares > 0.0, modes.squares, 1.0)), 0.0)
-    lossy = (mounting.losses @ (mounting.motions @ modes.shapes) * spread) @ vectors.T
-    drag = mounting.dampers @ motions + lossy
-    mounts = len(mounting.mounts)
-    return TimeModel(
-        stiffness=root @ mounting.stiffness @ root.T,
-        damping=np.einsum("mai,maj->ij", motions, drag),
-        load=root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
-        travels=own.reshape(-1, 6),
-        forces=(mounting.springs @ motions).reshape(3 * mounts, 6),
-        drag=drag.reshape(3 * mounts, 6),
-        gaps=np.repeat([spring.stop_gap for spring in springs], 3),
-        stops=np.repeat([spring.stop_stiffness for spring in springs], 3),
-        turns=turns,
-        places=np.array(places, dtype=np.intp),
-        roll=root.T[3],
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,22 +80,22 @@ def periodic_state(
     shortest = period / (math.gcd(*np.flatnonzero(loaded).tolist()) or 1)
 
     def ends(first: Array) -> Array:
-        return _integrated(rates, first, shortest, tolerance)[:, -1].reshape(12, -1)
+        return _integrated(rates, first, shortest, tolerance)[:, -1].reshape(2 * model.size, -1)
 
-    start = _shot(ends, _static_size(model, loads), tolerance, model.has_stops)
+    start = _shot(ends, model.size, _static_size(model, loads), tolerance, model.has_stops)
     times = np.arange(samples + 1) * (period / samples)
     states = _integrated(rates, start, period, tolerance, np.minimum(times, period))
-    y, rate = states[:6, :-1], states[6:, :-1]
+    y, rate = np.split(states[:, :-1], 2)
     mismatch = float(np.abs(states[:, -1] - start).max() / max(np.abs(states).max(), 1e-300))
     travels = model.mount_travels(y)
     return SteadyState(np.asarray(times[:-1] * speed, dtype=float), model.mount_forces(y, rate), travels, mismatch)
 
 
 def _rates(model: TimeModel, load: Callable[[float], Array]) -> Callable[[float, Array], Array]:
-    """Right side of E25 in columns (y, y'), under a load (6,) that time tells."""
+    """Right side of E25 in columns (y, y'), under a load (n,) that time tells."""
 
     def rates(t: float, state: Array) -> Array:
-        y, rate = state.reshape(2, 6, -1)
+        y, rate = state.reshape(2, model.size, -1)
         return np.concatenate([rate, model.accelerations(y, rate, load(t)[:, None])]).reshape(-1)
 
     return rates
@@ -218,14 +119,14 @@ def _solved(*told: Any, **more: Any) -> Array:
     return np.asarray(solve_ivp(*told, **more).y)
 
 
-def _shot(run: Callable[[Array], Array], size: float, tolerance: float, has_stops: bool) -> Array:
-    """The start (y, y'), shape (12,), that one period of `run` ends at again, by Newton's method from rest (E28)."""
-    start, step = np.zeros(12), size * 1e-4
+def _shot(run: Callable[[Array], Array], count: int, size: float, tolerance: float, has_stops: bool) -> Array:
+    """The start (y, y'), shape (2 n,), that one period of `run` ends at again, by Newton's method from rest (E28)."""
+    start, step = np.zeros(2 * count), size * 1e-4
     for _ in range(MOST_SHOTS):
-        ends = run(start[:, None] + np.column_stack([np.zeros(12), step * np.eye(12)]))
+        ends = run(start[:, None] + np.column_stack([np.zeros(2 * count), step * np.eye(2 * count)]))
         slope = (ends[:, 1:] - ends[:, :1]) / step
         gap = ends[:, 0] - start
-        change = np.linalg.solve(np.eye(12) - slope, gap)
+        change = np.linalg.solve(np.eye(2 * count) - slope, gap)
         start = start + change
         whole = max(np.abs(start).max(), size)
         # a gap of the integration's own rounding cannot be closed, only moved
@@ -307,16 +208,17 @@ def run_through(
     loads = [(part.orders, part.coefficients @ model.load.T) for part in (inertia, gas) if part is not None]
     rates = _rates(model, _sweeping(loads, first, gain))
     fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in loads))
-    state, edges = np.zeros(12), np.linspace(0.0, duration, stretches + 1)
+    state, edges = np.zeros(2 * model.size), np.linspace(0.0, duration, stretches + 1)
     force, travel, twist = np.zeros((3, stretches))
     least = 1e-3 * tolerance * _static_size(model, loads[0][1] * max(first, last) ** 2)
     count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
     for k, (start, end) in enumerate(pairwise(edges)):
         times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
         states = _solved(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least)
-        force[k] = np.linalg.norm(model.mount_forces(states[:6], states[6:]), axis=-1).max()
-        travel[k] = np.linalg.norm(model.mount_travels(states[:6]), axis=-1).max()
-        twist[k] = np.abs(model.roll @ states[:6]).max()
+        y, rate = np.split(states, 2)
+        force[k] = np.linalg.norm(model.mount_forces(y, rate), axis=-1).max()
+        travel[k] = np.linalg.norm(model.mount_travels(y), axis=-1).max()
+        twist[k] = np.abs(model.roll @ y).max()
         state = states[:, -1]
     return RunUp(first + gain * edges[1:], force, travel, twist)
 

@@ -17,8 +17,9 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.linear_run import LinearRun, Loads, Response
-from laufruhe.physics.run_up import LEAST_STEPS, MOST_STEPS, STEPS_PER_PERIOD, RunUp, run_through, time_model
+from laufruhe.physics.run_up import LEAST_STEPS, MOST_STEPS, STEPS_PER_PERIOD, RunUp, run_through
 from laufruhe.physics.speed_map import split_loads
+from laufruhe.physics.time_model import time_model
 
 HIGHEST = 12.0
 """Last order of the loads that is followed: those beyond shake the block by less than what the steps leave open."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.elastic_mounts import ElasticMounting
-from laufruhe.physics.run_up import SteadyState, periodic_state, time_model
+from laufruhe.physics.run_up import SteadyState, periodic_state
+from laufruhe.physics.time_model import time_model
 
 INTEGRATION = 1e-9
 
@@ -64,7 +65,7 @@ def viscous_forces(mounting: ElasticMounting, wrench: Spectrum, speed: float) ->
     """
     model = time_model(mounting)
     omega = wrench.orders[:, None, None] * speed
-    impedance = model.stiffness + 1j * omega * model.damping - omega**2 * np.eye(6)
+    impedance = model.stiffness + 1j * omega * model.damping - omega**2 * np.eye(model.size)
     y = np.linalg.solve(impedance, (wrench.coefficients @ model.load.T)[..., None])
     forces = (model.forces + 1j * omega * model.drag) @ y
     return Spectrum(wrench.base, forces.reshape(len(omega), -1, 3))

@@ -10,6 +10,7 @@ import numpy as np
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import Modes, static_motion, torque_roll_axis, torque_roll_coupling, weight_wrench
+from laufruhe.physics.time_model import frequencies_with_fluid
 from laufruhe.present.measures import Array, has_mounts
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
@@ -36,6 +37,11 @@ class MountingFacts:
     torque_roll_axis, torque_roll_coupling, torque_roll_frequency
         Unit vector, what is zero where turning about it is a mode (E8), and the frequency of the mode that comes
         nearest [Hz] (E46).
+    depends_on_frequency
+        Whether stiffness does: modes are then of that at rest (E50).
+    with_fluid
+        Natural frequencies of the block and the fluid of its mounts together, undamped [Hz]; none without fluid
+        tracks (E50).
     """
 
     modes: Modes
@@ -47,6 +53,8 @@ class MountingFacts:
     torque_roll_axis: Array
     torque_roll_coupling: float
     torque_roll_frequency: float
+    with_fluid: tuple[float, ...]
+    depends_on_frequency: bool
 
 
 def is_elastic(result: Result) -> bool:
@@ -71,6 +79,8 @@ def facts_of(evaluation: Evaluation) -> MountingFacts:
         torque_roll_axis=torque_roll_axis(mounting.block),
         torque_roll_coupling=torque_roll_coupling(mounting.block, mounting.stiffness),
         torque_roll_frequency=mount_numbers.torque_roll_frequency(mounting),
+        with_fluid=frequencies_with_fluid(mounting),
+        depends_on_frequency=bool(mounting.dynamic),
     )
 
 

@@ -5,13 +5,19 @@ from __future__ import annotations
 from laufruhe.machine import OperatingPoint, Run
 from laufruhe.physics.run_up import RunUp
 from laufruhe.physics.runs import point_of, runs_of
-from laufruhe.present.mounting import critical_speed, driven, facts_of, main_order
+from laufruhe.present.mounting import critical_speed, driven, facts_of, is_elastic, main_order
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
 
 SECONDS = 3.0
 # criticals beyond this many times the highest speed are left out
 REACH_OVER, BEYOND = 5.0, 1.5
+
+
+def runs_up(result: Result) -> bool:
+    """Whether there is a run to show: elastic mounts whose stiffness has a law in time."""
+    return is_elastic(result) and mounting_in(result.final.engine).dynamic.has_law
 
 
 def run_of(result: Result) -> Run:

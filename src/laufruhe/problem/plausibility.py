@@ -84,7 +84,7 @@ def _of_rotors(engine: Engine) -> Iterator[Complaint]:
 
 
 def _of_mounts(engine: Engine) -> Iterator[Complaint]:
-    stiffness = sum(max(spring.stiffness) for _, spring in every_spring(engine.mounts))
+    stiffness = sum(max(spring.at_rest) for _, spring in every_spring(engine.mounts))
     if engine.block is None or not stiffness:
         return
     sag = 9.81 * engine.block.mass / stiffness

@@ -151,7 +151,7 @@ class BoxModel:
         base = self.mounting(self.lower)
         self.root = np.linalg.inv(np.linalg.cholesky(base.block.mass_matrix))
         self.travels = (base.motions @ self.root.T).reshape(-1, 6)
-        self._base = self._parts(base)
+        self._base, self._dynamic = self._parts(base), base.dynamic
         ends = [np.where(np.arange(len(decisions)) == j, self.upper, self.lower) for j in range(len(decisions))]
         moved = [self._parts(self.mounting(end)) for end in ends]
         self._slopes = {
@@ -224,6 +224,20 @@ class BoxModel:
         """A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
         return self._at("stiffness", x)
 
+    def added(self, omegas: Array) -> ComplexArray:
+        """What springs whose stiffness depends on frequency add to the impedance, (lines, 6, 6) (E50)."""
+        return self._dynamic.impedance(omegas, self.root.T)
+
+    def added_forces(self, omegas: Array) -> ComplexArray:
+        """What they add to the forces of the mounts, (lines, 3 mounts, 6)."""
+        return self._dynamic.forces(omegas, self.root.T)
+
+    def rise(self, omegas: Array) -> Array:
+        """By how much they lift the largest eigenvalue at most, (lines,)."""
+        if not self._dynamic:
+            return np.zeros(len(omegas))
+        return np.asarray(np.maximum(np.linalg.eigvalsh(self.added(omegas).real)[..., -1], 0.0))
+
     def _at(self, name: str, x: Array) -> Array:
         base: Array = getattr(self._base, name)
         return np.asarray(base + np.einsum("bn,nij->bij", x - self.lower, self._slopes[name]))
@@ -233,7 +247,8 @@ class BoxModel:
         centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
         moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
         stiffness, loss, damping = (self._at(name, centres)[:, None] for name in ("stiffness", "loss", "damping"))
-        impedance = stiffness + 1j * (moving * loss + omegas * damping) - omegas**2 * np.eye(6)
+        impedance: ComplexArray = stiffness + 1j * (moving * loss + omegas * damping) + self.added(lines.omegas)
+        impedance = impedance - omegas**2 * np.eye(6)
         lost = moving[:, None] * self._slopes["loss"] + omegas[:, None] * self._slopes["damping"]
         slopes = self._slopes["stiffness"] + 1j * lost
         inverse = _inverse(np.asarray(impedance, dtype=np.complex128))
@@ -270,14 +285,14 @@ class BoxModel:
         springs, losses, dampers = (
             self._at(name, at.centres)[:, None, rows] for name in ("springs", "losses", "dampers")
         )
-        value = springs + 1j * (moving * losses + omegas * dampers)
+        value = springs + 1j * (moving * losses + omegas * dampers) + self.added_forces(lines.omegas)[:, rows]
         lost = moving[:, None] * self._slopes["losses"][:, rows] + omegas[:, None] * self._slopes["dampers"][:, rows]
         by_side = self._slopes["springs"][:, rows] + 1j * lost
         return value, by_side * at.halves[:, None, :, None, None]
 
     def felt_at_most(self, lines: Lines, channel: Channel) -> Array:
         """What an order above all natural frequencies can do to all mounts anywhere in the bounds, (lines,) (E41)."""
-        room = lines.omegas**2 - self.highest
+        room = lines.omegas**2 - self.highest - self.rise(lines.omegas)
         motion = np.linalg.norm(lines.loads, axis=1) / np.where(room > 0.0, room, 1.0)
         motion = np.where(room > 0.0, motion, np.inf)
         if is_travel(channel):
@@ -287,6 +302,7 @@ class BoxModel:
         apart = replace(stiffest, mounts=tuple(spring for _, spring in every_spring(stiffest.mounts)))
         most, top = max(len(mount.springs) for mount in stiffest.mounts), self._parts(apart)
         still = math.sqrt(most) * float(np.linalg.norm(top.springs + 1j * top.losses))
+        still = still + np.linalg.norm(self.added_forces(lines.omegas), axis=(1, 2))
         return np.asarray(motion * (still + lines.omegas * math.sqrt(most) * float(np.linalg.norm(top.dampers))))
 
 

@@ -129,6 +129,7 @@ def response(
     """Of one order above zero (E42)."""
     omega, load, here = float(lines.omegas[k]), lines.loads[k], at.here
     impedance = here.stiffness + 1j * (here.loss + omega * here.damping) - omega**2 * np.eye(6)
+    impedance = impedance + model.added(lines.omegas[[k]])[0]
     added, shared = springs.gains * at.half[springs.decisions], springs.factors(omega)
     solved = np.linalg.solve(impedance, np.column_stack([load, -springs.arms.T * (added * shared)]))
     given, slopes = solved[:, 0], solved[:, 1:]
@@ -140,8 +141,10 @@ def response(
         value, direct = model.travels[rows].astype(complex), np.zeros((len(rows), len(added)), dtype=complex)
     else:
         value = here.springs[rows] + 1j * (here.losses[rows] + omega * here.dampers[rows])
+        value = value + model.added_forces(lines.omegas[[k]])[0][rows]
         direct = springs.axes[rows] * (added * shared)
-    reach = _motion_at_most(at, omega, load) * np.linalg.norm(springs.arms, axis=1) / (unit * scales)
+    top = at.highest + float(model.rise(lines.omegas[[k]])[0])
+    reach = _motion_at_most(at, top, omega, load) * np.linalg.norm(springs.arms, axis=1) / (unit * scales)
     return Response(
         _parted(given / unit, slopes * scales),
         _parted(np.zeros(len(added)), np.diag(scales)),
@@ -151,11 +154,11 @@ def response(
     )
 
 
-def _motion_at_most(at: Middle, omega: float, load: ComplexArray) -> float:
+def _motion_at_most(at: Middle, highest: float, omega: float, load: ComplexArray) -> float:
     """|y| of no design of the box is over this: damping takes energy, and far above resonance the mass holds."""
     size = float(np.linalg.norm(load))
     loss = float(np.linalg.eigvalsh(at.lowest.loss + omega * at.lowest.damping)[0])
-    room = max(loss, omega**2 - at.highest)
+    room = max(loss, omega**2 - highest)
     return size / room if room > 0.0 else math.inf
 
 

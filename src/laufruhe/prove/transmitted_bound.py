@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel
+from laufruhe.machine.dynamic import Dynamic
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import Norm
@@ -58,11 +59,23 @@ class Softest:
         shape (mounts, 6, 6).
     load
         From a wrench about the origin to r, shape (6, 6).
+    dynamic
+        Springs whose stiffness depends on frequency, each with what it acts along, shape (6, 6), and whether that is
+        known or only not over it (E50).
     """
 
     floors: Array
     squares: Array
     load: Array
+    dynamic: tuple[tuple[Dynamic, Array, bool], ...] = ()
+
+    def floors_at(self, omega: float) -> Array:
+        """L at an angular frequency: what such springs have over their stiffness at rest, or lack."""
+        total = np.zeros((6, 6))
+        for law, along, is_known in self.dynamic:
+            added = float(law.at(np.array([omega])).real[0]) - law.static
+            total += (added if is_known else min(added, 0.0)) * along
+        return np.asarray(self.floors + total)
 
     def metric(self, norm: Norm, loads: ComplexArray) -> Array:
         """P of E32: for squares of forces their sum, for the forces themselves a matrix that covers each."""
@@ -96,22 +109,26 @@ def softest_of(problem: Problem) -> Softest:
     mounting = mounting_in(problem.engine)
     root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
     least, most = _ranges(problem)
-    floors, arms = [np.zeros((6, 6))], list[Array]()
+    floors, arms, dynamic = [np.zeros((6, 6))], list[Array](), list[tuple[Dynamic, Array, bool]]()
     for (place, spring), low, high in zip(every_spring(mounting.mounts), least, most, strict=True):
         middle = 0.5 * (low[POSITION] + high[POSITION])
         reach = float(np.linalg.norm(0.5 * (high[POSITION] - low[POSITION])))
-        motion = root_motion = point_motion(NUMBERS, middle - np.array(mounting.block.centre_of_gravity))
-        root_motion = motion @ root.T
+        root_motion = point_motion(NUMBERS, middle - np.array(mounting.block.centre_of_gravity)) @ root.T
         square = root_motion.T @ root_motion
+        turned = np.any(low[TURNED] < high[TURNED])
         if reach == 0.0:
             soft = np.maximum(low[STIFFNESS], 0.0)
-            turned = np.any(low[TURNED] < high[TURNED])
             axes = np.array(spring.orientation)
             held = soft.min() * np.eye(3) if turned else axes.T @ np.diag(soft) @ axes
             floors[0] += carried(root_motion, held)
         else:
             turning = root[:, 3:] @ root[:, 3:].T
             square = (1.0 + STRETCH) * square + (1.0 + 1.0 / STRETCH) * reach**2 * turning
+        for law in spring.dynamic:
+            is_known = reach == 0.0 and not turned
+            row = np.array(spring.orientation)[law.axis] @ root_motion
+            dynamic.append((law, np.outer(row, row) if is_known else square, is_known))
+            floors[0] += law.static * np.outer(row, row) if is_known else 0.0
         # springs that are joined stand in one place
         arms += [square] if place == len(arms) else []
     floors += limited_stiffness(problem, root)[0]
@@ -119,6 +136,7 @@ def softest_of(problem: Problem) -> Softest:
         (1.0 - SLACK) * np.array(floors),
         np.array(arms),
         root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
+        tuple(dynamic),
     )
 
 
@@ -172,7 +190,9 @@ def _of_quantity(problem: Problem, quantity: Measure, softest: Softest, model: A
             half = 0.5 if k else 1.0
             metric = softest.metric(quantity.norm, loads)
             order = k * float(base)
-            least_square = least_transmitted(loads, order * point.speed, metric, softest.floors, model.domains)
+            least_square = least_transmitted(
+                loads, order * point.speed, metric, softest.floors_at(order * point.speed), model.domains
+            )
             squares[-1][order] = half * least_square / len(softest.squares)
             roots[-1][order] = half * math.sqrt(least_square) / len(softest.squares)
     shares = np.array([point.weight / whole for point, _ in chosen])

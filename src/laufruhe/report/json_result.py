@@ -16,7 +16,7 @@ from laufruhe.physics.torsion import absorber_heat, chain_of
 from laufruhe.physics.wrench import WRENCH
 from laufruhe.present.measures import Array, is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
-from laufruhe.present.run_up import run_of, run_point, shown_runs
+from laufruhe.present.run_up import run_of, run_point, runs_up, shown_runs
 from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range
 from laufruhe.present.torsion import facts_of as torsion_of
 from laufruhe.problem.channels import LoadChannel
@@ -64,7 +64,8 @@ def as_dict(result: Result, series: bool = False) -> Record:
         **{key: _all_points(result, [point[key] for point in points]) for key in places},
         "shaking": _largest([point["shaking"] for point in points]),
         "points": [{key: point[key] for key in own} for point in points],
-        **({"modes": _modes(result.final), "run_up": _runs(result)} if is_elastic(result) else {}),
+        **({"modes": _modes(result.final)} if is_elastic(result) else {}),
+        **({"run_up": _runs(result)} if runs_up(result) else {}),
         **({"torsion": _torsion(result)} if is_twisted(result) else {}),
         **_running(result),
         **_phasing(result),
@@ -222,7 +223,7 @@ def _modes(design: Evaluation) -> Record:
         "energy": facts.modes.energy.T.tolist(),
         "shapes": facts.modes.shapes.T.tolist(),
         **_of(facts, "main_orders=orders static_sag=sag mount_sag mean_torque_travel=torque_travel"),
-        **_of(facts, "torque_roll_axis torque_roll_coupling torque_roll_frequency"),
+        **_of(facts, "torque_roll_axis torque_roll_coupling torque_roll_frequency with_fluid"),
     }
 
 

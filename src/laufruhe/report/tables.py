@@ -16,7 +16,7 @@ from laufruhe.physics.run_up import RunUp
 from laufruhe.present.measures import has_loads, has_ranking, limits_of, load_designs, places_of, ranking_of
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.pictures import MOST_PRINTED, PRINTED, SHEETS
-from laufruhe.present.run_up import shown_runs
+from laufruhe.present.run_up import runs_up, shown_runs
 from laufruhe.present.speed_curves import speeds_of, transmissibility_of
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation, measured
@@ -114,7 +114,7 @@ def _transmissibility(result: Result) -> Sheet | None:
 
 
 def _run_up(result: Result) -> Sheet | None:
-    if not is_elastic(result) or not has_loads(result):
+    if not runs_up(result) or not has_loads(result):
         return None
     rows = [
         [design, way, RPM * speed, force, travel, DEGREE * twist]

@@ -237,7 +237,7 @@ def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -
 
 def _price_of_time(problem: Problem) -> TimeDomain | None:
     """Elastic mounts by integration beside the frequency domain, at the first operating point."""
-    if problem.engine.block is None:
+    if problem.engine.block is None or not mounting_in(problem.engine).dynamic.has_law:
         return None
     point, mounting = problem.points[0], mounting_in(problem.engine)
     wrench = shaking_loads(problem.engine, point, Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS))

@@ -9,16 +9,15 @@ from matplotlib.figure import Figure
 from laufruhe.plots.speed_axis import LIMIT, RPM, limits_on
 from laufruhe.plots.style import entry, headed, page, series_of, styled
 from laufruhe.plots.words import INK
-from laufruhe.present.mounting import is_elastic
 from laufruhe.present.numbers import figure as words
-from laufruhe.present.run_up import run_of, run_point, shown_runs
+from laufruhe.present.run_up import run_of, run_point, runs_up, shown_runs
 from laufruhe.problem.channels import RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
 _RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
 _ROWS = (("largest force [N]", RUN_FORCE), ("largest travel [mm]", RUN_TRAVEL), ("largest roll [°]", RUN_TWIST))
-applies = is_elastic
+applies = runs_up
 
 
 @styled()

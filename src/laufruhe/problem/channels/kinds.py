@@ -102,6 +102,8 @@ class Channel:
         Whether the torque of the crank is in it, which other decisions than the flywheel move too.
     of_engine
         The value as a function of an engine, if it is of its sizes alone and goes one way with each of them.
+    of_constant_stiffness
+        Whether it has no meaning where stiffness depends on frequency.
     of_axis
         What turning about the torque-roll axis lacks to be a mode, if it is of that.
     open_frequency
@@ -128,6 +130,7 @@ class Channel:
     of_engine: Callable[[Engine], float] | None = None
     of_torque: bool = False
     of_modes: bool = False
+    of_constant_stiffness: bool = False
     of_axis: Callable[[Block, Band], AxisResidual] | None = None
     open_frequency: bool = False
     places: Callable[[Engine], Sequence[str]] = lambda _: ()

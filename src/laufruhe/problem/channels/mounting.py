@@ -55,7 +55,9 @@ def _of_axis(
     def value(mounting: ElasticMounting, measure: Asked) -> float:
         return mount_numbers.residual_of(mounting, residual(mounting.block, measure.frequency))
 
-    return MountChannel(name, unit, ("frequency",), values=_of_mounting(value), size=size, of_axis=residual)
+    return MountChannel(
+        name, unit, ("frequency",), values=_of_mounting(value), size=size, of_axis=residual, of_constant_stiffness=True
+    )
 
 
 TRANSMISSIBILITY = MountChannel("transmissibility", "", ON_BLOCK, values=_transmissibility, of_loads=True)
@@ -63,15 +65,15 @@ SAG = MountChannel(
     "static sag", "m", sides=("min", "max"), values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting))
 )
 FREQUENCIES = MountChannel(
-    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False,
+    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False, of_constant_stiffness=True,
     values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
 )  # fmt: skip
 DECOUPLING = MountChannel(
-    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False,
+    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False, of_constant_stiffness=True,
     values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
 )  # fmt: skip
 DECOUPLING_SHORTFALL = MountChannel(
-    "decoupling shortfall", "", ("motions", "wanted"), size=lambda _: 1.0,
+    "decoupling shortfall", "", ("motions", "wanted"), size=lambda _: 1.0, of_constant_stiffness=True,
     values=_of_mounting(
         lambda mounting, m: mount_numbers.decoupling_shortfall(mounting.modes.energy, motion_indices(m), m.wanted)
     ),

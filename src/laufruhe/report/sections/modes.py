@@ -37,7 +37,16 @@ def _modes(facts: MountingFacts, title: str) -> Grid:
     still = 6 - len(facts.excited)
     rest = f"{still} of 6 modes are not excited in this scene and not computed" if still else "every mode is excited"
     head = ("mode", "Hz", "excited", f"order {order:g} at rpm" if order else "critical rpm", *MOTIONS)
-    return Grid(title, head, tuple(rows), note=f"Kinetic energy in %; {rest}.")
+    return Grid(title, head, tuple(rows), note=f"Kinetic energy in %; {rest}.{_of_fluid(facts)}")
+
+
+def _of_fluid(facts: MountingFacts) -> str:
+    """What modes mean where stiffness depends on frequency."""
+    if not facts.depends_on_frequency:
+        return ""
+    together = ", ".join(number(frequency) for frequency in facts.with_fluid)
+    fluid = f"; block and fluid tracks together, undamped, have {together} Hz" if together else ""
+    return f" Modes are those of the stiffness at rest{fluid}."
 
 
 def _mounts(result: Result, facts: MountingFacts) -> Grid:

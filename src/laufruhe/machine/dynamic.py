@@ -1,0 +1,113 @@
+"""Springs whose stiffness depends on frequency: a fluid track, or what was measured (E50, E51)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+class Dynamic(Protocol):
+    """A spring along one own axis of a mount, beside its constant stiffness there."""
+
+    @property
+    def axis(self) -> int:
+        """Number of the own axis."""
+
+    @property
+    def static(self) -> float:
+        """Stiffness at rest [N/m]."""
+
+    def at(self, omegas: Array) -> ComplexArray:
+        """Complex stiffness at angular frequencies [N/m], shape of `omegas`; at rest the static one."""
+
+
+@dataclass(frozen=True)
+class FluidTrack:
+    """A hydraulic mount: fluid is pumped through a track, and swells the rubber that pumps it (E50).
+
+    All numbers are referred to the travel of the mount by the area of the piston.
+
+    Attributes
+    ----------
+    mass
+        Effective, of the fluid in the track [kg].
+    bulge
+        Stiffness of the rubber against swelling [N/m].
+    stiffness
+        Of the lower chamber [N/m].
+    damping
+        Of the flow through the track [N s/m].
+    """
+
+    axis: int
+    mass: float
+    bulge: float
+    stiffness: float = 0.0
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (self.mass > 0.0 and self.bulge > 0.0):
+            raise ModelError("a fluid track needs a mass and a bulge stiffness above zero")
+        if not (self.stiffness >= 0.0 and self.damping >= 0.0):
+            raise ModelError("a fluid track has no negative stiffness or damping")
+
+    @property
+    def static(self) -> float:
+        """Bulge and lower chamber one behind the other [N/m]."""
+        return self.bulge * self.stiffness / (self.bulge + self.stiffness)
+
+    def at(self, omegas: Array) -> ComplexArray:
+        """Bulge in series with fluid, track and lower chamber."""
+        behind = self.stiffness - self.mass * omegas**2 + 1j * self.damping * omegas
+        whole = self.bulge + behind
+        # without damping the fluid resonates: the force of the mount has no size there
+        return np.asarray(self.bulge * behind / np.where(whole == 0.0, 1e-300, whole), dtype=complex)
+
+
+@dataclass(frozen=True)
+class MeasuredStiffness:
+    """Complex stiffness over frequency, straight between the rows, constant beyond them (E51).
+
+    Attributes
+    ----------
+    omegas
+        Angular frequencies, rising [rad/s].
+    values
+        Complex stiffness [N/m].
+    """
+
+    axis: int
+    omegas: tuple[float, ...]
+    values: tuple[complex, ...]
+
+    def __post_init__(self) -> None:
+        rising = all(a < b for a, b in zip(self.omegas, self.omegas[1:], strict=False))
+        if not self.omegas or len(self.omegas) != len(self.values) or not rising or self.omegas[0] < 0.0:
+            raise ModelError("frequencies of a measured stiffness have to rise from zero or more")
+        for omega, value in zip(self.omegas, self.values, strict=True):
+            if not (math.isfinite(value.real) and value.imag >= 0.0):
+                raise ModelError(
+                    f"at {omega / math.tau:.4g} Hz a measured stiffness gains work; its loss is under zero"
+                )
+        if not self.values[0].real >= 0.0:
+            raise ModelError("a measured stiffness is negative at rest; its first row has to be zero or more")
+
+    @property
+    def static(self) -> float:
+        """That of the lowest frequency, without loss [N/m]."""
+        return self.values[0].real
+
+    def at(self, omegas: Array) -> ComplexArray:
+        """Interpolated, real and imaginary part each."""
+        values = np.array(self.values)
+        real, imag = (np.interp(omegas, self.omegas, part) for part in (values.real, values.imag))
+        return np.asarray(np.where(omegas == 0.0, self.static, real + 1j * imag), dtype=complex)

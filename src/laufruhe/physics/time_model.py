@@ -1,0 +1,164 @@
+"""Matrices of the block on its mounts in time, with bump stops and the fluid of hydraulic mounts (E25-E27, E50)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine.dynamic import FluidTrack
+from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.physics.dynamic_springs import DynamicSprings
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.rigid_body import moved_wrench
+
+Array = NDArray[np.float64]
+
+
+NO_LAW = "a stiffness measured over frequency has no law in time; give a fluid_track, or leave time and run-ups out"
+
+
+@dataclass(frozen=True, eq=False)
+class TimeModel:
+    """Matrices of E25 in coordinates in which the mass is one, q = R' y; the fluid of tracks after the block (E50).
+
+    Attributes
+    ----------
+    load
+        From a wrench about the origin to y, shape (n, 6).
+    travels
+        From y to travel along the own axes of the springs, shape (3 springs, n).
+    forces, drag
+        From y and y' to the mount forces in the axes of C2, shape (3 mounts, n).
+    gaps, stops
+        Of the bump stops along every own axis, shape (3 springs,).
+    turns
+        Own axes of the springs, shape (springs, 3, 3).
+    places
+        Number of the mount of every spring, shape (springs,).
+    roll
+        From y to the turn of the block about x, shape (n,).
+    """
+
+    stiffness: Array
+    damping: Array
+    load: Array
+    travels: Array
+    forces: Array
+    drag: Array
+    gaps: Array
+    stops: Array
+    turns: Array
+    places: NDArray[np.intp]
+    roll: Array
+
+    @property
+    def size(self) -> int:
+        """n: six, and one for each track."""
+        return len(self.stiffness)
+
+    @property
+    def has_stops(self) -> bool:
+        """Whether any bump stop can be met."""
+        return bool(np.any((self.stops > 0.0) & np.isfinite(self.gaps)))
+
+    def stop_forces(self, y: Array) -> Array:
+        """Forces of the stops along the own axes, shape (3 springs, times) of y (n, times) (E27)."""
+        travel = self.travels @ y
+        gaps = self.gaps[:, None]
+        return np.asarray(self.stops[:, None] * (travel - np.clip(travel, -gaps, gaps)))
+
+    def mount_forces(self, y: Array, rate: Array) -> Array:
+        """Forces of the engine on its mounts, shape (times, mounts, 3) of y, y' (n, times)."""
+        out = np.array((self.forces @ y + self.drag @ rate).T.reshape(y.shape[1], -1, 3))
+        if self.has_stops:
+            own = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
+            np.add.at(out.swapaxes(0, 1), self.places, np.einsum("nma,mab->mnb", own, self.turns))
+        return out
+
+    def mount_travels(self, y: Array) -> Array:
+        """Travel of the mounts in the axes of C2, shape (times, mounts, 3) of y (n, times)."""
+        first = np.unique(self.places, return_index=True)[1]
+        own = (self.travels @ y).T.reshape(y.shape[1], -1, 3)[:, first]
+        return np.asarray(np.einsum("nma,mab->nmb", own, self.turns[first]))
+
+    def accelerations(self, y: Array, rate: Array, load: Array) -> Array:
+        """y'' of columns (n, times)."""
+        out = load - self.stiffness @ y - self.damping @ rate
+        return out - self.travels.T @ self.stop_forces(y) if self.has_stops else out
+
+
+def time_model(mounting: ElasticMounting) -> TimeModel:
+    """E25 of a mounting, hysteretic loss as the viscous damping of E26.
+
+    A mount's loss in a mode becomes its loss over that mode's natural frequency, so each
+    mode keeps the loss factor that the mounts give it, and forces and motion agree.
+    """
+    modes = mounting.modes
+    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
+    vectors = np.linalg.solve(root.T, modes.shapes)
+    motions = mounting.motions @ root.T
+    places, springs = zip(*every_spring(mounting.mounts), strict=True)
+    turns = np.array([spring.orientation for spring in springs])
+    own = np.einsum("mab,mbj->maj", turns, motions[list(places)])
+    spread = np.where(modes.squares > 0.0, 1.0 / np.sqrt(np.where(modes.squares > 0.0, modes.squares, 1.0)), 0.0)
+    lossy = (mounting.losses @ (mounting.motions @ modes.shapes) * spread) @ vectors.T
+    drag = mounting.dampers @ motions + lossy
+    mounts = len(mounting.mounts)
+    model = TimeModel(
+        stiffness=root @ mounting.stiffness @ root.T,
+        damping=np.einsum("mai,maj->ij", motions, drag),
+        load=root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
+        travels=own.reshape(-1, 6),
+        forces=(mounting.springs @ motions).reshape(3 * mounts, 6),
+        drag=drag.reshape(3 * mounts, 6),
+        gaps=np.repeat([spring.stop_gap for spring in springs], 3),
+        stops=np.repeat([spring.stop_stiffness for spring in springs], 3),
+        turns=turns,
+        places=np.array(places, dtype=np.intp),
+        roll=root.T[3],
+    )
+    return _with_fluid(model, mounting.dynamic, root) if mounting.dynamic else model
+
+
+def frequencies_with_fluid(mounting: ElasticMounting) -> tuple[float, ...]:
+    """Undamped natural frequencies of the block and the fluid of its mounts [Hz]; none without fluid tracks (E50)."""
+    if not (mounting.dynamic and mounting.dynamic.has_law):
+        return ()
+    squares = np.maximum(np.linalg.eigvalsh(time_model(mounting).stiffness), 0.0)
+    return tuple((np.sqrt(squares) / (2.0 * np.pi)).tolist())
+
+
+def _with_fluid(model: TimeModel, dynamic: DynamicSprings, root: Array) -> TimeModel:
+    """With one more coordinate for the fluid of every track, in which its mass is one (E50).
+
+    Raises
+    ------
+    ModelError
+        Of stiffness that is known over frequency only.
+    """
+    tracks = [law for law in dynamic.laws if isinstance(law, FluidTrack)]
+    if len(tracks) < len(dynamic.laws):
+        raise ModelError(NO_LAW)
+    bulge, mass = (np.array([getattr(track, name) for track in tracks]) for name in ("bulge", "mass"))
+    lower, drag = (np.array([getattr(track, name) for track in tracks]) for name in ("stiffness", "damping"))
+    static = np.array([track.static for track in tracks])
+    seen, swelling = dynamic.rows @ root.T, bulge / np.sqrt(mass)
+    block = model.stiffness + seen.T @ ((bulge - static)[:, None] * seen)
+    across = -seen.T * swelling
+    wider = (0, len(tracks))
+    return replace(
+        model,
+        stiffness=np.block([[block, across], [across.T, np.diag((bulge + lower) / mass)]]),
+        damping=np.pad(model.damping, (wider, wider)) + np.diag(np.concatenate([np.zeros(6), drag / mass])),
+        load=np.pad(model.load, (wider, (0, 0))),
+        travels=np.pad(model.travels, ((0, 0), wider)),
+        forces=np.hstack([
+            model.forces + dynamic.directions @ ((bulge - static)[:, None] * seen), -dynamic.directions * swelling
+        ]),
+        drag=np.pad(model.drag, ((0, 0), wider)),
+        roll=np.pad(model.roll, wider),
+    )  # fmt: skip
