@@ -70,7 +70,7 @@ class _Mounts(_OfElasticMounts):
         return [
             (RIGID, Fidelity(samples=720, mounts="rigid")),
             (f"{every}, {TIME_SAMPLES} steps", cut),
-            (f"in time, {every}", replace(cut, mounts="time")),
+            *([(f"in time, {every}", replace(cut, mounts="time"))] if scale.mounting.dynamic.has_law else []),
         ]
 
 

@@ -21,7 +21,7 @@ _AXES = ("x", "y", "z")
 class FluidTrackTable(Table):
     """The fluid of a hydraulic mount, all referred to its travel by the area of the piston."""
 
-    axis: Literal["x", "y", "z"] = "z"
+    axis: Literal["x", "y", "z"] = f.told("Own axis of the mount along which it acts.", "z")
     mass: f.PositiveMass = f.needed("Effective mass of the fluid in the track: its inertance times the area squared.")
     bulge_stiffness: f.Stiffness = f.needed("Stiffness of the rubber against swelling: area squared over compliance.")
     chamber_stiffness: f.Stiffness = f.told("Of the lower chamber.", 0.0)
@@ -31,10 +31,10 @@ class FluidTrackTable(Table):
 class DynamicStiffnessTable(Table):
     """Complex stiffness along an own axis from a CSV file: frequency, stiffness, and loss or its angle."""
 
-    axis: Literal["x", "y", "z"] = "z"
+    axis: Literal["x", "y", "z"] = f.told("Own axis of the mount along which it acts.", "z")
     file: str = f.needed("CSV file beside the problem.")
-    frequency_unit: str = "Hz"
-    stiffness_unit: str = "N/mm"
+    frequency_unit: str = f.told("Unit of the first column.", "Hz")
+    stiffness_unit: str = f.told("Unit of the stiffness.", "N/mm")
     columns: Literal["stiffness and loss", "amount and angle"] = f.told(
         "What follows the frequency: storage and loss stiffness, or its amount and its loss angle in degrees.",
         "amount and angle",

@@ -215,12 +215,17 @@ def run_through(
     for k, (start, end) in enumerate(pairwise(edges)):
         times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
         states = _solved(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least)
-        y, rate = np.split(states, 2)
-        force[k] = np.linalg.norm(model.mount_forces(y, rate), axis=-1).max()
-        travel[k] = np.linalg.norm(model.mount_travels(y), axis=-1).max()
-        twist[k] = np.abs(model.roll @ y).max()
+        force[k], travel[k], twist[k] = _most(model, *np.split(states, 2))
         state = states[:, -1]
     return RunUp(first + gain * edges[1:], force, travel, twist)
+
+
+def _most(model: TimeModel, y: Array, rate: Array) -> tuple[float, float, float]:
+    """Largest force and travel of any mount, and largest roll."""
+    force, travel = model.mount_forces(y, rate), model.mount_travels(y)
+    sizes = (np.linalg.norm(each, axis=-1).max() for each in (force, travel))
+    force_most, travel_most = (float(size) for size in sizes)
+    return force_most, travel_most, float(np.abs(model.roll @ y).max())
 
 
 def _sweeping(
