@@ -146,9 +146,20 @@ def test_a_crank_is_ranked_held_and_chosen() -> None:
 def test_a_given_crank_may_be_opened() -> None:
     problem = load(LANCHESTER)
     assert problem.phasing is None
-    asked = Asked(edits=(Edit("open crank", "crank", True),))
+    asked = Asked(edits=(Edit("open crank", "crank", 1),))
     tables = asked.tables(source(LANCHESTER).tables, with_held=True)
     assert load(tables).phasing is not None
+
+
+@pytest.mark.slow
+def test_pictures_are_those_of_what_was_solved_last() -> None:
+    asked = Asked(edits=(TIGHT,))
+    settle(LANCHESTER, edits=asked.edits)
+    first = json.loads(answers.picture(source(LANCHESTER), asked, 0))
+    assert first["name"] == "engine"
+    assert first["image"].startswith("data:image/svg+xml;base64,")
+    assert json.loads(answers.picture(source(LANCHESTER), asked, first["of"])) == {"done": True}
+    assert json.loads(answers.picture(source(LANCHESTER), Asked(), 0)) == {"done": True}
 
 
 def test_the_state_is_saved_as_a_problem_that_evaluates_alike(tight: dict[str, Any], tmp_path: Path) -> None:

@@ -27,14 +27,17 @@ def figures(result: Result) -> Iterator[tuple[str, Figure]]:
             yield name, picture.figure(result)
 
 
+def names(result: Result) -> list[str]:
+    """Pictures that this result fills, in the order of a report."""
+    return [name for name in PICTURES if import_module(f"{__name__}.results.{name}").applies(result)]
+
+
 def figure(result: Result, name: str) -> Figure:
     """One picture of a result, by its name among `laufruhe.present.pictures.PICTURES`."""
     picture = import_module(f"{__name__}.results.{name}") if name in PICTURES else None
     if picture is None or not picture.applies(result):
-        known = [each for each in PICTURES if import_module(f"{__name__}.results.{each}").applies(result)]
-        raise InputError(
-            "figure", (Complaint("name", f'"{name}"', "is no picture of this result", f"one of {', '.join(known)}"),)
-        )
+        known = ", ".join(names(result))
+        raise InputError("figure", (Complaint("name", f'"{name}"', "is no picture of this result", f"one of {known}"),))
     drawn: Figure = picture.figure(result)
     return drawn
 

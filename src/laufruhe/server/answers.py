@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import math
@@ -20,6 +21,7 @@ from laufruhe.files.reader import load_tables
 from laufruhe.files.toml_text import toml_text
 from laufruhe.live import live_model
 from laufruhe.present.numbers import figure
+from laufruhe.present.pictures import PICTURES
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import NO_TOLERANCES
@@ -34,6 +36,7 @@ from laufruhe.solvers import solve, state
 from laufruhe.solvers.conclusion import Shown, concluded, decision_values, judged, limit_values
 from laufruhe.solvers.following import Followed, Follower, can_follow
 from laufruhe.solvers.result import LimitValue, Result
+from laufruhe.units import readable
 
 _SIDES = ("max", "min", "outside")
 _KEPT_SCENES = 6
@@ -82,6 +85,7 @@ class Scene:
 
 _scenes: dict[str, Scene] = {}
 _fronts: dict[str, object] = {}
+_solved: dict[str, Result] = {}
 
 
 def _scene(problem: Problem, key: str) -> Scene:
@@ -153,7 +157,7 @@ def begin(source: Source) -> str:
 def _opens(source: Source) -> bool:
     """Whether the crank may be left open."""
     try:
-        load_tables(Edit("open crank", CRANK, True)(source.tables), source.path)
+        load_tables(Edit("open crank", CRANK, 1)(source.tables), source.path)
     except LaufruheError:
         return False
     return True
@@ -214,7 +218,32 @@ def settle(source: Source, asked: Asked, seconds: float) -> str:
             result = solve(replace(problem, sharply=True), time_limit=seconds)
         except SolverError as error:
             return {"error": f"{source.path.name}: {error}"}
+        _solved.clear()
+        _solved[_state(asked)] = result
         return {**_settled(result, tables), "seconds": time.perf_counter() - began}
+
+    return _said(found, source)
+
+
+def _state(asked: Asked) -> str:
+    return repr(asked.edits)
+
+
+def picture(source: Source, asked: Asked, k: int) -> str:
+    """A picture of what was solved last, as its report has it; nothing where there is none any more."""
+
+    def found() -> dict[str, Any]:
+        from laufruhe import plots
+        from laufruhe.plots.style import as_svg
+
+        result = _solved.get(_state(asked))
+        names = [] if result is None else plots.names(result)
+        if result is None or k >= len(names):
+            return {"done": True}
+        svg = as_svg(plots.figure(result, names[k]))
+        data = base64.b64encode(svg.encode()).decode()
+        caption = PICTURES[names[k]]
+        return {"name": names[k], "caption": caption, "image": f"data:image/svg+xml;base64,{data}", "of": len(names)}
 
     return _said(found, source)
 
@@ -268,8 +297,10 @@ def front(source: Source, asked: Asked, across: str, k: int) -> str:
         if point is None:
             return {"skipped": True}
         problem, unit = own.problem, own.across.unit
+        (shown_unit, factor), (of_unit, of_factor) = readable(unit), readable(problem.objective_unit or "")
+        axes = {"across": [shown_unit, factor], "value": [of_unit, of_factor]}
         shown = told.optimum(problem, point.followed.values, point.value, point.bound, point.followed.gap, "")
-        return {**shown, "across": point.across, "acrossUnit": unit, "acrossText": figure(point.across, unit)}
+        return {**shown, "across": point.across, "axes": axes, "acrossText": figure(point.across, unit)}
 
     return _said(found, source)
 

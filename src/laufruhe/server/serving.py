@@ -17,6 +17,7 @@ from typing import Any, ParamSpec
 from laufruhe.errors import Complaint, InputError, SolverError
 from laufruhe.files.complaints import Refused
 from laufruhe.live import page_assets
+from laufruhe.present.pictures import PICTURES
 from laufruhe.server import answers
 from laufruhe.server.asked import Asked
 from laufruhe.server.desk import Desk, Superseded
@@ -28,7 +29,7 @@ P = ParamSpec("P")
 
 USUAL_PORT = 8537
 """Where links of yesterday lead, unless another page is served there."""
-FOLLOWED, GRACE = 20.0, 10.0
+FOLLOWED, GRACE = 30.0, 60.0
 """Seconds for an answer while a slider moves, and beyond those that a search may take."""
 HEARTBEAT = 1.0
 _HASTE, _PATIENCE = 5.0, 1.0
@@ -58,6 +59,7 @@ class Page:
             "/settle": self._asked(self._settle, seconds + GRACE, answers.settle, seconds),
             "/save": self._asked(self._follow, FOLLOWED, answers.save),
             "/front": self._fronted,
+            "/pictures": self._pictured,
             "/rest": self._rested,
             "/events": lambda _: Answer(lines=self._events()),
         }
@@ -129,16 +131,20 @@ class Page:
             return _wrong(refused.complaint)
         if not isinstance(across, str) or len(across) > 200:
             return _wrong(Complaint("across", "", "is no measure", "load the page again"))
-        return Answer(lines=self._points(asked, across))
-
-    def _points(self, asked: Asked, across: str) -> Iterator[str]:
         source = self.watched.source
-        for k in range(POINTS):
-            found = _worked(partial(self._front.ask, FOLLOWED, answers.front, source, asked, across, k))
-            yield found.text
-            if '"error"' in found.text or '"done"' in found.text or '"dropped"' in found.text:
-                return
-        yield '{"done": true}'
+        return Answer(
+            lines=_each(lambda k: partial(self._front.ask, FOLLOWED, answers.front, source, asked, across, k), POINTS)
+        )
+
+    def _pictured(self, body: Any) -> Answer:
+        try:
+            asked = Asked.of(body)
+        except Refused as refused:
+            return _wrong(refused.complaint)
+        source = self.watched.source
+        return Answer(
+            lines=_each(lambda k: partial(self._settle.ask, FOLLOWED, answers.picture, source, asked, k), len(PICTURES))
+        )
 
     def _events(self) -> Iterator[str]:
         """What the page is told unasked: that the file has changed, and that somebody is there."""
@@ -146,6 +152,16 @@ class Page:
         while not self.watched.is_closed:
             version = self.watched.later(version, HEARTBEAT)
             yield json.dumps(self._state())
+
+
+def _each(work: Callable[[int], Callable[[], str]], most: int) -> Iterator[str]:
+    """Answers one after the other, until one is the last."""
+    for k in range(most):
+        text = _worked(work(k)).text
+        yield text
+        if text.startswith(('{"error"', '{"done"', '{"dropped"')):
+            return
+    yield '{"done": true}'
 
 
 def _worked(work: Callable[[], str]) -> Answer:

@@ -2,7 +2,7 @@
 import { byId, element, shown } from "./parts.js";
 
 /**
- * @typedef {{name: string, value: number, unit: string, met?: boolean | null}} Measured
+ * @typedef {{name: string, value: number, unit: string, words?: string, shown?: string, factor?: number, met?: boolean | null}} Measured
  */
 
 /** The design that is kept. */
@@ -45,13 +45,14 @@ export class Comparison {
  */
 function row(a, b) {
   const change = b && a.value ? `${b.value >= a.value ? "+" : ""}${shown((100 * (b.value - a.value)) / a.value, 3)} %` : "-";
-  return element("tr", {}, element("th", { scope: "row" }, a.name), ...[a, b].map(cell), element("td", {}, change));
+  return element("tr", {}, element("th", { scope: "row" }, a.words ?? a.name), ...[a, b].map(cell), element("td", {}, change));
 }
 
 /** @param {Measured | undefined} measured */
 function cell(measured) {
   const broken = measured?.met === false ? ", broken" : "";
-  return element("td", {}, measured ? `${shown(measured.value, 5)} ${measured.unit}${broken}` : "-");
+  const [unit, factor] = [measured?.shown ?? measured?.unit, measured?.factor ?? 1];
+  return element("td", {}, measured ? `${shown(measured.value * factor, 5)} ${unit}${broken}` : "-");
 }
 
 /**

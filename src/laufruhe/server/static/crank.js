@@ -18,7 +18,7 @@ export class Crank {
     this.list = element("ol", { id: "ranking", "aria-label": "Cranks, best first" });
     this.all = element("button", { type: "button", id: "rank-all" }, "Rank all cranks");
     this.free = element("button", { type: "button", id: "crank-free" }, "As in the file");
-    this.all.addEventListener("click", () => moved(["open crank", "crank", true]));
+    this.all.addEventListener("click", () => moved(["open crank", "crank", 1]));
     this.free.addEventListener("click", () => moved(null));
     this.box = element("fieldset", { hidden: true }, element("legend", {}, "Crank and firing order"),
       element("p", { class: "tools" }, this.all, this.free), this.said, this.list);

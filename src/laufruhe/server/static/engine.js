@@ -25,6 +25,11 @@ export class EngineView {
     this.design = {};
     this.angle = 0;
     this.turning = 0;
+    this.isSeen = false;
+    new IntersectionObserver(([entry]) => {
+      this.isSeen = entry.isIntersecting;
+      this.draw();
+    }).observe(root);
   }
 
   /** Turn when asked to, or stand at an angle. */
@@ -76,10 +81,11 @@ export class EngineView {
     this.draw();
   }
 
+  /** While it is looked at. */
   draw() {
     const engine = this.engine;
-    if (!engine) {
-      this.root.replaceChildren();
+    if (!engine || !this.isSeen) {
+      if (!engine) this.root.replaceChildren();
       return;
     }
     const svg = drawn("svg", { viewBox: frame(engine), role: "img", "aria-label": "The engine from the front" });

@@ -5,7 +5,7 @@ const [WIDE, HIGH, LEFT, LOW] = [640, 360, 74, 44];
 
 /**
  * @typedef {{across: number, value: number, bound: number, acrossText: string, text: string, boundText: string,
- *   acrossUnit: string, unit: string, name: string, design: Record<string, number>}} Point
+ *   axes: {across: [string, number], value: [string, number]}, name: string, design: Record<string, number>}} Point
  */
 
 /**
@@ -49,16 +49,20 @@ function scale(values, from, to) {
  */
 function axes(x, y, point, across) {
   const found = [];
-  for (const tick of ticks(x.low, x.high)) {
-    found.push(drawn("line", { class: "grid", x1: x.at(tick), x2: x.at(tick), y1: 12, y2: HIGH - LOW }),
-      drawn("text", { x: x.at(tick), y: HIGH - LOW + 15, "text-anchor": "middle" }, shown(tick)));
+  const [unit, factor] = point.axes.across;
+  const [upUnit, upFactor] = point.axes.value;
+  for (const tick of ticks(x.low * factor, x.high * factor)) {
+    const at = x.at(tick / factor);
+    found.push(drawn("line", { class: "grid", x1: at, x2: at, y1: 12, y2: HIGH - LOW }),
+      drawn("text", { x: at, y: HIGH - LOW + 15, "text-anchor": "middle" }, shown(tick)));
   }
-  for (const tick of ticks(y.low, y.high)) {
-    found.push(drawn("line", { class: "grid", x1: LEFT, x2: WIDE - 12, y1: y.at(tick), y2: y.at(tick) }),
-      drawn("text", { x: LEFT - 6, y: y.at(tick) + 4, "text-anchor": "end" }, shown(tick)));
+  for (const tick of ticks(y.low * upFactor, y.high * upFactor)) {
+    const at = y.at(tick / upFactor);
+    found.push(drawn("line", { class: "grid", x1: LEFT, x2: WIDE - 12, y1: at, y2: at }),
+      drawn("text", { x: LEFT - 6, y: at + 4, "text-anchor": "end" }, shown(tick)));
   }
-  found.push(drawn("text", { x: WIDE - 12, y: HIGH - 8, "text-anchor": "end" }, `${across} [${point.acrossUnit}]`),
-    drawn("text", { x: 4, y: HIGH - 8 }, `${point.name} [${point.unit}] up; dashed: no design under it`));
+  found.push(drawn("text", { x: WIDE - 12, y: HIGH - 8, "text-anchor": "end" }, `${across} [${unit}]`),
+    drawn("text", { x: 4, y: HIGH - 8 }, `${point.name} [${upUnit}] up; dashed: no design under it`));
   return found;
 }
 

@@ -2,11 +2,13 @@
 import { address, addressed, ask, enter, Gone, listen, Refusal } from "./link.js";
 import { Comparison } from "./compare.js";
 import { Controls } from "./controls.js";
+import { offerObjectives } from "./objectives.js";
 import { Crank } from "./crank.js";
 import { EngineView } from "./engine.js";
+import { Pictures } from "./pictures.js";
 import { Trade } from "./trade.js";
-import { byId, element } from "./parts.js";
-import { busy, complain, tellGone, tellOptimum } from "./words.js";
+import { byId, download, element } from "./parts.js";
+import { busy, complain, tellFile, tellGone, tellOptimum } from "./words.js";
 
 /** Milliseconds of rest after which the whole problem is solved. */
 const REST = 350;
@@ -31,6 +33,7 @@ const state = {
   asking: false,
   again: false,
   resting: 0,
+  writing: 0,
   serial: 0,
   /** Whether a design was set by the page and not by the user. */
   setting: false,
@@ -48,6 +51,7 @@ const crank = new Crank(byId("controls"), (edit) => {
 const engine = new EngineView(byId("engine"));
 const comparison = new Comparison();
 const trade = new Trade(picked);
+const pictures = new Pictures();
 
 /**
  * A number has another value, or that of the file again.
@@ -61,12 +65,18 @@ function changed(name, edit) {
   // what is held by hand is held no other way
   state.held = state.held.filter((held) => held[1] !== name);
   byId("optimum").dataset.stage = "asked";
+  pictures.offer(false);
   remember();
   follow();
 }
 
-/** The state in the address, so that a link shows it. */
+/** The state in the address once nothing moves, so that a link shows it. */
 function remember() {
+  clearTimeout(state.writing);
+  state.writing = setTimeout(written, REST);
+}
+
+function written() {
   address("e", state.edits.size ? JSON.stringify([...state.edits.values()]) : null);
   const star = state.edits.get("star");
   crank.choose(star ? JSON.stringify(star[2]) : "");
@@ -136,6 +146,9 @@ async function settled(answer) {
   }
   answer.held.filter((/** @type {Edit} */ edit) => edit[0] === "fix").forEach((/** @type {Edit} */ edit) => controls.place(edit[1], parseFloat(edit[2])));
   tell(answer);
+  pictures.offer(Boolean(answer.optimum));
+  // where nothing slides they are all that there is to see
+  if (answer.optimum && !state.handle) pictures.draw(asked().edits).catch(failed);
 }
 
 /**
@@ -177,13 +190,11 @@ function tell(answer) {
   tellOptimum(answer);
   byId("keep").disabled = !state.handle;
   if (!state.handle) return;
+  const limits = answer.limits.filter((/** @type {any} */ l) => l.side === "at most")
+    .map((/** @type {any} */ l) => ({ name: l.name, maximum: l.limit }));
+  const follows = answer.optimum && byId("follows").checked;
   state.setting = true;
-  state.handle.setLimits(answer.limits.filter((/** @type {any} */ l) => l.side === "at most")
-    .map((/** @type {any} */ l) => ({ name: l.name, maximum: l.limit })));
-  if (answer.optimum) {
-    state.handle.setOptimum({ ...answer.optimum, kind: answer.optimum.proof, limits: answer.limits });
-    if (byId("follows").checked) state.handle.setDesign(answer.optimum.design, { quiet: true });
-  }
+  state.handle.update({ limits, optimum: answer.optimum, design: follows ? answer.optimum.design : null });
   state.setting = false;
   drawDesign();
 }
@@ -239,26 +250,8 @@ async function begin() {
   document.title = `${told.title} · Laufruhe`;
   controls.build(told.controls, state.edits);
   crank.offer(told.crank, told.openCrank);
-  objectives(told.objectives);
+  offerObjectives(byId("controls"), told.objectives, state.edits.get("objective")?.[2] ?? 0, (edit) => changed("objective", edit));
   tellFile(told.complaint);
-}
-
-/** @param {string} complaint of the file as it is on the disk */
-function tellFile(complaint) {
-  const banner = byId("banner");
-  banner.hidden = !complaint;
-  banner.textContent = complaint ? `The file has changed and cannot be used; the page shows its last good state. ${complaint}` : "";
-}
-
-/** @param {string[]} names of several objectives in order */
-function objectives(names) {
-  byId("controls").querySelector("#objectives")?.remove();
-  if (names.length < 2) return;
-  const select = element("select", { id: "first-objective" }, ...names.map((name, k) => element("option", { value: k }, name)));
-  select.value = String(state.edits.get("objective")?.[2] ?? 0);
-  select.addEventListener("change", () => changed("objective", Number(select.value) ? ["first", "objective", Number(select.value)] : null));
-  byId("controls").prepend(element("fieldset", { id: "objectives" }, element("legend", {}, "Objective"),
-    element("label", {}, "First of them ", select)));
 }
 
 /** @param {{version: number, complaint: string}} told that somebody is there, and how the file is */
@@ -304,10 +297,7 @@ function back() {
 
 async function save() {
   const { edits, held } = asked();
-  const told = await ask("save", { edits, held, design: state.handle ? state.handle.design() : {} });
-  const link = element("a", { href: URL.createObjectURL(new Blob([told.toml], { type: "application/toml" })), download: told.file });
-  link.click();
-  URL.revokeObjectURL(link.href);
+  download(await ask("save", { edits, held, design: state.handle ? state.handle.design() : {} }));
 }
 
 /** Keep what is shown, or show what was kept. */
@@ -345,6 +335,7 @@ async function start() {
   onClick("show-a", showKept);
   onClick("drop-a", () => comparison.drop());
   onClick("draw", () => trade.draw({ edits: asked().edits, held: state.held }));
+  onClick("picture", () => pictures.draw(asked().edits));
   engine.listen();
   byId("follows").addEventListener("change", () => {
     if (byId("follows").checked && state.optimum) state.handle.setDesign(state.optimum.design, {});

@@ -70,3 +70,13 @@ export function ticks(low, high, count = 5) {
   for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k += 1) found.push(k * step);
   return found;
 }
+
+/**
+ * Hand a file to the user.
+ * @param {{toml: string, file: string}} told
+ */
+export function download(told) {
+  const href = URL.createObjectURL(new Blob([told.toml], { type: "application/toml" }));
+  element("a", { href, download: told.file }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 1000);
+}

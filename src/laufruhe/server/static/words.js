@@ -50,7 +50,7 @@ export function busy(optimum) {
   const began = performance.now();
   const timer = setInterval(() => {
     const seconds = (performance.now() - began) / 1000;
-    said.textContent = seconds < 1 ? "" : ` ${optimum ? "Proving" : "Solving"}: ${seconds.toFixed(0)} s.`;
+    said.textContent = seconds < 1 ? "" : optimum ? ` for ${seconds.toFixed(0)} s` : `: ${seconds.toFixed(0)} s`;
     if (!said.isConnected) place.append(said);
   }, 250);
   return () => {
@@ -73,4 +73,11 @@ export function tellGone(file) {
   banner.dataset.gone = "true";
   banner.textContent = "The server of this page has ended. Sliders of weights still move the forces; limits, speed, load, crank and " +
     `mounts do not. Start it again with: laufruhe page ${file || ""}`;
+}
+
+/** @param {string} complaint of the file as it is on the disk */
+export function tellFile(complaint) {
+  const banner = byId("banner");
+  banner.hidden = !complaint;
+  banner.textContent = complaint ? `The file has changed and cannot be used; the page shows its last good state. ${complaint}` : "";
 }

@@ -1,0 +1,42 @@
+// Pictures of a report, drawn for the optimum that is proven now.
+import { listen, Refusal } from "./link.js";
+import { byId, element } from "./parts.js";
+
+/** What was solved last, in pictures. */
+export class Pictures {
+  constructor() {
+    /** @type {AbortController | null} */
+    this.asking = null;
+  }
+
+  /** @param {boolean} has whether there is an optimum to be drawn */
+  offer(has) {
+    this.asking?.abort();
+    byId("pictures").hidden = !has;
+    byId("pictures-state").textContent = "";
+    byId("drawn").replaceChildren();
+  }
+
+  /** @param {any[]} edits of the state that was solved */
+  async draw(edits) {
+    this.asking?.abort();
+    const mine = new AbortController();
+    this.asking = mine;
+    byId("drawn").replaceChildren();
+    byId("pictures-state").textContent = "Drawing the first one.";
+    try {
+      await listen("pictures", { edits }, (told) => this.add(told), mine.signal);
+    } catch (error) {
+      if (error.name !== "AbortError") throw error;
+    }
+  }
+
+  /** @param {{error?: string, image?: string, caption: string, of: number}} told */
+  add(told) {
+    if (told.error) throw new Refusal(told.error);
+    if (!told.image) return;
+    const figure = element("figure", {}, element("img", { src: told.image, alt: told.caption }), element("figcaption", {}, told.caption));
+    byId("drawn").append(figure);
+    byId("pictures-state").textContent = `${byId("drawn").children.length} of ${told.of}`;
+  }
+}
