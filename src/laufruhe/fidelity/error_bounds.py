@@ -12,9 +12,9 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -23,8 +23,6 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 REFERENCE_SAMPLES = 5760
 """Steps a cycle of the reference: what cheaper choices are compared with."""

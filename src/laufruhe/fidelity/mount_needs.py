@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.fidelity.automatic import Choice
 from laufruhe.fidelity.knob import LeftOut
@@ -20,13 +19,12 @@ from laufruhe.fidelity.knobs import KNOBS
 from laufruhe.fidelity.mount_knobs import mode_names
 from laufruhe.machine import Mount
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 SAME = 1e-12
 """Relative change under which a value is the same."""

@@ -12,13 +12,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.live.parts import Curve, Design, LiveModel, Proved, Shown, Slider
 from laufruhe.live.saving import saved
 from laufruhe.live.signals import Signal, signal_of
 from laufruhe.load_models.affine import AffineModel
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN
 from laufruhe.present.measures import places_of
 from laufruhe.problem.channels import CHANNELS
@@ -29,8 +29,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import angle_name
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
 HOW = "laufruhe page {file} follows it"

@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.problem.evaluation import over
 from laufruhe.problem.measure import Measure, bends_of, selected
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 PEAK = NORMS["maximum"]
 NOTHING = 1e-16

@@ -10,10 +10,10 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
@@ -24,8 +24,6 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, bends_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 MAXIMUM = NORMS["maximum"]
 NEEDED, LEAST_UNIT = 1e3, 1e-9

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from laufruhe.machine import Engine, Role, SliderCrank
 from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import Layout
-from laufruhe.physics.crank_stars import Array, Stars, star_sums
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.crank_stars import Stars, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.star_space import StarSpace

@@ -13,17 +13,15 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.machine import Engine
 from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-
-ComplexArray = NDArray[np.complex128]
 
 
 class AngleWaves(ThrowWaves):

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.batch_norms import CACHE_BYTES, BatchNorm
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

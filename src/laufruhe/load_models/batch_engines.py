@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, GasModel, OperatingPoint, Rotor, SliderCrank
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.batch_norms import CACHE_BYTES, BatchNorm
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import order_coefficients
@@ -25,8 +26,6 @@ from laufruhe.physics.shaking_loads import rotor_loads, unit_star_load
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure, bends_of
-
-Array = NDArray[np.float64]
 
 _NODES, _PART = 24, 4096
 

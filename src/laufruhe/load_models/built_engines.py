@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.batch_norms import BatchNorm
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, bends_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-
-Array = NDArray[np.float64]
 
 
 class BuiltEngines:

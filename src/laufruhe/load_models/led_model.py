@@ -12,17 +12,15 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.problem.decision import Decision, Kind, LeadDrive
 from laufruhe.problem.measure import Measure, bends_of, load_rows, selected
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 FINE = 1440
 """Angles between which a mean is averaged where no program stands at them."""

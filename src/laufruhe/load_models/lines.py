@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

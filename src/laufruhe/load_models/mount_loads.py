@@ -14,12 +14,11 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_model import Symbols, UnevenModel
 from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import base_of, common_base
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 KEPT_SHARE = 1e-4
 PROBES = 6

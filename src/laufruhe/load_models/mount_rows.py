@@ -8,14 +8,12 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.mount_symbols import SymbolicResponse, waves
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
-
-Array = NDArray[np.float64]
 
 LEAST_SAMPLES = 32
 SAMPLES_PER_ORDER = 4

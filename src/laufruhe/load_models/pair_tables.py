@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.load_models.star_model import StarNorm, StarProblem
-from laufruhe.physics.crank_stars import Array, Stars
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.crank_stars import Stars
 
 _ROUNDING = 1e-13
 

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.linear_run import Response
 from laufruhe.physics.runs import STRETCHES, point_of, responses_of
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import KnownRows, Problem
 from laufruhe.problem.sets import Value
-
-Array = NDArray[np.float64]
 
 NEAR = 0.98
 """Share of a limit from which a row counts."""

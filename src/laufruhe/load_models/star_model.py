@@ -12,19 +12,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.machine.firing import star_throws
 from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
-
-Array = NDArray[np.float64]
 
 _SAME_SLOPE = 1e-11
 _ROUNDING = 1e-14

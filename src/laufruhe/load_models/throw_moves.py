@@ -10,14 +10,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine.firing import firing_turns
 from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing
-
-Array = NDArray[np.float64]
 
 REACH = math.radians(60.0)
 # [rad]

@@ -25,8 +25,6 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure, load_rows, mass_rows, selected
 from laufruhe.problem.problem import Problem
 
-Array = NDArray[np.float64]
-
 _NOTHING, _FEW = 1e-10, 24
 
 

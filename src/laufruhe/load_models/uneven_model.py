@@ -23,6 +23,7 @@ from laufruhe.load_models.mount_symbols import waves
 from laufruhe.load_models.uneven_gas import LEFT_OUT, GasMoments
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, as_order, base_of
 from laufruhe.physics.mount_forces import RigidMounting
@@ -34,8 +35,6 @@ from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.measure import Measure, counted_rotors, radius_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
-
-Array = NDArray[np.float64]
 
 LEAST_SAMPLES = 72
 NEGLIGIBLE = 1e-9

@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts import Layout
-
-Array = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
 
 SLACK = 1e-7
 """By which firing intervals may miss their bounds [rad]: a rounding of the programs that place throws."""

@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, Norm
-
-Array = NDArray[np.float64]
 
 CACHE_BYTES = 1 << 19
 """Of the block of rows that one thread works on."""

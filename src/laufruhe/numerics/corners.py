@@ -20,7 +20,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
 
 DEGREES = 4
 """The value itself and as many derivatives but one, whose jumps are found."""

@@ -21,10 +21,10 @@ from functools import lru_cache, partial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Bearing, Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank, kinematics
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
 from laufruhe.numerics.turns import as_turn, cis, star_sum
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -33,8 +33,6 @@ from laufruhe.physics.mechanism import resolved_orders
 from laufruhe.physics.shaking_loads import rotor_loads, rotor_wrench
 from laufruhe.physics.star_loads import order_index, spread
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 OfPart: TypeAlias = Callable[[Cycle, SliderCrank, float, GasModel | None, Fidelity], Spectrum]
 
 

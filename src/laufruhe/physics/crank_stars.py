@@ -16,9 +16,9 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.turns import phasors
 
-Array = NDArray[np.float64]
 Stars = NDArray[np.uint8]
 
 # rows of a table of joined throws: small enough for the second-level cache

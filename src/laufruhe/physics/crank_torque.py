@@ -7,17 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.machine import Engine, OperatingPoint, SliderCrank
+from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
-from laufruhe.physics.mechanism import (
-    TWO_ORDER_ROLL,
-    ComplexArray,
-    Direction,
-    Effect,
-    resolved_orders,
-    two_order_roll,
-)
+from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, resolved_orders, two_order_roll
 from laufruhe.physics.star_loads import star_loads
 from laufruhe.physics.wrench import ROLL
 

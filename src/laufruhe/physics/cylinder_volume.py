@@ -14,32 +14,29 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Charge, Cycle, SliderCrank
-
-FloatArray: TypeAlias = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
 
 JUMP_WIDTH = 1e-11
 
 
-def swept_volume(part: SliderCrank, angles: FloatArray) -> FloatArray:
+def swept_volume(part: SliderCrank, angles: Array) -> Array:
     """Volume swept from the highest piston position, over the displacement (G1); 0 to 1, shape of `angles`."""
     highest = part.travel(np, np.asarray(part.dead_centres[0]))
     return np.asarray((part.travel(np, part.fires_at + _ratio(part) * angles) - highest) / part.stroke)
 
 
-def swept_rate(part: SliderCrank, angles: FloatArray) -> FloatArray:
+def swept_rate(part: SliderCrank, angles: Array) -> Array:
     """Derivative of `swept_volume` by the crank angle, exact, shape of `angles`."""
     ratio = _ratio(part)
     return np.asarray(-ratio * part.velocity(np, part.fires_at + ratio * angles) / part.stroke)
 
 
-def chamber_volume(part: SliderCrank, since: FloatArray) -> FloatArray:
+def chamber_volume(part: SliderCrank, since: Array) -> Array:
     """Volume of a chamber over its least [m3], some crank angles after it fired [rad] (Y3)."""
     own = part.swept.chamber
     return own.piston_area * own.stroke * swept_volume(own, part.swept.pace * (since - part.swept.late))
@@ -62,7 +59,7 @@ def _ratio(part: SliderCrank) -> float:
     return ratio
 
 
-def indicated_mean_pressure(pressures: FloatArray, part: SliderCrank, cycle: Cycle) -> float:
+def indicated_mean_pressure(pressures: Array, part: SliderCrank, cycle: Cycle) -> float:
     """Cyclic integral of p dV over the displacement (G3).
 
     Parameters
@@ -102,17 +99,17 @@ class ChargedCylinder:
         """(V_c + V_h) / V_h."""
         return self.gas.compression_ratio / (self.gas.compression_ratio - 1.0)
 
-    def volume(self, angles: FloatArray) -> FloatArray:
+    def volume(self, angles: Array) -> Array:
         """V / V_h (G1)."""
         return self.smallest + swept_volume(self.part, angles)
 
-    def pressure(self, closed: Callable[[FloatArray], FloatArray], angles: FloatArray) -> FloatArray:
+    def pressure(self, closed: Callable[[Array], Array], angles: Array) -> Array:
         """Pressure over the cycle from that of the closed period, the mean of both sides at a jump [Pa]."""
         before = self._one_sided(closed, angles - JUMP_WIDTH)
         after = self._one_sided(closed, angles + JUMP_WIDTH)
         return 0.5 * (before + after)
 
-    def _one_sided(self, closed: Callable[[FloatArray], FloatArray], angles: FloatArray) -> FloatArray:
+    def _one_sided(self, closed: Callable[[Array], Array], angles: Array) -> Array:
         top, bottom = dead_centres(self.part)
         first = bottom - math.tau
         local = first + np.mod(angles - first, self.cycle.angle)

@@ -10,10 +10,10 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.corners import joined
 from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
 from laufruhe.numerics.turns import Turn, as_turn, star_sum
-from laufruhe.physics.cylinder_volume import FloatArray
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import alike_under, pressure_breaks, thrust_at
 from laufruhe.physics.wrench import ROLL
@@ -62,7 +62,7 @@ def _one_cylinder(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) 
     return found
 
 
-def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> FloatArray:
+def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> Array:
     """Torque of one cylinder's gas on the engine's output, n P ds/dalpha, P = -A (p - p_crankcase) (L5).
 
     Returns
@@ -72,13 +72,13 @@ def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> 
     return _torque_at(gas, part, cycle, cycle.angle * np.arange(samples) / samples)
 
 
-def _torque_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: FloatArray) -> FloatArray:
+def _torque_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
     """As `gas_torque`, at any crank angles from the firing dead centre [rad]."""
     torques = [chamber_torque(gas, part, cycle, angles + lag) for lag in part.swept.lags]
     return np.asarray(np.sum(torques, axis=0))
 
 
-def chamber_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, since: FloatArray) -> FloatArray:
+def chamber_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, since: Array) -> Array:
     """Torque of what fired some crank angles ago [rad], of a piston or of one chamber of a rotor [N m] (L5, Y4)."""
     own, pace = part.swept.piston, part.swept.pace
     alpha = own.fires_at + own.shaft.ratio * pace * since

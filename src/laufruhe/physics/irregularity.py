@@ -12,14 +12,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.uneven_speed import gas_torque, moving_inertia, start_energy
-
-Array = NDArray[np.float64]
 
 FINE = 4
 """Times as many steps as the fidelity has, at which the ends of the speed are sought."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.machine import SliderCrank
 from laufruhe.machine.slider_crank import Motion
+from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.physics import order_coefficients
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.wrench import plane_wrench
-
-ComplexArray: TypeAlias = NDArray[np.complex128]
 
 _TAIL = 1e-15
 _MOST_STEPS = 1 << 16

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import lengths
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import UncarriedLoadError
 from laufruhe.machine.block import Block
-
-Array = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
 
 GRAVITY = 9.80665
 MOTIONS = ("fore-aft", "lateral", "bounce", "roll", "pitch", "yaw")

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Block, Mount
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import static_motion, torque_roll_axis, weight_wrench
-
-Array = NDArray[np.float64]
 
 
 def transmitted(forces: Spectrum, firm: Spectrum, orders: Sequence[float] | None) -> float:

@@ -16,11 +16,9 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-
-ComplexArray = NDArray[np.complex128]
+from laufruhe.numerics.arrays import ComplexArray
 
 _TAIL = 1e-18
 MAX_ORDER = 20_000

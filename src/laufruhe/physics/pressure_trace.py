@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, PressureTrace
-
-FloatArray: TypeAlias = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
 
 MAX_TRACE_GAP = math.radians(30.0)
 """Largest gap between points of a measured trace."""
 
 
-def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: FloatArray, pace: float = 1.0) -> FloatArray:
+def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: Array, pace: float = 1.0) -> Array:
     """Measured pressure [Pa] at crank angles gamma [rad], shape of `angles`, the cycle repeated at a pace (G12).
 
     Monotone cubics between the points (Fritsch and Carlson 1980) stay within their
@@ -41,7 +38,7 @@ def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: FloatArray, pace: f
     return np.asarray(PchipInterpolator(around, values)(local))
 
 
-def _one_period(gas: PressureTrace, cycle: Cycle, whole: float) -> tuple[FloatArray, FloatArray]:
+def _one_period(gas: PressureTrace, cycle: Cycle, whole: float) -> tuple[Array, Array]:
     """Points of a trace, an end that repeats the beginning merged into it."""
     points, pressures = np.array(gas.angles), np.array(gas.pressures)
     missing = whole - (points[-1] - points[0])
@@ -58,7 +55,7 @@ def _one_period(gas: PressureTrace, cycle: Cycle, whole: float) -> tuple[FloatAr
     return points[:-1], merged
 
 
-def _check_gaps(points: FloatArray, cycle: Cycle, whole: float) -> None:
+def _check_gaps(points: Array, cycle: Cycle, whole: float) -> None:
     inner = np.diff(points)
     outer = float(points[0] + whole - points[-1])
     if outer > min(2.0 * float(inner.max()), MAX_TRACE_GAP):

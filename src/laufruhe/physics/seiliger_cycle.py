@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, Seiliger, SliderCrank, Wiebe
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import rising_root
 from laufruhe.physics.cylinder_volume import ChargedCylinder, dead_centres, gas_exchange_pressure, in_bar
-
-FloatArray: TypeAlias = NDArray[np.float64]
 
 _ROUNDING = 1e-12
 
 
-def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: FloatArray) -> FloatArray:
+def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
     """Pressure [Pa] of the mixed cycle at crank angles gamma [rad], shape of `angles` (G4, G5).
 
     Raises
@@ -31,7 +28,7 @@ def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: Fl
     top, _ = dead_centres(part)
     cut_off = cylinder.smallest * seiliger_cut_off(gas, cycle)
 
-    def closed(local: FloatArray) -> FloatArray:
+    def closed(local: Array) -> Array:
         volume = cylinder.volume(local)
         compression = gas.intake_pressure * (cylinder.largest / volume) ** gas.compression_exponent
         expansion = gas.peak_pressure * np.minimum(1.0, cut_off / volume) ** gas.expansion_exponent

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -18,9 +18,6 @@ from laufruhe.physics.geared_inertia import geared_moment
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.wrench import ROLL
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> tuple[Spectrum, Spectrum | None]:

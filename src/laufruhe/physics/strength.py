@@ -14,7 +14,6 @@ from functools import partial
 from typing import TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import (
@@ -30,13 +29,13 @@ from laufruhe.machine import (
     Webs,
 )
 from laufruhe.machine.running_gear import ring_area, round_modulus
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 Factor: TypeAlias = Callable[[Engine, OperatingPoint], Array]
 

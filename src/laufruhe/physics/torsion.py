@@ -17,17 +17,15 @@ from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, SliderCrank, Torsion
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.numerics.turns import as_turn, phasors
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
 """Of a chain, by order [1] and speed [rad/s] what each section makes of its twist, shape (orders, sections)."""
 

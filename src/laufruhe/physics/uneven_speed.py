@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor, SliderCrank
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, bent_spectrum, spectrum_of
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.physics.fidelity import Fidelity
@@ -24,8 +24,6 @@ from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_factor
 from laufruhe.physics.mechanism import cylinder_wrench
 from laufruhe.physics.wrench import ROLL, plane_wrench
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 60
 _CONVERGED = 1e-14

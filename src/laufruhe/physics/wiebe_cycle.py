@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, SliderCrank, Wiebe
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.cylinder_volume import ChargedCylinder, dead_centres, gas_exchange_pressure, in_bar
-
-FloatArray: TypeAlias = NDArray[np.float64]
 
 MAX_CHARGE_HEAT = 50.0
 """Most heat taken for possible, over p V of the charge. Fuel and air without excess hold
@@ -22,7 +19,7 @@ some 3.4 MJ/m3 at 1 bar and 300 K, which is 34; 50 leaves room for cold charges.
 _ROUNDING = 1e-12
 
 
-def wiebe_pressure(gas: Wiebe, part: SliderCrank, cycle: Cycle, angles: FloatArray) -> FloatArray:
+def wiebe_pressure(gas: Wiebe, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
     """Pressure [Pa] with finite heat release at crank angles gamma [rad], shape of `angles` (G7-G9).
 
     Raises
@@ -34,7 +31,7 @@ def wiebe_pressure(gas: Wiebe, part: SliderCrank, cycle: Cycle, angles: FloatArr
     cylinder = ChargedCylinder(gas, part, cycle)
     heat = wiebe_heat(gas, part, cycle)
 
-    def closed(local: FloatArray) -> FloatArray:
+    def closed(local: Array) -> Array:
         volume = cylinder.volume(local)
         motored = gas.intake_pressure * (cylinder.largest / volume) ** gas.heat_ratio
         burnt = np.clip((local - gas.start) / gas.duration, 0.0, 1.0)
@@ -59,7 +56,7 @@ def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
     _check_burn(gas, part)
     places, weights = _unit_quadrature()
 
-    def worked(x: FloatArray) -> FloatArray:
+    def worked(x: Array) -> Array:
         volume = cylinder.volume(gas.start + gas.duration * x)
         return np.asarray(-np.expm1((gas.heat_ratio - 1.0) * np.log(volume / cylinder.largest)))
 
@@ -88,14 +85,14 @@ def _check_burn(gas: Wiebe, part: SliderCrank) -> None:
         )
 
 
-def _burn_rate(gas: Wiebe, x: FloatArray) -> FloatArray:
+def _burn_rate(gas: Wiebe, x: Array) -> Array:
     """Derivative of the burnt fraction 1 - exp(-a x^(m+1)) by x, the elapsed part of the burn (G7)."""
     order = gas.shape + 1.0
     efficiency = -math.log1p(-gas.completeness)
     return np.asarray(efficiency * order * x**gas.shape * np.exp(-efficiency * x**order))
 
 
-def _stored_heat(gas: Wiebe, cylinder: ChargedCylinder, elapsed: FloatArray) -> FloatArray:
+def _stored_heat(gas: Wiebe, cylinder: ChargedCylinder, elapsed: Array) -> Array:
     """Integral of v^(kappa-1) over the burnt fraction up to each elapsed part of the burn (G9)."""
     places, weights = _unit_quadrature()
     # every sample after the burn has the same integral
@@ -107,7 +104,7 @@ def _stored_heat(gas: Wiebe, cylinder: ChargedCylinder, elapsed: FloatArray) -> 
 
 
 @lru_cache(maxsize=1)
-def _unit_quadrature() -> tuple[FloatArray, FloatArray]:
+def _unit_quadrature() -> tuple[Array, Array]:
     """Places and weights of the double-exponential rule on (0, 1) (Takahasi and Mori 1974).
 
     The burn rate behaves as x^m at its start: this rule takes any such end in its stride.

@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Chamber, Chambers, Cycle, PressureTrace, Pump, SliderCrank, Steam
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.cylinder_volume import JUMP_WIDTH, dead_centres, swept_volume
 from laufruhe.physics.pressure_trace import trace_pressure
-
-FloatArray = NDArray[np.float64]
 
 _HALVINGS = 53
 
 
-def chambers_thrust(gas: Chambers, part: SliderCrank, angles: FloatArray) -> FloatArray:
+def chambers_thrust(gas: Chambers, part: SliderCrank, angles: Array) -> Array:
     """P = -sum of +-F (p - p_0) along the axis of a cylinder, away from the crank [N] (G14; eq. 296).
 
     Parameters
@@ -36,15 +35,15 @@ def chambers_thrust(gas: Chambers, part: SliderCrank, angles: FloatArray) -> Flo
     return total
 
 
-def chambers_breaks(gas: Chambers, part: SliderCrank) -> FloatArray:
+def chambers_breaks(gas: Chambers, part: SliderCrank) -> Array:
     """Angles from the dead centre of the cylinder at which a derivative of a pressure jumps [rad]."""
     return np.array(sorted({angle for chamber in gas.of(part) for angle in _breaks(chamber, part)}))
 
 
-def chamber_pressure(chamber: Chamber, part: SliderCrank, angles: FloatArray) -> FloatArray:
+def chamber_pressure(chamber: Chamber, part: SliderCrank, angles: Array) -> Array:
     """Absolute pressure [Pa], the mean of both sides at a jump, shape of `angles`."""
 
-    def at(own: FloatArray) -> FloatArray:
+    def at(own: Array) -> Array:
         smallest, largest = _ends(chamber, part)
         local = np.mod(own - smallest, math.tau)
         pressures = PRESSURES[type(chamber.diagram)]
@@ -53,7 +52,7 @@ def chamber_pressure(chamber: Chamber, part: SliderCrank, angles: FloatArray) ->
     return 0.5 * (at(angles - JUMP_WIDTH) + at(angles + JUMP_WIDTH))
 
 
-def chamber_travel(chamber: Chamber, part: SliderCrank, angles: FloatArray) -> FloatArray:
+def chamber_travel(chamber: Chamber, part: SliderCrank, angles: Array) -> Array:
     """Part of the stroke from where a chamber is smallest, 0 to 1."""
     swept = np.clip(swept_volume(part, angles), 0.0, 1.0)
     return swept if chamber.side > 0 else 1.0 - swept
@@ -81,7 +80,7 @@ def _breaks(chamber: Chamber, part: SliderCrank) -> list[float]:
     return [smallest, largest, *(begin + low * (largest - begin)).tolist()]
 
 
-def _steam(diagram: Steam, travel: FloatArray, out: NDArray[np.bool_], _: FloatArray) -> FloatArray:
+def _steam(diagram: Steam, travel: Array, out: NDArray[np.bool_], _: Array) -> Array:
     """Admission, expansion and release on the way out, exhaust, compression and lead on the way back (G15)."""
     released = _expanded(diagram, diagram.admission, diagram.cut_off, np.asarray(diagram.release))
     squeezed = _expanded(diagram, diagram.back_pressure, diagram.compression, np.asarray(diagram.lead))
@@ -97,24 +96,24 @@ def _steam(diagram: Steam, travel: FloatArray, out: NDArray[np.bool_], _: FloatA
     return np.where(out, on_way_out, np.where(travel >= diagram.lead, squeezing, rising))
 
 
-def _expanded(diagram: Steam, pressure: float, begin: float, end: FloatArray) -> FloatArray:
+def _expanded(diagram: Steam, pressure: float, begin: float, end: Array) -> Array:
     """p ((begin + c) / (end + c))^n, with nothing to expand the pressure itself."""
     volume = end + diagram.clearance
     shrinking = np.where(volume > 0.0, (begin + diagram.clearance) / np.where(volume > 0.0, volume, 1.0), 1.0)
     return np.asarray(pressure * shrinking**diagram.exponent)
 
 
-def _pump(diagram: Pump, _: FloatArray, out: NDArray[np.bool_], __: FloatArray) -> FloatArray:
+def _pump(diagram: Pump, _: Array, out: NDArray[np.bool_], __: Array) -> Array:
     """Suction while the chamber grows, delivery while it shrinks (G17)."""
     return np.where(out, diagram.suction, diagram.delivery)
 
 
-def _trace(diagram: PressureTrace, _: FloatArray, __: NDArray[np.bool_], local: FloatArray) -> FloatArray:
+def _trace(diagram: PressureTrace, _: Array, __: NDArray[np.bool_], local: Array) -> Array:
     """A measured trace of one side, over the crank angle from where its chamber is smallest (G12)."""
     return trace_pressure(diagram, Cycle.TWO_STROKE, local)
 
 
-PRESSURES: Mapping[type, Callable[[Any, FloatArray, NDArray[np.bool_], FloatArray], FloatArray]] = {
+PRESSURES: Mapping[type, Callable[[Any, Array, NDArray[np.bool_], Array], Array]] = {
     Steam: _steam,
     Pump: _pump,
     PressureTrace: _trace,

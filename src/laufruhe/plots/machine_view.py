@@ -11,10 +11,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle, Wedge
-from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, Rotor
 from laufruhe.machine.rotor import Role
+from laufruhe.numerics.arrays import Array
 from laufruhe.plots.machine_parts import (
     IRON,
     METAL,
@@ -40,7 +40,6 @@ from laufruhe.solvers.result import Result
 WIDE, HIGH, ACROSS, NARROW = 8.0, 4.4, 0.8, 2.2
 ROOM = 1.1
 """Around what is seen, as a share of it."""
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.plots.machine_parts import MM, at
 from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
 from laufruhe.plots.style import VERMILION, Page, Series, entry_of_dots, headed, point_name, series_of, styled
-from laufruhe.present.measures import Array, hardest_point, has_loads
+from laufruhe.present.measures import hardest_point, has_loads
 from laufruhe.present.numbers import figure as words
 from laufruhe.present.poses import Pose, bore_of
 from laufruhe.problem.curves import forces_of

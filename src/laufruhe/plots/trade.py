@@ -10,13 +10,11 @@ from matplotlib.collections import PathCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.plots.style import Page, heading, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, spread, typeset
 from laufruhe.studies.trade import Row, Trade
-
-Array = NDArray[np.float64]
 
 LEAST_ERROR, LEAST_REGRET = 1e-7, 1e-8
 PANEL, DOT = (5.4, 4.4), 0.13

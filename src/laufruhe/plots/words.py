@@ -17,9 +17,9 @@ from matplotlib.text import Text
 from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from matplotlib.transforms import Affine2D
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
+
 INK, FAINT = "#222222", "#5c5c5c"
 FONT = "DejaVu Sans"
 SMALL = 9.0

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.machine import Chambers, Engine, OperatingPoint, SliderCrank
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.cylinder_volume import chamber_volume, swept_volume
 from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
-from laufruhe.present.measures import Array, has_loads
+from laufruhe.present.measures import has_loads
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import Chambers
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.torsion import has_torsion
@@ -19,8 +19,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import limit_values
 from laufruhe.solvers.ranking import PhasingResult
 from laufruhe.solvers.result import LimitValue, Result
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import Modes, static_motion, torque_roll_axis, torque_roll_coupling, weight_wrench
 from laufruhe.physics.time_model import frequencies_with_fluid
-from laufruhe.present.measures import Array, has_mounts
+from laufruhe.present.measures import has_mounts
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result

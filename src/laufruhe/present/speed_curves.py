@@ -8,9 +8,9 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.physics.speed_map import speed_map, split_loads
-from laufruhe.present.measures import Array
 from laufruhe.present.mounting import critical_speed, driven, facts_of, main_order
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation

@@ -10,6 +10,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import parted
 from laufruhe.physics.torsion import (
     TorsionalModes,
@@ -24,7 +25,6 @@ from laufruhe.physics.torsion import (
     throw_torques,
     vector_sums,
 )
-from laufruhe.present.measures import Array
 from laufruhe.problem.channels.torsional import HIGHEST
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads

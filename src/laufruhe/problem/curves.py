@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, check_whole
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, common_base, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.modes import MOTIONS
@@ -33,7 +33,6 @@ from laufruhe.problem.loads import PointLoads
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 MOST_STEPS = 1_000_000
 STEPS = 720
 """Over the cycle; what is sampled is known at every angle."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.drives import (
     DAMPING,
     LAG,
@@ -64,8 +64,6 @@ __all__ = [
     "moved_numbers",
     "without_rotors",
 ]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

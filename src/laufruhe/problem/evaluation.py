@@ -9,10 +9,10 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.fidelity import Fidelity
@@ -23,8 +23,6 @@ from laufruhe.problem.channels import MOUNT_FORCE, LoadChannel, NumberChannel
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 BETWEEN = NORMS["maximum"].refinement
 """Times as many samples as are asked for, among which maxima of mounts are sought (M6)."""

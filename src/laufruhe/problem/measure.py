@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Role, Rotor, SliderCrank
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, orders_equal
 from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel
 from laufruhe.problem.loads import PointLoads
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

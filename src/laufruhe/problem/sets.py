@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
+
 Value: TypeAlias = complex | float
 
 EDGE = 1e-6

@@ -15,13 +15,12 @@ from itertools import pairwise
 from typing import ClassVar, Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import CRANKSHAFT, Engine, OperatingPoint, Role, Rotor, Shaft
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision, RotorDrive
 
-Array = NDArray[np.float64]
 Path: TypeAlias = tuple[str | int, ...]
 
 SIGMAS = 3.0

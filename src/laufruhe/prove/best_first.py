@@ -15,10 +15,10 @@ from typing import Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.progress import tell
 
-Array = NDArray[np.float64]
 P = TypeVar("P")
 
 # of the difference that counts as none, what is left for roundings

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Measure
 from laufruhe.prove.box_response import Answer, BoxModel, Expansion, Lines
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

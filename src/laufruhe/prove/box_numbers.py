@@ -7,17 +7,14 @@ from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import total_stiffness
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, motion_indices
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.box_response import BoxModel
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SLACK = 1e-6
 """Designs count as allowed when they break a limit by less."""

@@ -13,11 +13,9 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
-
-Array = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
 
 
 def gap_of(value: float, bound: float, nothing: float) -> float:

@@ -21,11 +21,9 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.mount_numbers import AxisResidual
-
-Array = NDArray[np.float64]
 
 FELT = 1e-6
 """Share of the limits by which they have to miss each other to be a contradiction."""

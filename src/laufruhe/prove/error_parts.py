@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import lengths
 
-Array = NDArray[np.float64]
 Terms: TypeAlias = Sequence[tuple[float, AffineNorm]]
 
 ROUNDING = 1e-12

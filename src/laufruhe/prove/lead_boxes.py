@@ -21,18 +21,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineProblem
 from laufruhe.load_models.led_model import LedModel, LedNorm
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import lengths
 from laufruhe.numerics.norms.norm import curvature, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.measure import Measure
 from laufruhe.prove.certificate import ROUNDING, Multipliers, minorant
 from laufruhe.prove.lead_swing import LeadSwing
-
-Array = NDArray[np.float64]
 
 WIDE = 1.2
 """Half an arc [rad] beyond which nothing is known of unbalances on it."""

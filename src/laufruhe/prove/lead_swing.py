@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.led_model import LedModel, carried
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import curvature
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.irregularity import FINE
@@ -25,8 +25,6 @@ from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.uneven_speed import gas_torque, moving_inertia, start_energy
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

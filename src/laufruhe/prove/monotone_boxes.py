@@ -12,12 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import parted
 from laufruhe.prove.best_first import Box, Division, Parts, Waiting, halves, widest
-
-Array = NDArray[np.float64]
 
 MOST_BOXES = 4000
 # halvings of a side that is cut, and of a line through a box on the way to a design

@@ -9,10 +9,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from laufruhe.numerics.arrays import Array, Indices
 
 # least curvature that is left to a sum of quadratic functions of size one
 CONVEX_BY = 1e-9

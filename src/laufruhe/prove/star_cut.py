@@ -9,7 +9,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from laufruhe.load_models.star_model import StarProblem
-from laufruhe.physics.crank_stars import Array, Stars
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers

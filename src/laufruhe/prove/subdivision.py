@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
@@ -22,9 +23,6 @@ from laufruhe.prove.best_first import Divided, divide
 from laufruhe.prove.box_norms import Under, root_under, under
 from laufruhe.prove.box_numbers import RANGES, SLACK, breaks
 from laufruhe.prove.box_response import BoxModel, Expansion, Lines
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 # open numbers that are divided without being asked for, and what all boxes may cost together
 MOST_OPEN = 4

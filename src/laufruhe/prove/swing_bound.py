@@ -17,17 +17,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import CRANKSHAFT, Engine, OperatingPoint
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.turns import as_turn
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.torsion import cylinder_torque
 from laufruhe.physics.uneven_speed import moving_inertia
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 SAMPLED = 1e-4
 """Share by which a degree at angles may lie under the true one."""

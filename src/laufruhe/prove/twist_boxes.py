@@ -24,23 +24,15 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Flywheel, Torsion
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.reduced_inertia import turning_inertia
-from laufruhe.physics.torsion import (
-    ComplexArray,
-    dynamic_stiffness,
-    inertias,
-    natural_modes,
-    receptances,
-    throw_torques,
-)
+from laufruhe.physics.torsion import dynamic_stiffness, inertias, natural_modes, receptances, throw_torques
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.box_numbers import SLACK
 from laufruhe.prove.twist_coordinates import TwistCoordinates
-
-Array = NDArray[np.float64]
 
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
 LEAST_SHARE = 1e-10

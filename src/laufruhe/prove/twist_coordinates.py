@@ -5,14 +5,12 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import Section, Torsion
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.torsion import chain_of
 from laufruhe.problem.decision import Decision, TorsionDrive
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 
 class TwistCoordinates:

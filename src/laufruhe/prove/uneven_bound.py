@@ -15,17 +15,15 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
 from laufruhe.machine.firing import firing_lattice
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Intervals
 from laufruhe.problem.problem import Phasing, Problem
-
-Array = NDArray[np.float64]
 
 POINTS = 97
 MOST_STARS = 50_000

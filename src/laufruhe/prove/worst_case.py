@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.prove.best_first import Division, Parts, Waiting
 from laufruhe.prove.error_parts import ROUNDING, Block, Known, Terms, bounded
-
-Array = NDArray[np.float64]
 
 MOST_NODES = 5000
 STARTS, CLIMBS = 12, 30

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.balance_factor import balance_factors
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.torque import torque_facts
 from laufruhe.physics.torsion import absorber_heat, chain_of
 from laufruhe.physics.wrench import WRENCH
-from laufruhe.present.measures import Array, is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
+from laufruhe.present.measures import is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.run_up import run_of, run_point, runs_up, shown_runs
 from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range

@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.load_models.built_engines import BuiltEngines, evaluated, values_of
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.error_parts import Terms
 from laufruhe.prove.worst_case import MOST_NODES, worst_case
-
-Array = NDArray[np.float64]
 
 QUICK = 1
 """Parts of the errors that are looked at while designs still change."""

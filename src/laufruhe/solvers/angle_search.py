@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.angle_waves import AngleWaves
 from laufruhe.load_models.uneven_model import rides_of, rotor_states
 from laufruhe.machine.firing_windows import SLACK, FiringWindow
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Sector
@@ -22,8 +22,6 @@ from laufruhe.solvers.throw_boxes import ThrowPrograms
 from laufruhe.solvers.throw_riders import Riders
 from laufruhe.solvers.throw_search import Improve, Searched, ThrowSearch, found_by, knows
 from laufruhe.solvers.throw_windows import firing_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

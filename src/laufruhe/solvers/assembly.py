@@ -13,11 +13,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.built_engines import BuiltEngines, values_of
 from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.assembly import Lot
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -34,7 +34,6 @@ from laufruhe.solvers.conclusion import KEPT, limit_values
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 from laufruhe.solvers.robust_result import SHARES
 
-Array = NDArray[np.float64]
 Chosen = tuple[tuple[int, ...], ...]
 """Of every lot the part in each cylinder."""
 

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.fidelity.error_bounds import missed, relative
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Limit, Side
@@ -23,8 +23,6 @@ from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.ranking import PhasingResult, none_of_given
 from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible, objective_of
-
-Array = NDArray[np.float64]
 
 FEASIBLE = 1e-6
 """Relative excess over a limit that counts as none."""

@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineProblem, reach
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import left
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.solvers.cone_rows import Block, Rows
-
-Array = NDArray[np.float64]
 
 LEAST_SHARE = 1e-7
 """Under which a sum is no part of the largest."""

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Cones
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,12 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, lengths
 from laufruhe.prove.certificate import Multipliers, excludes
 from laufruhe.solvers.cone_program import ConicSolution, answered, program_of, projected, told
 from laufruhe.solvers.equations import equations_of
-
-Array = NDArray[np.float64]
 
 # flat optima need a small gap before their decisions are digits one can build
 TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}

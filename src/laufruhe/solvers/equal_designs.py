@@ -7,9 +7,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import MEAN, Grid
 from laufruhe.problem.decision import Domain
@@ -18,8 +18,6 @@ from laufruhe.solvers.conclusion import FEASIBLE
 from laufruhe.solvers.conic import solve_cones
 from laufruhe.solvers.mount_starts import unbalances_of
 from laufruhe.solvers.result import DecisionRange, Result
-
-Array = NDArray[np.float64]
 
 MOST_OPEN = 16
 """Decisions whose ranges are sought: each takes two programs, or some more where its angle is open."""

@@ -11,13 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineProblem
+from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.solvers.cone_program import projected
-
-Array = NDArray[np.float64]
 
 SAME = 1e-10
 """Share of what the decisions do, or of what is to vanish, under which there is nothing."""

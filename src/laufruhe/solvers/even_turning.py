@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine.firing import firing_turns
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
@@ -24,8 +25,6 @@ from laufruhe.solvers.ranking import ranked_star, ranking_result
 from laufruhe.solvers.result import ObjectiveValue, Result
 from laufruhe.solvers.star_design import solve_fixed
 from laufruhe.solvers.star_families import families_of
-
-Array = NDArray[np.float64]
 
 _AT_ONCE = 512
 

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.pair_tables import PairObjective
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.progress import tell
-from laufruhe.physics.crank_stars import Array, Stars
+from laufruhe.physics.crank_stars import Stars
 from laufruhe.solvers.star_search import BestStars, StarsFound
 
 MOST_SLOTS = 13

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import Flywheel
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Numbers, moved_numbers
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure
@@ -20,8 +20,6 @@ from laufruhe.solvers.conclusion import concluded, judged, none_within
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.local_programs import LocalProgram, shown
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 WIDTH = "flywheel.width"
 # boxes close in fast where the sum goes one way: at so small a share of the tolerance limits hold the design

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.problem.decision import Kind
@@ -23,8 +22,6 @@ from laufruhe.solvers.conclusion import KEPT
 from laufruhe.solvers.conic import solve_cones
 from laufruhe.solvers.equations import on_grid
 from laufruhe.solvers.unbalances import conflict_of, settled
-
-Array = NDArray[np.float64]
 
 FEW_ANGLES = 48
 """Over the period of the loads, where the problem itself takes more."""

@@ -10,13 +10,11 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left
 from laufruhe.numerics.progress import telling
 from laufruhe.solvers.local_optimum import Ending, LocalOptimum
-
-Array = NDArray[np.float64]
 
 # seconds that a start has where time is over
 SHORTEST = 0.5

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineProblem
 from laufruhe.load_models.led_model import LedModel, LedNorm
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.nothing import nothing_of
@@ -33,8 +33,6 @@ from laufruhe.solvers.equations import on_grid
 from laufruhe.solvers.mount_starts import unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
-
-Array = NDArray[np.float64]
 
 MOST_BOXES, MOST_PROGRAMS = 20_000, 2_000
 """Boxes of leads alone, and of those with a cone program each."""

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, Grid
 from laufruhe.problem.decision import Domain
 from laufruhe.solvers.cone_program import projected
 from laufruhe.solvers.conic import solve_cones
-
-Array = NDArray[np.float64]
 
 SAME_LOAD = 1e-10
 """Share of what a load turns to by all decisions, under which a direction does not move it."""

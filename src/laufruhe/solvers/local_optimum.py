@@ -6,10 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
 
 _NEAR = 1e-6
 # optima that a rule may miss on average

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Self, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize, nnls
 
 from laufruhe.errors import ModelError
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side
@@ -21,8 +21,6 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, room_of
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, judged
-
-Array = NDArray[np.float64]
 
 # designs looked at for each start of the search; step of a slope, room that is none, and an objective that is far off
 LOOKS, STEP, HELD, FAR = 4, 1e-6, 1e-6, 1e3

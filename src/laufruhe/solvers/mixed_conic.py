@@ -15,18 +15,16 @@ from typing import Any
 
 import cvxpy as cp
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.star_model import StarNorm, StarProblem
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import left
 from laufruhe.numerics.norms import Cones
 from laufruhe.numerics.progress import tell
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import ShaftChoice
-
-Array = NDArray[np.float64]
 
 # what SCIP's own feasibility tolerance may hide of the objective
 TRUST = 1e-6

@@ -9,8 +9,8 @@ from typing import Any
 
 import cvxpy as cp
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.mount_numbers import AxisResidual
 from laufruhe.prove.convex_functions import (
     Compliance,
@@ -23,8 +23,6 @@ from laufruhe.prove.convex_functions import (
     excludes,
 )
 from laufruhe.solvers.conic import ATTEMPTS
-
-Array = NDArray[np.float64]
 
 # duals of a matrix inequality prove no more than what they are good to
 SHARP = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}

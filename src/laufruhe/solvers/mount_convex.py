@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import mass_root
@@ -36,8 +36,6 @@ from laufruhe.prove.convex_functions import (
 from laufruhe.solvers.conclusion import Shown, better, concluded, given_design, judged, none_within
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 CONVEX = (channels.SAG, channels.TORQUE_ROLL, channels.RAW_TORQUE_ROLL, channels.TOTAL_STIFFNESS)
 

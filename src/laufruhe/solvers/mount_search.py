@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, passed
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.evaluation import Evaluation
@@ -21,8 +21,6 @@ from laufruhe.solvers.local_optimum import LocalOptimum, distinct, is_explored
 from laufruhe.solvers.mount_starts import start_points
 from laufruhe.solvers.nonlinear import solve_nonlinear
 from laufruhe.solvers.smooth_program import SmoothProgram
-
-Array = NDArray[np.float64]
 
 SLACK = 1e-5
 # share by which two designs are worth the same

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left, limited
 from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
@@ -19,8 +19,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.unbalances import solve_unbalances
-
-Array = NDArray[np.float64]
 
 # starts at most for each open number, and candidates for each start: so many cost about as much as its search
 STARTS = 4

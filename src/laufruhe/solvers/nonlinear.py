@@ -30,14 +30,13 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, each, executor_for
 from laufruhe.solvers.ipopt import Task, run
 from laufruhe.solvers.local_optimum import Ending, LocalOptimum
 
-Array = NDArray[np.float64]
 Enough: TypeAlias = Callable[[Sequence[LocalOptimum]], bool]
 Several: TypeAlias = Callable[[tuple[Task, Sequence[tuple[int, Array]]]], list[LocalOptimum]]
 

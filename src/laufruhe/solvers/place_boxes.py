@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Role, Rotor
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import ADDED_MASS
 from laufruhe.problem.decision import Decision, Kind, RotorDrive
 from laufruhe.problem.measure import Limit, Measure
@@ -28,8 +29,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Set, Value
 from laufruhe.solvers.mount_starts import unbalances_of
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 
 class Relaxation:

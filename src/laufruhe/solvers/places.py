@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from itertools import islice, product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
@@ -22,8 +22,6 @@ from laufruhe.solvers.mount_starts import unbalances_of
 from laufruhe.solvers.place_boxes import Relaxation
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
-
-Array = NDArray[np.float64]
 
 MOST_BOXES = 300
 # of the tolerance that the programs of the boxes may use up

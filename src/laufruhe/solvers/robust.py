@@ -14,11 +14,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.load_models.built_engines import evaluated
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell, within
 from laufruhe.numerics.spectrum import common_base
@@ -37,7 +37,6 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.robust_conclusion import compared, robust_result
 from laufruhe.solvers.unbalances import conflict_of, tightened
 
-Array = NDArray[np.float64]
 Solve = Callable[[Problem], Result]
 
 MOST_ROUNDS = 60

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.built_engines import BuiltEngines, evaluated, values_of
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
@@ -22,8 +22,6 @@ from laufruhe.solvers.adversaries import Adversary, Found
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, decision_values, limit_values
 from laufruhe.solvers.result import LimitValue, ObjectiveValue, Result, Status
 from laufruhe.solvers.robust_result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
-
-Array = NDArray[np.float64]
 
 CHECKED, CHECKED_CURVED = 20_000, 400
 """Engines of the second sample: where loads are affine in the errors, and where each is built anew."""

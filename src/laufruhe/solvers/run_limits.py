@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineProblem
-from laufruhe.load_models.run_rows import Array, RunRows
+from laufruhe.load_models.run_rows import RunRows
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.decision import Kind, domains_of

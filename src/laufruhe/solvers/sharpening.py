@@ -10,14 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
+from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import ROUNDING, Bound, Multipliers, gap_of, levelled, lower_bound
 from laufruhe.solvers.conclusion import FEASIBLE
 from laufruhe.solvers.conic import solve_quadratic
-
-Array = NDArray[np.float64]
 
 SHARP = 1e-6
 TIMES = 16

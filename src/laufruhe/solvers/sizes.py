@@ -7,10 +7,10 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.sized_model import SizeModel
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided
@@ -20,8 +20,6 @@ from laufruhe.solvers.conclusion import concluded, none_within
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.local_programs import LocalProgram, looks, proven, searched, shown
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 STARTS = 3
 # relative room that local programs leave inside limits, a part of what counts as kept

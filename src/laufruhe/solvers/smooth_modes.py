@@ -8,17 +8,15 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, motion_indices
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.gathered import Gathered
-
-Array = NDArray[np.float64]
 
 OF_MODES = (channels.FREQUENCIES, channels.DECOUPLING, channels.DECOUPLING_SHORTFALL)
 

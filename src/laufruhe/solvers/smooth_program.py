@@ -21,7 +21,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
@@ -30,6 +29,7 @@ from laufruhe.load_models.mount_rows import PointResponse, sampled_rows, transmi
 from laufruhe.load_models.mount_symbols import elimination, response, symbolic_mounts
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_model import UnevenModel, rides_of
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import Grid, softened_lengths
 from laufruhe.physics.modes import weight_wrench
@@ -45,8 +45,6 @@ from laufruhe.solvers.gathered import Gathered
 from laufruhe.solvers.local_optimum import LocalOptimum
 from laufruhe.solvers.nonlinear import NonlinearProgram
 from laufruhe.solvers.smooth_modes import ModeVariables
-
-Array = NDArray[np.float64]
 
 SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
 # bounds of a stiffness that are further apart leave a start no place between them

@@ -16,9 +16,10 @@ import numpy as np
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.load_models.star_model import StarModel, StarProblem
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.progress import tell
-from laufruhe.physics.crank_stars import Array, Stars
+from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import ShaftChoice

@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import tell
 from laufruhe.numerics.roots import parted
 from laufruhe.numerics.workers import HERE, count_of, each, executor_for
-from laufruhe.physics.crank_stars import Array, Stars, phase_waves
+from laufruhe.physics.crank_stars import Stars, phase_waves
 from laufruhe.physics.star_space import Partial, StarSpace
 
 SLACK = 1e-9

@@ -12,20 +12,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import MOST_NUMBERS, AffineNorm, AffineProblem
 from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.machine.firing_windows import SLACK, FiringBounds, FiringWindow
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.prove.certificate import ROUNDING, Multipliers, minorant
 from laufruhe.prove.throw_arcs import ArcBox, Arcs
 from laufruhe.solvers.conic import solve_cones
 from laufruhe.solvers.throw_mixtures import Mixed, Program
 from laufruhe.solvers.throw_riders import BoxColumns, Riders
-
-Array = NDArray[np.float64]
 
 # rounds in which one box shrinks, and by how much of its sides it has to
 _ROUNDS, _WORTH = 6, 0.8

@@ -7,16 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.machine.firing_windows import FiringWindow
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, Grid
 from laufruhe.problem.decision import Decision, domains_of
 from laufruhe.problem.sets import Interval
 from laufruhe.solvers.throw_riders import BoxColumns
-
-Array = NDArray[np.float64]
 
 # angles of an arc that a program mixes, and how far two of them may be for the highest order that is told apart [rad]
 _FEWEST, _MOST, _APART = 3, 12, 0.6

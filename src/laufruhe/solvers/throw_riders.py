@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.problem.decision import Decision, Domain, RotorDrive, domains_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Sector, Set, Value
-
-Array = NDArray[np.float64]
 
 # [rad], of an arc between two corners of its polygon
 _SIDE = math.radians(60.0)

@@ -8,13 +8,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
-import numpy as np
-from numpy.typing import NDArray
-
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_waves import ThrowWaves
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.machine.firing_windows import FiringWindow
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import over
 from laufruhe.problem.measure import Measure, load_rows
 from laufruhe.problem.nothing import nothing_of
@@ -27,7 +25,6 @@ from laufruhe.solvers.throw_boxes import ThrowBox, ThrowPrograms
 from laufruhe.solvers.throw_riders import Riders
 from laufruhe.solvers.throw_windows import amid, firing_of, nearest, windows_of
 
-Array = NDArray[np.float64]
 Improve = Callable[[Candidate], StarDesign | None]
 """The best design near a candidate, and only the allowed one."""
 

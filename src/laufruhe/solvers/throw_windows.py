@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.machine.firing_windows import FiringBounds, FiringWindow
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Term
 from laufruhe.problem.problem import Phasing, Problem
-
-Array = NDArray[np.float64]
 
 MOST_WINDOWS = 6_000
 

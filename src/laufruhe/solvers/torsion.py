@@ -6,9 +6,6 @@ import math
 import time
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divide
@@ -17,8 +14,6 @@ from laufruhe.prove.twist_boxes import TwistBoxes
 from laufruhe.solvers.conclusion import KEPT, concluded, none_within
 from laufruhe.solvers.local_programs import LocalProgram, looks, proven, searched, shown
 from laufruhe.solvers.result import Result
-
-Array = NDArray[np.float64]
 
 # open numbers that are divided, and boxes that this may take
 MOST_OPEN, MOST_BOXES = 3, 3000

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.problem.channels import OF_MOUNTS
 from laufruhe.problem.evaluation import evaluate
@@ -26,8 +26,6 @@ from laufruhe.solvers.equations import on_grid
 from laufruhe.solvers.lightest import SAME_LOAD, lightest
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.sharpening import Optimum, sharpened
-
-Array = NDArray[np.float64]
 
 MOST_DOUBLINGS = 4
 MOST_MARGINS = 3

@@ -13,11 +13,11 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -38,8 +38,6 @@ from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.star_families import families_of
 from laufruhe.solvers.throw_search import Searched, search_throws
 from laufruhe.solvers.uneven_starts import firing_intervals, none_fires, starts_of
-
-Array = NDArray[np.float64]
 
 STARTS = 6
 # share of the objective as given that a search counts in at least

@@ -7,16 +7,14 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.studies import picture as p
 from laufruhe.studies.part import Column, Part, Template
 from laufruhe.studies.regions import COLUMNS, VALUES
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.units import readable
-
-Array = NDArray[np.float64]
 
 MOST_DRAWS = 1_000_000_000
 MOST_TABLED = 100_000

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import (
-    Array,
     Cones,
     Grid,
     Norm,

@@ -17,9 +17,8 @@ from typing import Any, ClassVar, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
-
-Array = NDArray[np.float64]
 
 # squares of numbers between these neither overflow nor lose digits
 _LEAST, _MOST = 1e-140, 1e150

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.maximum import in_place
-from laufruhe.numerics.norms.norm import (
-    Array,
+from laufruhe.numerics.norms.norm import (  # fmt: skip
     Cones,
     Grid,
     Norm,
@@ -27,7 +27,7 @@ from laufruhe.numerics.norms.norm import (
     curvature,
     lengths,
     softened_lengths,
-)  # fmt: skip
+)
 from laufruhe.numerics.spectrum import Spectrum
 
 SAME = 1e-13

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.mean import between
-from laufruhe.numerics.norms.norm import Array, Cones, Grid, Norm, OrderBounds, SmoothProgram, lengths, mean_square
+from laufruhe.numerics.norms.norm import Cones, Grid, Norm, OrderBounds, SmoothProgram, lengths, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 
 

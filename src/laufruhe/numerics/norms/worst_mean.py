@@ -10,17 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.mean import Mean, between
-from laufruhe.numerics.norms.norm import (
-    Array,
-    Cones,
-    Grid,
-    Norm,
-    OrderBounds,
-    SmoothProgram,
-    lengths,
-    softened_lengths,
-)
+from laufruhe.numerics.norms.norm import Cones, Grid, Norm, OrderBounds, SmoothProgram, lengths, softened_lengths
 from laufruhe.numerics.spectrum import Spectrum
 
 _MEAN = Mean()

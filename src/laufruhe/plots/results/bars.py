@@ -11,9 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.plots.style import Series, headed, page, series_of, styled, thin
 from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, ink_on, rows_of
-from laufruhe.present.measures import Array, hardest_point, has_mount_forces
+from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.solvers.result import Result

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.plots.style import ORANGE, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
 from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks, rows_of
-from laufruhe.present.measures import BEARINGS, Array, has_loads, load_designs, places_of
+from laufruhe.present.measures import BEARINGS, has_loads, load_designs, places_of
 from laufruhe.problem.evaluation import samples_of
 from laufruhe.solvers.result import Result
 

@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
 from laufruhe.plots.style import Series, entry, headed, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK, aligned, empty, fitted, in_thousands, round_ticks, width_of
-from laufruhe.present.measures import Array, hardest_point, has_firing, has_loads
+from laufruhe.present.measures import hardest_point, has_firing, has_loads
 from laufruhe.solvers.result import Result
 
 STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6

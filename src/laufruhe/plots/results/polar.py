@@ -14,9 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from laufruhe.machine import Mount
+from laufruhe.numerics.arrays import Array
 from laufruhe.plots.style import Page, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
 from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks, rows_of
-from laufruhe.present.measures import Array, hardest_point, has_mount_forces
+from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import figure as words
 from laufruhe.present.numbers import trimmed
 from laufruhe.problem.evaluation import samples_of

@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.plots.style import headed, page, point_name, series_of, styled
 from laufruhe.plots.words import empty, in_thousands, round_ticks
-from laufruhe.present.measures import Array, hardest_point, has_loads, main_load, mount_orders, padded
+from laufruhe.present.measures import hardest_point, has_loads, main_load, mount_orders, padded
 from laufruhe.problem.loads import PointLoads
 from laufruhe.solvers.result import Result
 

@@ -6,16 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.linear_run import Response
 from laufruhe.physics.run_up import RunUp
 from laufruhe.physics.runs import point_of, runs_of
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import Needs, NumberChannel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

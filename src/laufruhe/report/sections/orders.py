@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.present.measures import (
-    Array,
     hardest_point,
     has_loads,
     has_mounts,

@@ -10,12 +10,13 @@ import numpy as np
 import xarray as xr
 
 from laufruhe.load_models.batch import Designs, prepare
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import decision_values
 from laufruhe.studies import picture as p
 from laufruhe.studies.part import Column, Record, variable
 from laufruhe.studies.regions import VALUES
-from laufruhe.studies.sampled import Array, Sampled, in_unit, listed, share_below
+from laufruhe.studies.sampled import Sampled, in_unit, listed, share_below
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import solved
 from laufruhe.studies.text import Rows, Text, number

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from laufruhe.errors import InputError
@@ -19,6 +18,7 @@ from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.elastic_mounts import ResonanceError
 from laufruhe.problem.channels import ON_BLOCK, LoadChannel, mounting_in
@@ -32,7 +32,6 @@ from laufruhe.studies.swept import AS_GIVEN, FAILED, decided
 from laufruhe.studies.text import NOTHING, Rows, Text, number
 from laufruhe.units import readable
 
-Array = NDArray[np.float64]
 DesignName = Literal["as given", "as decided"]
 RPM, PER_RAD = readable("rad/s")
 MOST_SPEEDS, MOST_ORDERS, PRESENT = 20_000, 8, 0.01

@@ -13,7 +13,6 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from laufruhe.files import fields as f
@@ -21,6 +20,7 @@ from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.modes import GRAVITY
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -35,8 +35,6 @@ from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import NEGLIGIBLE, Rows, Text, Verdict, number, said
-
-Array = NDArray[np.float64]
 
 ANGLES, PIECE = 360, 500
 MAXIMUM, CLOSE = NORMS["maximum"], 1e-5
