@@ -35,7 +35,7 @@ SLIDE = """async values => {
     }
     const page = await laufruheLive.page;
     page.drawNow();
-    const limits = [...document.querySelectorAll("tr[data-measure]")];
+    const limits = [...document.querySelectorAll("tr[data-measure]")].filter(row => row.dataset.met !== "");
     return {
         design: page.design(), text: page.text(),
         objective: document.querySelector("[data-measure=objective]").innerText,

@@ -80,6 +80,15 @@ def test_limits_that_no_slider_moves_stay_with_their_value():
     assert shown["maximum mount travel"].signal is not None
 
 
+def test_limits_that_are_not_followed_stand_with_the_value_of_the_design_decided():
+    problem = load(PROBLEMS / "soft-single-run-up.toml")
+    shown = {each.name: each for each in model_of(problem).measures}
+    twist = shown["run-up twist"]
+    assert not twist.followed
+    assert twist.value > 0.0
+    assert twist.sides[0][0] == "at most"
+
+
 def test_a_page_too_large_says_so(every, monkeypatch):
     monkeypatch.setattr("laufruhe.live.parts.MOST_MB", 1e-3)
     assert "at the most" in every[1].too_large

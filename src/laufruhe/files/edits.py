@@ -93,6 +93,8 @@ def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
             label = shaft.get("name", "") if single else f"{shaft.get('name', '')}.{unbalance.get('name', j + 1)}"
             yield label, ("balancer_shafts", k, "unbalances", j)
         yield shaft.get("name", ""), ("balancer_shafts", k)
+    for k, geared in enumerate(tables.get("geared_inertias", ())):
+        yield geared.get("name", ""), ("geared_inertias", k)
     for k, bearing in enumerate(tables.get("main_bearings", ())):
         yield bearing.get("name", str(k + 1)), ("main_bearings", k)
     for k, place in enumerate(tables.get("mounts", {}).get("places", ())):

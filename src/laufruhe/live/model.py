@@ -86,7 +86,7 @@ def _moving(problem: Problem, values: Mapping[str, Value]) -> Problem:
 
 def _filled(bare: LiveModel, moving: Problem, result: Result, values: Mapping[str, Value]) -> LiveModel:
     model = AffineModel(moving)
-    collected = _Collected(model, {decision.kind for decision in moving.decisions}, bare.file)
+    collected = _Collected(model, {decision.kind for decision in moving.decisions}, bare.file, result)
     curves = _curves(collected, result)
     measures = collected.measures()
     start = _vector(model.domains, [decision.start for decision in moving.decisions])
@@ -109,8 +109,9 @@ def _filled(bare: LiveModel, moving: Problem, result: Result, values: Mapping[st
 class _Collected:
     """Signals of a problem, each once, and what of its measures they say."""
 
-    def __init__(self, model: AffineModel, kinds: set[Kind], file: str) -> None:
+    def __init__(self, model: AffineModel, kinds: set[Kind], file: str, result: Result) -> None:
         self.model, self.kinds, self.file = model, kinds, file
+        self.decided = {found.name: found for found in result.limits}
         self.signals: dict[Measure, Signal] = {}
         self.unmoved: list[tuple[str, str]] = []
         self.asked: list[Measure | None] = []
@@ -140,11 +141,16 @@ class _Collected:
         stays = not measure.channel.is_moved_by(self.kinds)
         is_affine = measure.is_mass or (measure.is_load and not measure.channel.feels_inertia)
         if not stays and not is_affine:
-            why = f"it is not affine in what is open, so it is not shown here; {HOW.format(file=self.file)}"
+            why = (
+                f"not affine in what is open, so the value is that of the design decided; {HOW.format(file=self.file)}"
+            )
             self.unmoved.append((name, why))
-            return []
-        self.asked.append(None if stays else measure)
+        self.asked.append(None if stays or not is_affine else measure)
         base = Shown(role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit))
+        if not stays and not is_affine:
+            known = self.decided.get(name)
+            base = replace(base, followed=False)
+            return [replace(base, value=known.value, sides=((known.side, known.limit),)) if known else base]
         if not stays:
             return [replace(base, signal=self.signal(measure))]
         if limit is None:

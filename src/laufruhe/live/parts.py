@@ -66,6 +66,8 @@ class Shown:
         Of what stays.
     met
         Whether what stays keeps the limit.
+    followed
+        Whether it is known of every design; else its value is that of the design decided.
     """
 
     role: str
@@ -78,6 +80,7 @@ class Shown:
     sides: tuple[tuple[str, float], ...] = ()
     value: float = 0.0
     met: bool = True
+    followed: bool = True
 
 
 @dataclass(frozen=True)

@@ -69,6 +69,7 @@ class Limits {
     const value = element("td", {}), edge = element("td", { class: "edge" }), bar = element("i"), met = element("span", { class: "live-met" });
     const root = element("tr", { "data-measure": measure.name }, element("th", { scope: "row" }, measure.name), value, edge,
       element("td", {}, element("span", { class: "live-gauge", "aria-hidden": "true" }, bar), met));
+    root.classList.toggle("aside", !measure.followed);
     return { measure, root, value, edge, bar, met };
   }
 
@@ -76,11 +77,11 @@ class Limits {
     this.rows.forEach((row, k) => {
       const { value, met, side } = found[k], { measure, root } = row;
       root.setAttribute("data-value", value);
-      root.setAttribute("data-met", met);
+      root.setAttribute("data-met", met ?? "");
       row.value.textContent = figure(value, measure);
       row.edge.textContent = side ? `${side[0]} ${trimmed(side[1] * measure.factor)} ${measure.shown}`.trimEnd() : "";
       row.bar.style.width = `${side && side[1] ? Math.min(100, (100 * value) / side[1]) : 0}%`;
-      row.met.textContent = met ? (measure.signal === null ? "kept, stays" : "kept") : "broken";
+      row.met.textContent = met === null ? "not followed" : met ? "kept" : "broken";
     });
   }
 }

@@ -99,7 +99,7 @@ class OverAngle extends Compared {
   constructor(signal, was, width) {
     super(signal, was);
     Object.assign(this, { wide: width - 64, isSigned: signal.parts === 1 });
-    this.root = picture(width, 300, "");
+    this.root = picture(width, 304, "");
     this.lines = signal.places.map((_, k) => line(`now ${colour(k)}`));
     this.before = line("was");
     this.top = label(46, 18, "", "end");
@@ -181,7 +181,7 @@ class Orders {
   constructor(signal, k, designs) {
     Object.assign(this, { signal, point: signal.points[k], scale: new Scale() });
     this.orders = this.counted(designs);
-    this.root = picture(420, 190, "");
+    this.root = picture(420, 194, "");
     this.width = 360 / this.orders.length;
     this.bars = this.orders.map((order, j) => this.column(order, j));
     this.top = label(40, 20, "", "end");

@@ -21,7 +21,7 @@ function measured(model, x) {
 
 /** How a value stands to a limit: the side that has least room, and whether it is kept. */
 function standing(measure, value) {
-  if (measure.signal === null) return { value, met: measure.met, side: measure.sides[0] ?? null };
+  if (measure.signal === null) return { value, met: measure.followed ? measure.met : null, side: measure.sides[0] ?? null };
   const rooms = measure.sides.map(([sense, edge]) => [(sense === "at most" ? edge - value : value - edge) / (Math.abs(edge) || 1), [sense, edge]]);
   const [room, side] = rooms.reduce((a, b) => (b[0] < a[0] ? b : a), [Infinity, null]);
   return { value, met: room >= -KEPT, side };
@@ -29,26 +29,28 @@ function standing(measure, value) {
 
 /** What is known of one design: objective, limits, and what is minimised after it. */
 function judged(model, values) {
-  const x = vectorOf(model, values), found = measured(model, x);
+  return judgedAt(model, vectorOf(model, values));
+}
+
+function judgedAt(model, x) {
+  const found = measured(model, x);
   const at = (role) => model.measures.map((measure, k) => ({ measure, value: found[k] })).filter(({ measure }) => measure.role === role);
   const terms = at("objective");
   return {
     x,
-    objective: terms.length ? terms.reduce((sum, { measure, value }) => sum + measure.weight * value, 0) : null,
+    objective: terms.length && terms.every(({ measure }) => measure.followed) ? terms.reduce((sum, { measure, value }) => sum + measure.weight * value, 0) : null,
     limits: at("limit").map(({ measure, value }) => standing(measure, value)),
     ranks: at("rank"),
   };
 }
 
-/** Largest relative difference between the page's own numbers and those of the exact model. */
+/** Largest difference between the page's own numbers and those of the exact model, over the largest of each measure. */
 function difference(model) {
-  let most = 0;
-  for (const { x, measured: told } of Object.values(model.designs)) {
-    measured(model, Float64Array.from(x)).forEach((value, k) => {
-      if (told[k] !== null) most = Math.max(most, Math.abs(value - told[k]) / (Math.abs(told[k]) || 1));
-    });
-  }
-  return most;
+  const designs = Object.values(model.designs).map(({ x, measured: told }) => [measured(model, Float64Array.from(x)), told]);
+  return largest(model.measures.map((_, k) => {
+    const known = designs.filter(([, told]) => told[k] !== null), size = largest(known.map(([, told]) => Math.abs(told[k])));
+    return largest(known.map(([own, told]) => Math.abs(own[k] - told[k]) / (size || 1)));
+  }));
 }
 
 /** Number of the curve that the objective is of; else the first. */
@@ -75,6 +77,7 @@ class Page {
     this.optimum = this.known("optimum");
     this.given = this.known("given");
     this.bound = this.model.proved;
+    this.size = largest(Object.values(this.model.designs).map(({ x }) => judgedAt(this.model, Float64Array.from(x)).objective ?? 0));
     // the address is that of the first model, whatever was moved since stays
     this.values = fitting(this.model, this.history ? this.values : fromAddress() ?? {}, this.optimum ?? this.given);
     this.history = new History({ ...this.values });
@@ -157,6 +160,7 @@ class Page {
       ["orders", `Amplitude by order [${signal.shown}]`, orders.root],
     ].filter(Boolean);
     const legend = element("p", { class: "live-legend", "aria-hidden": "true" }, ...signal.places.map((name, k) => element("span", { class: colour(k) }, name)));
+    legend.hidden = signal.places.length < 2;
     this.figures.replaceChildren(legend, ...boxes.map(([key, title, root]) => element("figure", { "data-figure": key, class: `live-figure ${key}` }, element("figcaption", {}, title), root)));
     const forces = [polar, over, bars].filter(Boolean);
     return {
@@ -247,7 +251,7 @@ class Page {
     const found = judged(model, values);
     this.found = found;
     this.sliders.forEach((slider) => slider.show(values[slider.field.name]));
-    this.value.textContent = found.objective === null ? "" : figure(found.objective, model.objective);
+    this.value.textContent = found.objective === null ? "" : this.told(found.objective);
     this.value.setAttribute("data-value", found.objective ?? "");
     this.showRegret(found);
     this.limits.update(found.limits);
@@ -263,19 +267,42 @@ class Page {
     const more = broken.length > 2 ? ` and ${broken.length - 2} more` : "";
     const limits = broken.length ? `Breaks ${broken.slice(0, 2).join(", ")}${more}. ` : "";
     if (!bound || found.objective === null) { this.regret.textContent = limits; return; }
-    const share = bound.value > 0 ? found.objective / bound.value - 1 : found.objective - bound.value;
-    const proof = bound.kind === "global" ? "proven" : bound.kind === "global within gap" ? `proven to ${trimmed(100 * bound.gap, 2)} %` : "a local one";
-    const away = bound.value > 0 ? percent(share) : figure(share, model.objective);
-    const best = `the optimum of ${figure(bound.value, model.objective)} (${proof})`;
+    const share = this.isNothing(bound.value) ? found.objective - bound.value : found.objective / bound.value - 1;
     this.regret.setAttribute("data-value", share);
-    const isThere = Math.abs(found.objective - bound.value) <= AT * Math.abs(bound.value);
-    this.regret.textContent = limits + (isThere ? `${limits ? "As much as" : "This is"} ${best}.` : `${away} against ${best}.`);
+    this.regret.textContent = `${limits}${this.against(found.objective, share, limits !== "")}`;
+  }
+
+  /** How the objective stands to the proven one. */
+  against(value, share, isBroken) {
+    const { bound, model } = this, best = `the optimum of ${this.told(bound.value)} (${proofWords(bound)})`;
+    const unknown = model.measures.filter((measure) => !measure.followed).map((measure) => measure.name);
+    const aside = unknown.length ? ` Not followed here: ${unknown.join(", ")}.` : "";
+    if (this.isOptimum()) return `This is ${best}.`;
+    if (Math.abs(value - bound.value) <= AT * Math.abs(bound.value)) return `As much as ${best}.${aside}`;
+    if (share < 0 && (aside || isBroken)) return `Less than ${best}, which keeps all limits.${aside}`;
+    return `${this.isNothing(bound.value) ? `${this.told(share)} more than` : `${percent(share)} against`} ${best}.${aside}`;
+  }
+
+  /** The objective in words; what is a rounding beside the designs known is nothing. */
+  told(value) {
+    return figure(value, this.model.objective, 4, this.size);
+  }
+
+  isNothing(value) {
+    return value <= 1e-9 * this.size;
+  }
+
+  /** Whether the design is the one that was decided, but for roundings. */
+  isOptimum() {
+    const x = vectorOf(this.model, this.values), best = vectorOf(this.model, this.optimum ?? this.values);
+    const size = largest(this.model.sliders.map((slider) => slider.upper - slider.lower));
+    return this.optimum !== null && x.every((value, k) => Math.abs(value - best[k]) <= 1e-9 * size);
   }
 
   /** Names of the limits that are broken. */
   broken() {
     const limits = this.model.measures.filter((measure) => measure.role === "limit");
-    return limits.filter((_, k) => !this.found.limits[k].met).map((measure) => measure.name);
+    return limits.filter((_, k) => this.found.limits[k].met === false).map((measure) => measure.name);
   }
 
   sentence() {
@@ -368,6 +395,12 @@ class Page {
 /** SI unit, the one that is shown, and its factor. */
 function unitOf({ unit, shown, factor }) {
   return { unit, shown, factor };
+}
+
+/** What was proven of an optimum. */
+function proofWords({ kind, gap }) {
+  if (kind === "global") return "proven";
+  return kind === "global within gap" ? `proven to ${trimmed(100 * gap, 2)} %` : "a local one";
 }
 
 /** Names that have the same to be said of them. */
