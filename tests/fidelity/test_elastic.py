@@ -88,7 +88,7 @@ def test_automatic_on_ready_engines(path: Path, tolerance: float) -> None:
     _keeps_its_word(replace(_held(path), decisions=()), tolerance)
 
 
-@pytest.mark.parametrize("seed", first_fast(range(AUTOMATIC), 4))
+@pytest.mark.parametrize("seed", first_fast(range(AUTOMATIC), 4, long=range(10, AUTOMATIC)))
 def test_automatic_on_random_engines(seed: int) -> None:
     _keeps_its_word(random_elastic_problem(random.Random(700 + seed), gas=seed % 4 == 0), (3e-1, 3e-2)[seed % 2])
 

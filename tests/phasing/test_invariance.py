@@ -112,19 +112,22 @@ def same(folder, seed, **changed):
         assert after[2:] == before[2:]
 
 
+# of the seeds beyond the fast lane every other one is long
 IMAGES = [{"front": -1}, {"left": -1}, {"turned": True}, {"front": -1, "left": -1}]
-LONG = [*itertools.product((4, 9, 14, 24, 29), IMAGES), *((19, image) for image in IMAGES[:3])]
+IMAGED = list(itertools.product(range(30), IMAGES))
+LONG = [case for case in IMAGED if case[0] in (4, 14, 24) or (case[0] > 4 and case[0] % 2)]
 
 
-@pytest.mark.parametrize(("seed", "changed"), first_fast(itertools.product(range(30), IMAGES), 16, LONG))
+@pytest.mark.parametrize(("seed", "changed"), first_fast(IMAGED, 16, LONG))
 def test_mirrored_reversed_and_told_in_another_order(tmp_path, seed, changed):
     same(tmp_path, seed, **changed)
 
 
 SIZES = [{key: 10.0**power} for power in (-6, 6, -3, 3) for key in ("mass", "length", "speed")]
-LARGE = [*((4, size) for size in SIZES), *((9, size) for size in SIZES[2:])]
+SIZED = list(itertools.product(range(10), SIZES))
+LARGE = [case for case in SIZED if case[0] in (3, 4, 5, 7, 9)]
 
 
-@pytest.mark.parametrize(("seed", "changed"), first_fast(itertools.product(range(10), SIZES), 24, LARGE))
+@pytest.mark.parametrize(("seed", "changed"), first_fast(SIZED, 24, LARGE))
 def test_in_other_sizes(tmp_path, seed, changed):
     same(tmp_path, seed, **changed)

@@ -23,6 +23,7 @@ from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
@@ -36,8 +37,8 @@ Array = NDArray[np.float64]
 REFERENCE_STEPS = 1440
 """Steps over the period at which the optimum beside which a regret is counted is solved."""
 REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"
-STARS_ON_OPEN_MOUNTS = 2
-"""Each of them takes a joint solve, at every fidelity."""
+STARTS_OF_MOUNTS, STARS_ON_OPEN_MOUNTS = 3, 2
+"""Each of them takes a search, at every fidelity."""
 _LEAST_TIME, _MOST_REPEATS = 0.02, 50
 
 
@@ -162,15 +163,17 @@ def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
     """The best engine at a fidelity; None where it decides nothing, or finds no design within the limits (F14).
 
     Unbalances alone are decided at `samples` steps over the period of the loads, without
-    refinement. Open stars and mounts are solved as `solve` does, of the latter one start, of
-    both together the stars that rank first.
+    refinement. Open stars and mounts are solved as `solve` does, of the latter a few starts, of
+    both together the stars that rank first. Boxes that prove no more than a design are left out.
     """
     try:
         if problem.phasing is None and len(problem.unbalances) == len(problem.decisions):
             model = AffineModel(problem)
             x = solve_cones(model.at(samples or model.full_samples)).x
             return None if x is None else problem.design([domain.complex_value(x) for domain in model.domains])
-        one = replace(problem, search=replace(problem.search, starts=1))
+        boxes = problem.search.boxes if any(d.kind is Kind.PLACE for d in problem.decisions) else 0
+        starts = min(problem.search.starts, STARTS_OF_MOUNTS)
+        one = replace(problem, search=replace(problem.search, starts=starts, boxes=boxes))
         if one.phasing is not None and one.mount_decisions:
             one = replace(one, phasing=replace(one.phasing, best=STARS_ON_OPEN_MOUNTS))
         result = solve(one)

@@ -1,0 +1,223 @@
+"""What processor time grows with: one design evaluated, unbalances decided, stars searched, stiffness decided.
+
+Writes results/benchmarks/growth.md. Each size is one solve of a process of its own kind; exponents are fitted
+to the larger half of the sizes. `--quick` takes the smaller half.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pages import PAGES, publish
+
+from laufruhe import load, solve
+from laufruhe.physics.shaking_loads import forget
+from laufruhe.problem.evaluation import evaluate, objective_value
+
+OUT = PAGES / "growth.md"
+# an evaluation is repeated for so long [s], and the least of so many rounds is taken
+LONG_ENOUGH, ROUNDS = 0.03, 5
+ELASTIC_SPRINGS = 6
+
+
+def scene(
+    cylinders: int = 4, *, counterweights: int = 0, shafts: int = 2, points: int = 1, mounts: int = 4,
+    samples: int | None = None, orders: int | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """A row of cylinders on rigid mounts; every counterweight has two open numbers, every shaft one."""
+    length = 0.125 * cylinders
+    tables: dict[str, Any] = {
+        "title": "row",
+        "engine": {
+            "layout": "inline", "cycle": "four-stroke", "cylinders": cylinders, "stroke": "120 mm", "rod_ratio": 0.26,
+            "reciprocating_mass": "1.25 kg", "cylinder_spacing": "125 mm",
+            "throws": [round(137.5 * k % 360.0, 1) for k in range(cylinders)],
+        },
+        "operating_points": [{"name": f"p{k}", "speed": f"{800 + 3000 * k / points:.3f} rpm"} for k in range(points)],
+        "mounts": {"positions": [
+            [f"{length * math.cos(a):.6f} m", f"{0.3 * math.sin(a):.6f} m", "0 m"]
+            for a in 2.0 * math.pi * (np.arange(mounts) + 0.5) / mounts
+        ]},
+        "counterweights": [
+            {"name": f"w{k}", "x": f"{length * (k / max(counterweights - 1, 1) - 0.5):.6f} m", "radius": "80 mm",
+             "mass": {"between": ["0 kg", "3 kg"]}, "angle": {"between": [0, 360]}}
+            for k in range(counterweights)
+        ],
+        "balancer_shafts": [
+            {"name": f"s{k}", "ratio": (2, -2, 1, -1)[k % 4], "position": [f"{100 - 200 * (k % 2)} mm", "-100 mm"],
+             "unbalances": [{"x": f"{length * (k / max(shafts - 1, 1) - 0.5):.6f} m", "radius": "20 mm",
+                             "unbalance": {"between": ["0 kg m", "0.05 kg m"]}, "angle": {"between": [0, 360]}}]}
+            for k in range(shafts)
+        ],
+        "objective": {"minimise": "mean mount force"},
+    }  # fmt: skip
+    fidelity = {k: v for k, v in (("samples", samples), ("orders", orders)) if v is not None}
+    return {**{k: v for k, v in tables.items() if v}, **({"fidelity": fidelity} if fidelity else {})}
+
+
+def star(cylinders: int) -> dict[str, Any]:
+    """Crank and firing order open."""
+    engine = {**scene(cylinders)["engine"], "throws": "open", "firing_order": "open"}
+    points = [{"speed": "600 rpm"}]
+    return {
+        "title": "star", "engine": engine, "operating_points": points, "phasing": {"best": 8},
+        "objective": {"minimise": "rms rocking couple", "orders": [1, 2]},
+    }  # fmt: skip
+
+
+def elastic(springs: int, points: int = 1, cylinders: int = 4) -> dict[str, Any]:
+    """So many open stiffnesses of four mounts."""
+    left = iter(range(springs))
+    places = []
+    for k, (x, y) in enumerate([(0.3, 0.2), (0.32, -0.22), (-0.4, 0.2), (-0.38, -0.21)]):
+        numbers = ["200 N/mm", "200 N/mm", "700 N/mm"]
+        stiffness = [
+            {"between": ["60 N/mm", "1200 N/mm"], "start": number} if next(left, None) is not None else number
+            for number in numbers
+        ]
+        places.append({"name": f"m{k}", "position": [f"{x} m", f"{y} m", "0 m"], "stiffness": stiffness})
+    tables = scene(cylinders, shafts=0, points=points)
+    engine = {**tables["engine"], "throws": [0, 180, 180, 0], "bore": "100 mm", "firing_order": [1, 3, 4, 2]}
+    return {
+        **tables, "engine": engine,
+        "gas": {"model": "wiebe", "imep": "5.5 bar", "start": -5, "duration": 50, "compression_ratio": 17},
+        "block": {"mass": "420 kg", "centre_of_gravity": ["-60 mm", "0 mm", "120 mm"],
+                  "inertia": ["27 kg m^2", "62 kg m^2", "50 kg m^2"]},
+        "mounts": {"kind": "elastic", "loss_factor": 0.1, "places": places},
+        "objective": {"minimise": "rms mount force", "orders": [2, 4]},
+        "constraints": [{"limit": "static sag", "max": "6 mm"}],
+        "search": {"starts": 8},
+    }  # fmt: skip
+
+
+def evaluated(tables: dict[str, Any]) -> float:
+    """Seconds of one evaluation from nothing, the least of several."""
+    problem = load(tables)
+
+    def work() -> float:
+        forget()
+        return objective_value(problem, evaluate(problem))
+
+    work()
+    best = math.inf
+    for _ in range(ROUNDS):
+        began, count = time.process_time(), 0
+        while time.process_time() - began < LONG_ENOUGH:
+            work()
+            count += 1
+        best = min(best, (time.process_time() - began) / count)
+    return best
+
+
+def solved(tables: dict[str, Any]) -> float:
+    """Seconds of one solve."""
+    problem = load(tables)
+    began = time.process_time()
+    result = solve(problem)
+    assert result.objective is not None, result.message
+    return time.process_time() - began
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What grows with what."""
+
+    what: str
+    by: str
+    sizes: Sequence[int]
+    tables: Callable[[int], dict[str, Any]]
+    measured: Callable[[dict[str, Any]], float]
+    grows_by_factor: bool = False
+
+
+SWEEPS = (
+    Sweep("evaluate", "cylinders", (1, 3, 6, 12, 24, 48), lambda n: scene(n, samples=720), evaluated),
+    Sweep("evaluate", "orders kept", (2, 4, 8, 16, 32), lambda n: scene(samples=720, orders=n), evaluated),
+    Sweep("evaluate", "samples", (360, 720, 1440, 2880, 5760), lambda n: scene(samples=n), evaluated),
+    Sweep("evaluate", "mounts", (4, 8, 16, 32, 64), lambda n: scene(mounts=n, samples=720), evaluated),
+    Sweep("evaluate", "operating points", (1, 3, 10, 30, 100), lambda n: scene(points=n, samples=720), evaluated),
+    Sweep("evaluate", "shafts", (2, 6, 16, 50), lambda n: scene(shafts=n, samples=720), evaluated),
+    Sweep("solve unbalances", "cylinders", (1, 3, 6, 12, 24, 48), lambda n: scene(n), solved),
+    Sweep("solve unbalances", "orders kept", (2, 4, 8, 16, 32), lambda n: scene(orders=n), solved),
+    Sweep("solve unbalances", "samples", (360, 720, 1440, 2880), lambda n: scene(samples=n), solved),
+    Sweep("solve unbalances", "operating points", (1, 3, 10, 30, 100), lambda n: scene(points=n), solved),
+    Sweep("solve unbalances", "shafts", (2, 6, 16, 50), lambda n: scene(shafts=n), solved),
+    Sweep("solve unbalances", "counterweights", (2, 6, 16, 50), lambda n: scene(shafts=0, counterweights=n), solved),
+    Sweep("search stars", "cylinders", (4, 5, 6, 7, 8, 9, 10, 12), star, solved, True),
+    Sweep("decide stiffness", "springs", (1, 2, 4, 6, 9, 12), elastic, solved),
+    Sweep("decide stiffness", "operating points", (1, 2, 4, 8, 16), lambda n: elastic(ELASTIC_SPRINGS, n), solved),
+)  # fmt: skip
+LARGE = (
+    ("48 cylinders, two shafts open, one point", lambda: scene(48)),
+    ("48 cylinders, 50 unbalances open, one point", lambda: scene(48, shafts=0, counterweights=50)),
+    ("4 cylinders, two shafts open, 100 points", lambda: scene(points=100)),
+    ("12 cylinders, 50 unbalances open, 10 points", lambda: scene(12, shafts=0, counterweights=50, points=10)),
+)
+
+
+def exponent(sizes: Sequence[int], times: Sequence[float]) -> float:
+    """Of the larger half, by least squares of the logarithms."""
+    first = len(sizes) // 2 - (len(sizes) == 2)
+    slope = np.polyfit(np.log(sizes[first:]), np.log(times[first:]), 1)[0]
+    return float(slope)
+
+
+def factor(sizes: Sequence[int], times: Sequence[float]) -> float:
+    """For each further one, over the larger half."""
+    first = len(sizes) // 2
+    return float(np.exp(np.polyfit(sizes[first:], np.log(times[first:]), 1)[0]))
+
+
+def told(seconds: float) -> str:
+    """With a unit that reads well."""
+    return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
+
+
+def main() -> None:
+    """Measure one sweep after the other."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true")
+    quick = parser.parse_args().quick
+    if hasattr(os, "sched_setaffinity"):
+        # one processor: what is measured is work, not how it is shared
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    for tables in (scene(), elastic(2)):
+        # libraries are loaded before the clock starts
+        solved(tables)
+    lines = [
+        "# What cost grows with",
+        "",
+        "Processor time of one process; libraries are loaded before. Rows of cylinders without gas on four rigid",
+        "mounts, two shafts of open size and angle, unless the column says otherwise; stars by the rms rocking",
+        "couple; stiffness on elastic mounts with gas, and six springs where points grow. Exponents are fitted to the",
+        "larger half of the sizes; of stars the factor for each further cylinder.",
+        "",
+        "| what | grows with | sizes | processor time | exponent |",
+        "| --- | --- | --- | --- | ---: |",
+    ]
+    for sweep in SWEEPS:
+        sizes = sweep.sizes[: (len(sweep.sizes) + 1) // 2 + 1] if quick else sweep.sizes
+        times = [sweep.measured(sweep.tables(n)) for n in sizes]
+        power = f"x {factor(sizes, times):.2f}" if sweep.grows_by_factor else f"{exponent(sizes, times):.2f}"
+        lines.append(
+            f"| {sweep.what} | {sweep.by} | {', '.join(map(str, sizes))} | {', '.join(map(told, times))} | {power} |"
+        )
+        print(lines[-1], flush=True)
+    lines += ["", "## What to expect of large problems", "", "| problem | evaluate | solve, with proof |"]
+    lines.append("| --- | ---: | ---: |")
+    for name, make in () if quick else LARGE:
+        tables = make()
+        lines.append(f"| {name} | {told(evaluated(tables))} | {told(solved(tables))} |")
+        print(lines[-1], flush=True)
+    publish(OUT, "\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
