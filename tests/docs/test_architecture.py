@@ -1,0 +1,44 @@
+"""The page of the architecture, and the guide of contributors, say of methods, rooms and files what is so."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from laufruhe.solvers import METHODS
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+GUIDE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+SOURCE = ROOT / "src" / "laufruhe"
+
+
+def first_cells(head: str) -> list[str]:
+    """Of the rows under a head of the page."""
+    rows = PAGE[PAGE.index(head) :].split("\n\n")[0].splitlines()[2:]
+    return [row.split("|")[1].strip() for row in rows]
+
+
+def layers() -> list[set[str]]:
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    rooms = next(each["layers"] for each in contracts if each.get("containers") == ["laufruhe"])
+    return [set(re.findall(r"\w+", layer)) for layer in rooms]
+
+
+def test_methods_stand_in_the_order_in_which_they_are_asked() -> None:
+    assert first_cells("| method | may be open together") == [method.name for method in METHODS]
+
+
+def test_rooms_stand_in_the_order_of_their_imports() -> None:
+    assert [set(re.findall(r"\w+", cell)) for cell in first_cells("| room | what is in it |")] == layers()
+    (chain,) = re.findall(r"^ +(cli -> .*)$", GUIDE, re.MULTILINE)
+    assert [set(re.findall(r"\w+", part)) for part in chain.split(" -> ")] == layers()
+
+
+def test_files_that_are_named_are_there() -> None:
+    for page in (PAGE, GUIDE):
+        for path in re.findall(r"`((?:[a-z_]+/)+[a-z_]+\.py)`", page):
+            assert (SOURCE / path).is_file() or (ROOT / path).is_file(), path
