@@ -99,3 +99,15 @@ def test_a_page_may_end_by_itself() -> None:
     assert done.returncode == 0
     assert done.stdout.startswith(f"{LANCHESTER}: http://127.0.0.1:")
     assert done.stderr == ""
+
+
+def test_a_browser_is_started_with_a_ticket_and_not_with_the_token(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda address: bool(opened.append(address)))
+    result = CliRunner().invoke(app, ["page", str(LANCHESTER), "--for", "0.3"])
+    assert result.exit_code == 0
+    assert "No browser could be started" in result.stderr
+    token = result.stdout.partition("#t=")[2].split()[0]
+    assert len(opened) == 1
+    assert token not in opened[0]
+    assert opened[0].partition("#o=")[0] == result.stdout.partition(": ")[2].partition("#t=")[0]

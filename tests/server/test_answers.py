@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from laufruhe.files.reader import load, tables_of
 from laufruhe.server import answers
 from laufruhe.server.answers import Source
 from laufruhe.server.asked import Asked, Edit
+from laufruhe.solvers.result import Status
 from problem_files import PROBLEMS
 
 LANCHESTER, VEE = PROBLEMS / "tractor-four-lanchester.toml", PROBLEMS / "vee-eight-open.toml"
@@ -67,6 +69,29 @@ def test_a_model_is_sent_once_and_again_where_loads_are_others() -> None:
     faster = follow(LANCHESTER, has=first["key"], edits=(Edit("set", "operating_points.1.speed", "3000 rpm"),))
     assert faster["model"]["designs"]["given"] != first["model"]["designs"]["given"]
     assert faster["optimum"]["value"] > first["optimum"]["value"]
+
+
+@pytest.mark.parametrize(
+    ("name", "but"),
+    [
+        ("tractor-four-lanchester", []),
+        ("study-soft-mounts", ["what loads are not affine in held as given"]),
+        ("tractor-four-robust", ["no tolerances"]),
+        ("single-three-balances", ["the first objective alone"]),
+    ],
+)
+def test_what_is_left_out_while_sliders_move_is_said(name: str, but: list[str]) -> None:
+    assert follow(PROBLEMS / f"{name}.toml")["but"] == but
+
+
+def test_a_design_that_breaks_a_limit_is_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = laufruhe.solve(PROBLEMS / "tractor-single.toml")
+    broken = replace(result, status=Status.FAILED, message="the best design found breaks 'sag'")
+    monkeypatch.setattr(answers, "solve", lambda *_, **__: broken)
+    found = settle(PROBLEMS / "tractor-single.toml")
+    assert found["optimum"] is None
+    assert found["status"] == "failed"
+    assert "breaks 'sag'" in found["message"]
 
 
 def test_limits_that_contradict_each_other_are_named() -> None:
@@ -134,7 +159,7 @@ def test_a_crank_is_ranked_held_and_chosen() -> None:
     found = settle(VEE)
     assert len(found["ranking"]) == 5
     assert found["optimum"]["value"] == pytest.approx(found["ranking"][0]["value"], rel=1e-4)
-    held = tuple(Edit(*edit) for edit in found["held"])
+    held = tuple(Edit(*edit) for edit in found["holds"])
     following = follow(VEE, held=held)["optimum"]
     assert following["bound"] <= found["optimum"]["value"] <= following["value"] * (1 + 1e-3)
     second = found["ranking"][1]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import json
 import math
 import time
@@ -19,27 +18,23 @@ from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
 from laufruhe.files.reader import load_tables
 from laufruhe.files.toml_text import toml_text
-from laufruhe.live import live_model
 from laufruhe.present.numbers import figure
 from laufruhe.present.pictures import PICTURES
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import NO_TOLERANCES
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import Proof
 from laufruhe.server import told
 from laufruhe.server.asked import CRANK, Asked, Edit
 from laufruhe.server.controls import as_json, controls_of, offered_by, typed
-from laufruhe.server.drawing import drawing_of
 from laufruhe.server.front import Front, partners, places
 from laufruhe.server.held import held_by, ranking_of
-from laufruhe.solvers import solve, state
-from laufruhe.solvers.conclusion import Shown, concluded, decision_values, judged, limit_values
-from laufruhe.solvers.following import Followed, Follower, can_follow
-from laufruhe.solvers.result import LimitValue, Result
+from laufruhe.server.scenes import Scene, key_of, scene_of
+from laufruhe.solvers import kinds_of, solve
+from laufruhe.solvers.conclusion import decision_values, limit_values
+from laufruhe.solvers.following import Followed
+from laufruhe.solvers.result import LimitValue, Result, Status
 from laufruhe.units import readable
 
-_SIDES = ("max", "min", "outside")
-_KEPT_SCENES = 6
 ROUNDING = 1e-5
 """Share of the objective that a program at few angles does not tell from nothing."""
 
@@ -52,55 +47,8 @@ class Source:
     path: Path
 
 
-class Scene:
-    """A problem but for its limits: what is drawn of it, and what follows a limit that slides.
-
-    Where something is open that loads are not affine in, it stays as given.
-    """
-
-    def __init__(self, problem: Problem, key: str) -> None:
-        self.key, self.whole = key, problem
-        self.problem = problem if can_follow(problem) else replace(
-            problem, phasing=None, over=None, assembly=None, tolerances=NO_TOLERANCES, decisions=problem.unbalances
-        )  # fmt: skip
-        self.given = state(self.problem, to_start_from=True)
-        self.follower: Follower | None = None
-        if can_follow(self.problem) and not self.given.final.resonance:
-            try:
-                self.follower = Follower(self.problem)
-            except ModelError:
-                # an engine on mounts in time has no loads that are affine in anything
-                self.follower = None
-
-    def drawn(self, found: Followed | None) -> dict[str, Any]:
-        """What the page draws from, with the optimum where it is known; why there is nothing to slide else."""
-        result = self.given
-        if found is not None and not found.conflict:
-            shown = Shown(found.bound, Reach.WHOLE, 0.0, "second-order cones at few angles")
-            result = concluded(judged(self.problem, found.values), self.given.final, shown, {})
-        model = live_model(self.whole, result)
-        about = {"engine": drawing_of(self.problem), "partners": list(partners(self.problem))}
-        return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
-
-
-_scenes: dict[str, Scene] = {}
 _fronts: dict[str, object] = {}
 _solved: dict[str, Result] = {}
-
-
-def _scene(problem: Problem, key: str) -> Scene:
-    if key not in _scenes:
-        while len(_scenes) >= _KEPT_SCENES:
-            _scenes.pop(next(iter(_scenes)))
-        _scenes[key] = Scene(problem, key)
-    return _scenes[key]
-
-
-def _key(tables: Mapping[str, Any]) -> str:
-    """Of all but where limits stand."""
-    limits = [{k: v for k, v in entry.items() if k not in _SIDES} for entry in tables.get("constraints", [])]
-    text = json.dumps({**tables, "constraints": limits}, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 @lru_cache(maxsize=4)
@@ -169,17 +117,20 @@ def follow(source: Source, asked: Asked) -> str:
     def found() -> dict[str, Any]:
         began = time.perf_counter()
         tables, problem = _asked_about(source, asked, with_held=True)
-        scene = _scene(problem, _key(tables))
+        scene = scene_of(problem, tables)
         follows = scene.follower.at(problem.limits) if scene.follower else None
         own: dict[str, Any] = {"key": scene.key, "stage": "following" if follows else "given"}
+        own["but"] = list(scene.simplified(bool(asked.held)))
         if asked.has != scene.key:
             own |= scene.drawn(follows)
-        if follows is None:
+        if follows is None or follows.conflict:
             standing = () if scene.given.final.resonance else limit_values(problem, scene.given.final)
             own |= {"optimum": None, "limits": told.limits(standing, problem)}
-            if scene.given.objective:
-                own["given"] = told.figures(scene.given.objective.value, problem)
-        else:
+        if follows is None and scene.given.objective:
+            own["given"] = told.figures(scene.given.objective.value, problem)
+        elif follows is not None and follows.conflict:
+            own["conflict"] = list(follows.conflict)
+        elif follows is not None:
             own |= _followed(follows, problem, scene)
         return {**own, "milliseconds": 1e3 * (time.perf_counter() - began)}
 
@@ -187,25 +138,24 @@ def follow(source: Source, asked: Asked) -> str:
 
 
 def _followed(found: Followed, problem: Problem, scene: Scene) -> dict[str, Any]:
-    given = scene.given.final
-    if found.conflict:
-        standing = told.limits(limit_values(problem, given), problem)
-        return {"optimum": None, "conflict": list(found.conflict), "limits": standing}
     limits = [
-        LimitValue(x.name, value, x.maximum, x.measure.unit, *_price(x, price, found))
-        if x.maximum < math.inf and math.isfinite(value)
-        else limit_values(problem.changed(limits=(x,)), given)[0]
+        _standing(x, value, price, found, scene)
         for x, value, price in zip(problem.limits, found.standing, found.prices, strict=True)
     ]
-    proof = "global" if found.gap <= problem.tolerance else "global within gap"
-    own = told.optimum(scene.problem, found.values, found.value, found.bound, found.gap, proof)
+    # at few angles nothing is proven but the bound
+    own = told.optimum(scene.problem, found.values, found.value, found.bound, found.gap, str(Proof.WITHIN_GAP))
     return {"optimum": own, "limits": told.limits(limits, problem)}
 
 
-def _price(limit: Limit, price: float, found: Followed) -> tuple[bool, float]:
-    """Whether a limit is active, and its price: one that would not move the objective by its rounding is none."""
-    active = price * limit.maximum > ROUNDING * found.value
-    return active, price if active else 0.0
+def _standing(limit: Limit, value: float, price: float, found: Followed, scene: Scene) -> LimitValue:
+    """How a design that follows stands to a limit; no number where only the whole solve tells."""
+    if math.isfinite(value) and limit.maximum < math.inf:
+        # a price that would not move the objective by its rounding is none
+        active = price * limit.maximum > ROUNDING * found.value
+        return LimitValue(limit.name, value, limit.maximum, limit.measure.unit, active, price if active else 0.0)
+    (given,) = limit_values(scene.problem.changed(limits=(limit,)), scene.given.final)
+    moves = limit.measure.channel.is_moved_by(kinds_of(scene.problem))
+    return replace(given, value=math.nan, active=False, shadow_price=math.nan) if moves else given
 
 
 def settle(source: Source, asked: Asked, seconds: float) -> str:
@@ -258,9 +208,10 @@ def _settled(result: Result, tables: Mapping[str, Any]) -> dict[str, Any]:
         "limits": told.limits(result.limits, problem),
         "optimum": None,
         "ranking": ranking_of(result),
-        "held": held_by(result, tables),
+        "holds": held_by(result, tables),
     }
-    if result.objective is not None and own is not None:
+    designed = result.status in (Status.OPTIMAL, Status.FEASIBLE)
+    if designed and result.objective is not None and own is not None:
         found["optimum"] = {
             **told.optimum(problem, (), result.objective.value, own.lower_bound, own.gap, str(own.kind)),
             "design": {entry.name: entry.value for entry in result.decisions},
@@ -271,9 +222,9 @@ def _settled(result: Result, tables: Mapping[str, Any]) -> dict[str, Any]:
 
 def _front(source: Source, asked: Asked, across: str) -> Front:
     tables, whole = _asked_about(source, asked, with_held=True)
-    problem = replace(_scene(whole, _key(tables)).problem, limits=whole.limits)
+    problem = replace(scene_of(whole, tables).problem, limits=whole.limits)
     limits = tuple((limit.name, limit.maximum) for limit in problem.limits)
-    key = f"{_key(tables)} {across} {limits}"
+    key = f"{key_of(tables)} {across} {limits}"
     if _fronts.get("key") != key:
         own = partners(problem)
         if across not in own:

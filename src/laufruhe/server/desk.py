@@ -102,14 +102,6 @@ class Desk:
                 workers.shutdown(wait=False, cancel_futures=True)
                 self._workers, self._busy = None, False
 
-    def drop(self) -> None:
-        """Nobody wants an answer any more."""
-        with self._changed:
-            self._newest += 1
-            if self._busy:
-                self._end(self._workers)
-            self._changed.notify_all()
-
     def close(self) -> None:
         """End the process at once."""
         with self._changed:

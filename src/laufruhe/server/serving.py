@@ -14,7 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, ParamSpec
 
-from laufruhe.errors import Complaint, InputError, SolverError
+from laufruhe.errors import Complaint, InputError, SolverError, printed
 from laufruhe.files.complaints import Refused
 from laufruhe.live import page_assets
 from laufruhe.present.pictures import PICTURES
@@ -60,7 +60,6 @@ class Page:
             "/save": self._asked(self._follow, FOLLOWED, answers.save),
             "/front": self._fronted,
             "/pictures": self._pictured,
-            "/rest": self._rested,
             "/events": lambda _: Answer(lines=self._events()),
         }
 
@@ -117,12 +116,6 @@ class Page:
 
         return answer
 
-    def _rested(self, _: Any) -> Answer:
-        """Nobody looks at a front, or waits for a search, any more."""
-        self._front.drop()
-        self._settle.drop()
-        return Answer("{}")
-
     def _fronted(self, body: Any) -> Answer:
         across = body.pop("across", None) if isinstance(body, dict) else None
         try:
@@ -174,6 +167,11 @@ def _worked(work: Callable[[], str]) -> Answer:
     except BrokenExecutor:
         text = "the process that solves has ended, most likely for want of memory; it is started again"
         return Answer(json.dumps({"error": text}))
+    except Exception as error:
+        # a fault of the program; the page stays, and the next state is another
+        return Answer(
+            json.dumps({"error": printed(f"this state cannot be worked out: {type(error).__name__}: {error}")})
+        )
 
 
 def _wrong(complaint: Complaint) -> Answer:

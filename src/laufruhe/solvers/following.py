@@ -59,9 +59,13 @@ class Followed:
 def can_follow(problem: Problem) -> bool:
     """Whether all that is open is what loads are affine in, of the drawing, and a norm of theirs is minimised."""
     kinds = {decision.kind for decision in problem.decisions}
+    channels = [measure.channel for measure in problem.measures]
     told = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
     alone = problem.over is None and problem.assembly is None and problem.phasing is None
-    return bool(kinds) and kinds <= _FOLLOWED and told and alone
+    # inertias follow the masses of pistons, and numbers of mounts their loads
+    bent = Kind.PISTON in kinds and any(channel.feels_inertia or channel.is_number for channel in channels)
+    affine = not bent and not any(channel.of_loads for channel in channels)
+    return bool(kinds) and kinds <= _FOLLOWED and told and alone and affine
 
 
 class Follower:

@@ -29,6 +29,18 @@ export function address(key, value) {
   history.replaceState(null, "", `#${keys}`);
 }
 
+/**
+ * What was changed in the state of another time, or of a link.
+ * @returns {[string, string, any][]}
+ */
+export function recalled() {
+  try {
+    return JSON.parse(addressed().get("e") || "[]");
+  } catch {
+    return [];
+  }
+}
+
 /** Take the token out of the address, or out of what this tab keeps, so that a link that is handed on has none. */
 export async function enter() {
   const keys = addressed();

@@ -1,5 +1,5 @@
 // The page of a problem: what is asked, when, and where answers are shown.
-import { address, addressed, ask, enter, Gone, listen, Refusal } from "./link.js";
+import { address, addressed, ask, enter, Gone, listen, recalled, Refusal } from "./link.js";
 import { Comparison } from "./compare.js";
 import { Controls } from "./controls.js";
 import { offerObjectives } from "./objectives.js";
@@ -10,8 +10,8 @@ import { Trade } from "./trade.js";
 import { byId, download, element } from "./parts.js";
 import { busy, complain, tellFile, tellGone, tellOptimum } from "./words.js";
 
-/** Milliseconds of rest after which the whole problem is solved. */
-const REST = 350;
+/** Milliseconds of rest after which the whole problem is solved, and before something is asked again. */
+const [REST, RETRY, MOST_RETRIES] = [350, 100, 3];
 const CRANK = ["star", "crank"];
 
 /** @typedef {import("./controls.js").Edit} Edit */
@@ -35,6 +35,7 @@ const state = {
   resting: 0,
   writing: 0,
   serial: 0,
+  dropped: 0,
   /** Whether a design was set by the page and not by the user. */
   setting: false,
 };
@@ -96,13 +97,21 @@ async function follow() {
   const from = inputAt;
   inputAt = 0;
   state.serial += 1;
+  state.dropped = 0;
   try {
     const answer = await ask("follow", asked());
     if (!answer.dropped) await show(answer);
+    // another page of this server was faster
+    else setTimeout(follow, RETRY);
     if (from) requestAnimationFrame(() => setTimeout(() => latencies.push(performance.now() - from)));
     rest();
   } catch (error) {
     failed(error);
+    if (error instanceof Refusal && state.held.length) {
+      // what was held may be what no longer fits
+      state.held = [];
+      state.again = true;
+    }
   }
   state.asking = false;
   if (state.again) {
@@ -122,7 +131,9 @@ async function settle() {
   const stop = busy(state.optimum);
   try {
     const answer = await ask("settle", { edits: [...state.edits.values()] });
-    if (!answer.dropped && mine === state.serial) await settled(answer);
+    if (mine !== state.serial) return;
+    if (!answer.dropped) await settled(answer);
+    else if (state.dropped++ < MOST_RETRIES) state.resting = setTimeout(settle, RETRY * 10 ** state.dropped);
   } catch (error) {
     if (mine === state.serial) failed(error);
   } finally {
@@ -136,15 +147,15 @@ async function settle() {
  */
 async function settled(answer) {
   crank.tell(answer.ranking, JSON.stringify(state.edits.get("star")?.[2] ?? answer.ranking[0]?.orders[0]?.star ?? ""));
-  const moved = JSON.stringify(answer.held) !== JSON.stringify(state.held);
+  const moved = JSON.stringify(answer.holds) !== JSON.stringify(state.held);
   if (answer.optimum && moved) {
-    state.held = answer.held;
+    state.held = answer.holds;
     const mine = state.serial;
     const model = await ask("follow", asked());
     if (mine !== state.serial) return;
     await show(model);
   }
-  answer.held.filter((/** @type {Edit} */ edit) => edit[0] === "fix").forEach((/** @type {Edit} */ edit) => controls.place(edit[1], parseFloat(edit[2])));
+  answer.holds.filter((/** @type {Edit} */ edit) => edit[0] === "fix").forEach((/** @type {Edit} */ edit) => controls.place(edit[1], parseFloat(edit[2])));
   tell(answer);
   pictures.offer(Boolean(answer.optimum));
   // where nothing slides they are all that there is to see
@@ -216,11 +227,6 @@ function failed(error) {
   if (error instanceof Gone) lost();
   else if (error instanceof Refusal) {
     complain(error.message);
-    if (state.held.length) {
-      // what was held may be what no longer fits
-      state.held = [];
-      state.again = true;
-    }
   } else throw error;
 }
 
@@ -275,16 +281,6 @@ async function events() {
   lost();
 }
 
-/** The state of another time, or of a link. */
-function recall() {
-  try {
-    const edits = JSON.parse(addressed().get("e") || "[]");
-    state.edits = new Map(edits.map((/** @type {Edit} */ edit) => [edit[1], edit]));
-  } catch {
-    state.edits = new Map();
-  }
-}
-
 /** As the file has it. */
 function back() {
   state.edits.clear();
@@ -327,7 +323,7 @@ function onClick(id, work) {
 
 async function start() {
   await enter();
-  recall();
+  state.edits = new Map(recalled().map((edit) => [edit[1], edit]));
   byId("controls").addEventListener("submit", (/** @type {Event} */ event) => event.preventDefault());
   onClick("back", back);
   onClick("save", save);

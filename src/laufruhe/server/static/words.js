@@ -15,15 +15,16 @@ export function tellOptimum(answer) {
 
 /** @param {any} answer */
 function words(answer) {
-  if (answer.conflict?.length) return [conflict(answer.conflict)];
+  const but = answer.but?.length ? `, with ${answer.but.join(", ")}` : "";
+  if (answer.conflict?.length) return [conflict(answer.conflict, but)];
   const own = answer.optimum;
   if (!own) return [answer.message || given(answer)];
   const lead = [element("strong", {}, `Optimum ${own.text}`), ` ${own.name}, `];
   const share = `${(100 * own.gap).toPrecision(2)} %`;
-  if (own.proof === "global") return [...lead, element("span", { class: "proven" }, `proven: no design has less than ${own.boundText}`)];
-  const found = answer.stage === "settled"
-    ? `found; no design has less than ${own.boundText} (gap ${share}${own.proof === "local" ? ", a local optimum" : ""})`
-    : `at ${share} from its bound so far: no design has less than ${own.boundText}; being proven`;
+  const bound = `no design has less than ${own.boundText}`;
+  if (answer.status === "optimal") return [...lead, element("span", { class: "proven" }, `proven: ${bound}`)];
+  const local = own.proof === "local" ? ", a local optimum" : "";
+  const found = answer.stage === "settled" ? `found; ${bound} (gap ${share}${local})` : `at ${share} from its bound so far${but}: ${bound}; being proven`;
   return [...lead, element("span", { class: "pending" }, found)];
 }
 
@@ -32,11 +33,15 @@ function given(answer) {
   return answer.given ? `${answer.given.name} ${answer.given.text} as given; the optimum is being computed` : "The optimum is being computed";
 }
 
-/** @param {string[]} names */
-function conflict(names) {
+/**
+ * @param {string[]} names of limits
+ * @param {string} but what was left out of the question
+ */
+function conflict(names, but) {
   const told = names.map((name) => `'${name}'`).join(" and ");
   const why = names.length > 1 ? `${told} contradict each other` : `${told} cannot be met within the bounds`;
-  return element("strong", { class: "infeasible" }, `No design exists: ${why}. Move one of the limits.`);
+  const whole = but ? "; the whole problem is being solved" : "";
+  return element("strong", { class: "infeasible" }, `No design exists${but}: ${why}. Move one of the limits${whole}.`);
 }
 
 /**

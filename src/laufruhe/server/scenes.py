@@ -1,0 +1,92 @@
+"""A problem as a page has it: what follows sliders at once, what stands still meanwhile, and what is drawn."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from laufruhe.errors import ModelError
+from laufruhe.live import live_model
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.tolerance import NO_TOLERANCES
+from laufruhe.prove.certificate import Reach
+from laufruhe.server.drawing import drawing_of
+from laufruhe.server.front import partners
+from laufruhe.solvers import kinds_of, state
+from laufruhe.solvers.conclusion import Shown, concluded, judged
+from laufruhe.solvers.following import Followed, Follower, can_follow
+
+_SIDES = ("max", "min", "outside")
+_KEPT = 6
+
+
+class Scene:
+    """A problem but for its limits: what is drawn of it, and what follows a limit that slides.
+
+    Where something is open that loads are not affine in, it stays as given.
+    """
+
+    def __init__(self, problem: Problem, key: str) -> None:
+        self.key, self.whole = key, problem
+        self.problem = problem if can_follow(problem) else replace(
+            problem, phasing=None, over=None, assembly=None, tolerances=NO_TOLERANCES, decisions=problem.unbalances
+        )  # fmt: skip
+        self.given = state(self.problem, to_start_from=True)
+        self.follower: Follower | None = None
+        if can_follow(self.problem) and not self.given.final.resonance:
+            try:
+                self.follower = Follower(self.problem)
+            except ModelError:
+                # an engine on mounts in time has no loads that are affine in anything
+                self.follower = None
+
+    def drawn(self, found: Followed | None) -> dict[str, Any]:
+        """What the page draws from, with the optimum where it is known; why there is nothing to slide else."""
+        result = self.given
+        if found is not None and not found.conflict:
+            shown = Shown(found.bound, Reach.WHOLE, 0.0, "second-order cones at few angles")
+            result = concluded(judged(self.problem, found.values), self.given.final, shown, {})
+        model = live_model(self.whole, result)
+        about = {"engine": drawing_of(self.problem), "partners": list(partners(self.problem))}
+        return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
+
+    def simplified(self, is_held: bool) -> Iterator[str]:
+        """What of the whole problem is left out while sliders move: a bound holds for the rest alone."""
+        whole = self.whole
+        if is_held:
+            yield "what loads are not affine in held as it was decided"
+        elif whole.phasing is not None or any(not decision.is_affine for decision in whole.decisions):
+            yield "what loads are not affine in held as given"
+        if whole.over is not None:
+            yield "no tolerances"
+        if whole.assembly is not None:
+            yield "no parts assigned"
+        if whole.ranks:
+            yield "the first objective alone"
+        kinds = kinds_of(self.problem)
+        told = {limit.measure for limit in self.problem.load_limits}
+        if any(limit.measure not in told and limit.measure.channel.is_moved_by(kinds) for limit in whole.limits):
+            yield "limits on numbers left out"
+
+
+_scenes: dict[str, Scene] = {}
+
+
+def scene_of(problem: Problem, tables: Mapping[str, Any]) -> Scene:
+    """The scene of a problem, kept for the next request."""
+    key = key_of(tables)
+    if key not in _scenes:
+        while len(_scenes) >= _KEPT:
+            _scenes.pop(next(iter(_scenes)))
+        _scenes[key] = Scene(problem, key)
+    return _scenes[key]
+
+
+def key_of(tables: Mapping[str, Any]) -> str:
+    """Of all but where limits stand."""
+    limits = [{k: v for k, v in entry.items() if k not in _SIDES} for entry in tables.get("constraints", [])]
+    text = json.dumps({**tables, "constraints": limits}, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
