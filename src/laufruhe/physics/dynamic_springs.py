@@ -45,7 +45,7 @@ class DynamicSprings:
     def added(self, omegas: Array) -> ComplexArray:
         """Stiffness over that at rest, shape (frequencies, n) [N/m]."""
         found = [law.at(np.asarray(omegas, dtype=float)) - law.static for law in self.laws]
-        return np.array(found, dtype=complex).reshape(len(self.laws), -1).T
+        return np.array(found, dtype=complex).reshape(len(self.laws), len(omegas)).T
 
     def impedance(self, omegas: Array, shapes: Any) -> ComplexArray:
         """What they add to the impedance, in coordinates of these shapes (6, k), shape (frequencies, k, k)."""
