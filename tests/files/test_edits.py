@@ -59,6 +59,17 @@ def test_every_decision_is_found_by_the_name_that_results_show() -> None:
             assert decision.name not in {other.name for other in fixed.decisions}
 
 
+@pytest.mark.parametrize(
+    "name", ["opposed-pistons-masses", "shaper", "tractor-four-seven-metres", "geared-inertia", "rotary-two"]
+)
+def test_masses_shares_and_weights_named_like_a_table_are_found(name: str) -> None:
+    problem = laufruhe.load(PROBLEMS / f"{name}.toml")
+    for decision in problem.decisions:
+        middle = 0.5 * (decision.lower + decision.upper)
+        fixed = problem.fix(decision.name, f"{middle!r} {decision.unit}" if decision.unit else middle)
+        assert decision.name not in {other.name for other in fixed.decisions}
+
+
 def test_fixed_where_it_starts_is_the_design_as_given(problem: Problem) -> None:
     fixed = problem
     for decision in problem.decisions:

@@ -89,6 +89,14 @@ def test_limits_that_are_not_followed_stand_with_the_value_of_the_design_decided
     assert twist.sides[0][0] == "at most"
 
 
+def test_sliders_have_the_units_of_the_file():
+    in_grams = EVERY_NORM.replace('["0 kg", "2 kg"]', '["0 g", "2000 g"]')
+    web, left = model_of(load(in_grams)).sliders
+    assert (web.shown, web.unit, web.upper) == ("g", "kg", 2.0)
+    assert web.factor == pytest.approx(1000.0)
+    assert (left.shown, left.factor) == ("kg m", 1.0)
+
+
 def test_a_page_too_large_says_so(every, monkeypatch):
     monkeypatch.setattr("laufruhe.live.parts.MOST_MB", 1e-3)
     assert "at the most" in every[1].too_large

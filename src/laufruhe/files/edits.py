@@ -62,6 +62,13 @@ def _is_negative(value: Any) -> bool:
     return _NUMBER.match(value) is not None if isinstance(value, str) else value < 0
 
 
+def unit_of_bounds(tables: Mapping[str, Any], name: str) -> str:
+    """The unit in which the bounds of an open number are written; empty where they have none."""
+    now = _at(tables, keys_by_name(tables, name))
+    bound = now["between"][-1] if _is_open(now) else now
+    return units.unit_of(bound) if isinstance(bound, str) else ""
+
+
 def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
     """Keys and places that lead to a number: by the name that a result shows, or by a path as studies have it."""
     first, _, rest = name.partition(".")

@@ -9,11 +9,15 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
+from laufruhe import units
 from laufruhe.errors import ModelError
+from laufruhe.files import edits
+from laufruhe.files.complaints import Refused
 from laufruhe.live.parts import Curve, Design, LiveModel, Proved, Shown, Slider
 from laufruhe.live.saving import saved
 from laufruhe.live.signals import Signal, signal_of
@@ -22,7 +26,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN
 from laufruhe.present.measures import places_of
 from laufruhe.problem.channels import CHANNELS
-from laufruhe.problem.decision import Domain, Kind
+from laufruhe.problem.decision import Decision, Domain, Kind
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
@@ -56,7 +60,7 @@ def live_model(problem: Problem, result: Result) -> LiveModel:
     still = tuple(_still(result.problem, file))
     bare = replace(bare, unmoved=still, why_not="" if moving.decisions else NOTHING)
     try:
-        found = _filled(bare, moving, result, values)
+        found = _filled(bare, problem, moving, result, values)
     except ModelError as error:
         return replace(bare, why_not=f"The loads cannot be shown while decisions move: {error}.")
     return replace(found, save=saved(problem, result, moving, values))
@@ -84,7 +88,9 @@ def _moving(problem: Problem, values: Mapping[str, Value]) -> Problem:
     return replace(problem, phasing=None, over=None, engine=engine, decisions=problem.unbalances)
 
 
-def _filled(bare: LiveModel, moving: Problem, result: Result, values: Mapping[str, Value]) -> LiveModel:
+def _filled(
+    bare: LiveModel, problem: Problem, moving: Problem, result: Result, values: Mapping[str, Value]
+) -> LiveModel:
     model = AffineModel(moving)
     collected = _Collected(model, {decision.kind for decision in moving.decisions}, bare.file, result)
     curves = _curves(collected, result)
@@ -96,7 +102,7 @@ def _filled(bare: LiveModel, moving: Problem, result: Result, values: Mapping[st
     designs.append(("between", _between(model.domains)))
     return replace(
         bare,
-        sliders=tuple(map(_slider, model.domains)),
+        sliders=tuple(_slider(domain, problem) for domain in model.domains),
         signals=tuple(collected.signals.values()),
         curves=curves,
         measures=measures,
@@ -176,12 +182,22 @@ def _curves(collected: _Collected, result: Result) -> tuple[Curve, ...]:
     return tuple(found)
 
 
-def _slider(domain: Domain) -> Slider:
+def _slider(domain: Domain, problem: Problem) -> Slider:
     decision, own = domain.decision, domain.set
     return Slider(
         decision.name, decision.unit, domain.start, domain.width, own.lower, own.upper, own.angles,
-        angle_name(decision),
+        angle_name(decision), *_unit(problem, decision),
     )  # fmt: skip
+
+
+def _unit(problem: Problem, decision: Decision) -> tuple[str, float]:
+    """The unit that the file has, else that of reports, and its factor on an SI value."""
+    if problem.origin is not None:
+        with suppress(Refused, units.UnitError):
+            own = edits.unit_of_bounds(problem.origin.file[0], decision.name)
+            if own:
+                return own, 1.0 / units.parse(f"1 {own}", decision.unit)
+    return units.readable(decision.unit)
 
 
 def _vector(domains: Sequence[Domain], values: Sequence[Value]) -> Array:

@@ -34,6 +34,8 @@ class Slider:
         Bounds of the angle [rad], where that is open.
     angle
         What results call it.
+    shown, factor
+        The unit of the file, and its factor on an SI value.
     """
 
     name: str
@@ -44,6 +46,8 @@ class Slider:
     upper: float
     angles: tuple[float, float]
     angle: str
+    shown: str
+    factor: float
 
 
 @dataclass(frozen=True)
@@ -176,7 +180,7 @@ class LiveModel:
             "file": self.file,
             "points": self.points,
             "turns": self.turns,
-            "sliders": [_slider(slider) for slider in self.sliders],
+            "sliders": [asdict(slider) for slider in self.sliders],
             "signals": signals,
             "curves": [_curve(curve) for curve in self.curves],
             "measures": [_measure(measure) for measure in self.measures],
@@ -189,11 +193,6 @@ class LiveModel:
             "data": data,
         }
         return json.dumps(plain, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-
-
-def _slider(slider: Slider) -> dict[str, Any]:
-    own = {"name": slider.name, "column": slider.column, "width": slider.width, "lower": slider.lower}
-    return {**own, "upper": slider.upper, "angles": slider.angles, "angle": slider.angle, **with_unit(slider.unit)}
 
 
 def _curve(curve: Curve) -> dict[str, Any]:
