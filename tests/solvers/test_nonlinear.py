@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from laufruhe.numerics.budget import limited
 from laufruhe.numerics.norms import softened_lengths
 from laufruhe.solvers.local_optimum import Ending, distinct, is_explored
 from laufruhe.solvers.mount_starts import spread_starts
@@ -35,6 +38,26 @@ def test_optimum_on_a_constraint_agrees_with_another_solver():
     step = 1e-4
     moved = solve_nonlinear(rosenbrock(1.0 + step), [best.x])[0]
     assert best.multipliers[0] == pytest.approx((best.value - moved.value) / step, rel=1e-3)
+
+
+def test_a_start_whose_time_is_over_stops_where_it_is_and_the_next_does_not():
+    """The clock is no part of the program, which is built once."""
+    stopped = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])], max_seconds=0.0)[0]
+    assert stopped.ending is Ending.UNFINISHED
+    assert stopped.iterations <= 1
+    assert solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])])[0].usable
+
+
+def test_no_later_stage_is_begun_after_the_time():
+    e = ca.SX.sym("e")
+    program = replace(rosenbrock(), parameters=e, stages=((1.0,), (0.1,)))
+    whole = solve_nonlinear(program, [np.array([-1.0, 1.0])])[0]
+    assert whole.usable
+    with limited(0.0):
+        cut = solve_nonlinear(program, [np.array([-1.0, 1.0])])[0]
+    # the first stage has its least time
+    assert cut.ending is Ending.UNFINISHED
+    assert cut.x == pytest.approx(whole.x, abs=1e-6)
 
 
 def test_the_residual_is_not_small_away_from_an_optimum():

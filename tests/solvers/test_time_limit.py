@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from cli import scenes
 from laufruhe.cli import app
 from laufruhe.files.reader import load
-from laufruhe.numerics.budget import in_time, left, limited, passed
+from laufruhe.numerics.budget import in_time, left, limited, passed, rounds
 from laufruhe.solvers import CUT_SHORT, Status, solve
 from problem_files import written
 
@@ -38,9 +38,10 @@ def test_a_limit_within_a_limit() -> None:
             time.sleep(1e-3)
             assert passed()
             assert list(in_time(range(5))) == [0]
+            assert list(rounds(5)) == []
         with limited(None):
             assert 99.0 < left() <= 100.0
-            assert list(in_time(range(5))) == list(range(5))
+            assert list(in_time(range(5))) == list(rounds(5)) == list(range(5))
     assert not passed()
 
 

@@ -41,3 +41,11 @@ def in_time(items: Iterable[T]) -> Iterator[T]:
         if k and passed():
             return
         yield item
+
+
+def rounds(most: int) -> Iterator[int]:
+    """Numbers of rounds that may be left out, as long as time is left."""
+    for k in range(most):
+        if passed():
+            return
+        yield k

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left
-from laufruhe.numerics.progress import telling
+from laufruhe.numerics.progress import tell, telling
 from laufruhe.solvers.local_optimum import Ending, LocalOptimum
 
 # seconds that a start has where time is over
@@ -38,8 +39,7 @@ _ENDINGS = {
     "Infeasible_Problem_Detected": Ending.INFEASIBLE,
     "Restoration_Failed": Ending.INFEASIBLE,
     "Maximum_Iterations_Exceeded": Ending.UNFINISHED,
-    "Maximum_CpuTime_Exceeded": Ending.UNFINISHED,
-    "Maximum_WallTime_Exceeded": Ending.UNFINISHED,
+    "User_Requested_Stop": Ending.UNFINISHED,
 }
 
 
@@ -66,38 +66,78 @@ def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
     task, points = share
     if not points:
         return []
-    seconds = min(task.max_seconds, max(left(), SHORTEST))
-    solver, slopes = _built(task.oracle, task.expand, task.max_iterations, seconds)
-    return [_from_start(task, solver, slopes, k, point) for k, point in in_time(telling("starts", points))]
+    tell("derivatives of the smooth program")
+    built = _built(task.oracle, task.expand, task.max_iterations)
+    return [_from_start(task, built, k, point) for k, point in in_time(telling("starts", points))]
+
+
+class _Clock(ca.Callback):
+    """Asked by IPOPT after every iteration whether time is over; a limit of its own would be built into the program."""
+
+    def __init__(self, sizes: dict[str, int]) -> None:
+        ca.Callback.__init__(self)
+        self._sizes, self._until = sizes, math.inf
+        self.construct("clock", {})
+
+    def start(self, seconds: float) -> None:
+        """So much time from now on."""
+        self._until = time.monotonic() + seconds
+
+    def get_n_in(self) -> int:
+        """As many as IPOPT tells."""
+        return int(ca.nlpsol_n_out())
+
+    def get_n_out(self) -> int:
+        """One number: not zero ends the search."""
+        return 1
+
+    def get_sparsity_in(self, k: int) -> Any:
+        """Shape of what IPOPT tells."""
+        return ca.Sparsity.dense(self._sizes[ca.nlpsol_out(k)], 1)
+
+    def eval(self, _: Any) -> list[float]:
+        """Whether time is over."""
+        return [float(time.monotonic() > self._until)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Program:
+    """The solver of a program, its clock, and the derivatives of the judge's own making."""
+
+    solver: Any
+    clock: _Clock
+    slopes: Any
 
 
 @lru_cache(maxsize=_BUILT)
-def _built(oracle: str, expand: bool, max_iterations: int, max_seconds: float) -> tuple[Any, Any]:
-    """The solver of a program, and the derivatives of the judge's own making: they cost as much as some starts."""
+def _built(oracle: str, expand: bool, max_iterations: int) -> _Program:
+    """A program that can be solved: to build it costs as much as some starts."""
     function = ca.Function.deserialize(oracle)
     if expand:
         function = function.expand()
-    limits = {"max_iter": max_iterations, "max_wall_time": max_seconds}
-    options: dict[str, Any] = {**_QUIET, "ipopt": {**_OPTIONS, **limits}}
+    n, m = function.size1_in("x"), function.size1_out("g")
+    clock = _Clock({"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": function.size1_in("p")})
+    options: dict[str, Any] = {**_QUIET, "ipopt": {**_OPTIONS, "max_iter": max_iterations}, "iteration_callback": clock}
     slopes = function.factory("slopes", ["x", "p"], ["f", "g", "grad:f:x", "jac:g:x"])
-    return ca.nlpsol("solver", "ipopt", function, options), slopes
+    return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, slopes)
 
 
-def _from_start(task: Task, solver: Any, slopes: Any, k: int, point: Array) -> LocalOptimum:
+def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptimum:
     began = time.perf_counter()
     y, iterations, ending = point / task.scales, 0, Ending.FAILED
     sides = {"lbx": task.lower, "ubx": task.upper, "lbg": task.constraint_lower, "ubg": task.constraint_upper}
     m = b = np.zeros(0)
     for stage in task.stages:
-        found = solver(x0=y, p=list(stage), **sides)
-        stats = solver.stats()
+        built.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
+        found = built.solver(x0=y, p=list(stage), **sides)
+        stats = built.solver.stats()
         iterations += int(stats["iter_count"])
         ending = _ENDINGS.get(stats["return_status"], Ending.FAILED)
         y = np.clip(_flat(found["x"]), task.lower, task.upper)
         m, b = _flat(found["lam_g"]), _flat(found["lam_x"])
         if ending in (Ending.FAILED, Ending.INFEASIBLE):
             break
-    f, g, gradient, jacobian = slopes(y, list(task.stages[-1]))
+    f, g, gradient, jacobian = built.slopes(y, list(task.stages[-1]))
     with np.errstate(invalid="ignore"):
         # of a point without numbers nothing is a number, and that is all that is asked of it
         residual, violation = _judged(task, y, _flat(g), _flat(gradient), np.asarray(jacobian, dtype=float), m, b)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.numerics.budget import in_time
+from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem import channels
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
@@ -114,7 +114,7 @@ def _divided(problem: Problem, search: MountSearch) -> Divided:
         value = found.design.value if found is not None and found.design.excess <= KEPT else math.inf
         room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
         divided = _by_boxes(problem, value, room)
-        if not divided.places or not search.again(divided.places):
+        if not divided.places or passed() or not search.again(divided.places):
             break
     return divided
 

@@ -10,7 +10,7 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import in_time, passed
+from laufruhe.numerics.budget import passed, rounds
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.nothing import nothing_of
@@ -101,7 +101,7 @@ class MountSearch:
         """From all starts, and again in a smaller size where that of the starts hid what was found."""
         nothing = nothing_of(self.problem)
         self._search(self._points)
-        for _ in in_time(range(MOST_SIZES)):
+        for _ in rounds(MOST_SIZES):
             if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= nothing:
                 break
             # a search ends at a share of the size that it counts in
@@ -214,7 +214,7 @@ class MountSearch:
 
     def _tightened(self, near: Found) -> None:
         margin = 0.0
-        for _ in in_time(range(MOST_MARGINS)):
+        for _ in rounds(MOST_MARGINS):
             if near.optimum is None or not FEASIBLE < near.design.excess <= NEAR:
                 break
             margin += 1.001 * near.design.excess

@@ -204,6 +204,8 @@ def _polished(task: Task, groups: Sequence[LocalOptimum], several: Several) -> l
     """Through the other stages; where time is over, an end stays where it is."""
     if len(task.stages) < 2:
         return list(groups)
+    if passed():
+        return [replace(end, ending=Ending.UNFINISHED) if end.usable else end for end in groups]
     usable = [end for end in groups if end.usable]
     # what led nowhere goes on only where all did
     left = usable or [end for end in groups if end.ending not in (Ending.FAILED, Ending.INFEASIBLE)]
