@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,15 +24,15 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
+from laufruhe.prove.best_first import Box, halves
 from laufruhe.prove.certificate import Multipliers, Reach, best_bound
 from laufruhe.prove.lead_boxes import SLACK, LeadBound, LeadBoxes
 from laufruhe.solvers.box_search import divided
-from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, none_within
+from laufruhe.solvers.conclusion import Shown, concluded, judged, none_within
 from laufruhe.solvers.conic import solve_cones
 from laufruhe.solvers.equations import on_grid
-from laufruhe.solvers.mount_starts import unbalances_of
-from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.unbalances import solve_unbalances
+from laufruhe.solvers.held_designs import SHARE, HeldDesign, HeldDesigns
+from laufruhe.solvers.result import Result
 
 MOST_BOXES, MOST_PROGRAMS = 20_000, 2_000
 """Boxes of leads alone, and of those with a cone program each."""
@@ -45,8 +45,6 @@ LOOKS, SAME = (0.0, 0.31, 0.67), 1e-6
 """Places at which a lead is looked at for whether anything asked changes, and the share that is no change."""
 EXACT = 0.02
 """Of the tolerance, by which parts of a box may still be better."""
-SHARE = 0.25
-"""Of the tolerance that the programs of boxes may use up."""
 
 
 def solve_leads(problem: Problem) -> Result:
@@ -92,46 +90,20 @@ class _Box:
         return np.asarray(0.5 * (self.lower + self.upper))
 
 
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """A design, and the result for its unbalances with its leads."""
-
-    design: Design
-    result: Result | None = None
-
-    @property
-    def value(self) -> float:
-        """The objective of a design that is allowed."""
-        return math.inf if self.design.rank[0] else self.design.value
-
-
-class _Search:
+class _Search(HeldDesigns):
     """Boxes of the leads of a problem."""
 
     is_shared = False
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.model = problem, LedModel(problem)
+        super().__init__(problem)
+        self.model = LedModel(problem)
         self.boxes = LeadBoxes(self.model)
         self.samples = max(problem.fidelity.samples // COARSE, 24) * COARSE
-        self.conflict: tuple[str, ...] = ()
 
-    @staticmethod
-    def better(best: _Found, found: _Found) -> _Found:
-        """The better of the best design so far and another."""
-        return found if found.design.rank < best.design.rank else best
-
-    def told(self, conflict: Sequence[str]) -> None:
-        """Limits that were not met in boxes: all of them together tell."""
-        told = {*self.conflict, *conflict}
-        self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in told)
-
-    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | None, _Found | None]]:
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | None, HeldDesign | None]]:
         """Halves of a box, each with the best design at its middle where that may be better than a value."""
-        middle, here = box.middle, np.arange(len(box.lower)) == box.side
-        for low, high in (
-            (box.lower, np.where(here, middle, box.upper)), (np.where(here, middle, box.lower), box.upper)
-        ):  # fmt: skip
+        for low, high in halves(Box(box.lower, box.upper, box.side)):
             half = self.box(low, high, box.bound, value)
             worth = half is not None and half.at_middle < value * (1.0 - SHARE * self.problem.tolerance)
             yield half, self.at(half.middle) if half is not None and worth else None
@@ -205,28 +177,19 @@ class _Search:
         norms = [norm.value(np.zeros(0)) for _, norm in (*program.terms, *program.limits)]
         return np.array([*norms, *self.boxes.numbers(leads)])
 
-    def first(self) -> _Found:
+    def first(self) -> HeldDesign:
         """The design as given, and the best that searches find where leads alone are open."""
-        found = [_Found(judged(self.problem, self.problem.start))]
+        found = [HeldDesign(judged(self.problem, self.problem.start))]
         if self.model.domains:
             found += [self.at(self.model.start), self.at(0.5 * (self.model.lower + self.model.upper))]
         else:
-            found += [_Found(judged(self.problem, [float(x) for x in each])) for each in self._searched()]
+            found += [HeldDesign(judged(self.problem, [float(x) for x in each])) for each in self._searched()]
         return min(found, key=lambda each: each.design.rank)
 
-    def at(self, leads: Array) -> _Found:
+    def at(self, leads: Array) -> HeldDesign:
         """The best design with its leads given."""
-        where = dict(zip((d.name for d in self.model.leads), (float(x) for x in leads), strict=True))
-        values: dict[str, Value] = {d.name: d.start for d in self.problem.decisions} | where
-        result, samples = None, None
-        if self.problem.unbalances:
-            held = self._held(leads)
-            result = solve_unbalances(held)
-            if result.status is not Status.INFEASIBLE:
-                found = unbalances_of(held, result)
-                values |= dict(zip((d.name for d in self.problem.unbalances), found, strict=True))
-            samples = result.final.samples
-        return _Found(judged(self.problem, list(values.values()), samples), result)
+        where: dict[str, Value] = {d.name: float(x) for d, x in zip(self.model.leads, leads, strict=True)}
+        return self.best_with(self._held(leads), where)
 
     def _held(self, leads: Array) -> Problem:
         """The problem with its leads given: what turns with them has turned."""
@@ -241,9 +204,7 @@ class _Search:
             return replace(decision, drives=tuple(drives))
 
         engine = self.problem.design([float(x) for x in leads], self.model.leads)
-        decisions = tuple(turned(d) for d in self.problem.unbalances)
-        tolerance = SHARE * self.problem.tolerance
-        return replace(self.problem, engine=engine, decisions=decisions, tolerance=tolerance)
+        return replace(self.problem, engine=engine, decisions=tuple(turned(d) for d in self.problem.unbalances))
 
     def _searched(self) -> list[Array]:
         """Where searches end that begin at the best points of a grid."""

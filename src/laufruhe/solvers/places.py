@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice, product
 
@@ -17,15 +17,13 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.box_search import divided
-from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, none_within
-from laufruhe.solvers.mount_starts import unbalances_of
+from laufruhe.solvers.conclusion import Shown, concluded, none_within
+from laufruhe.solvers.held_designs import SHARE, HeldDesign, HeldDesigns
 from laufruhe.solvers.place_boxes import Relaxation
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.unbalances import solve_unbalances
 
 MOST_BOXES = 300
-# of the tolerance that the programs of the boxes may use up
-SHARE = 0.25
 # [m]
 EXACT = 1e-6
 # [m], by which a limit on a distance may be missed, and by which it is kept where places are moved for it
@@ -60,19 +58,6 @@ class _Box:
         return bool(self.spread.max() <= EXACT)
 
 
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """A design, and the result for its unbalances where it stands."""
-
-    design: Design
-    result: Result | None
-
-    @property
-    def value(self) -> float:
-        """The objective of a design that is allowed."""
-        return np.inf if self.design.rank[0] else self.design.value
-
-
 def solve_places(problem: Problem) -> Result:
     """Places and unbalances, proven as far as dividing the boxes of places goes.
 
@@ -98,7 +83,7 @@ def solve_places(problem: Problem) -> Result:
     return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
 
 
-def _divided(search: _Search, nothing: float) -> tuple[_Found | None, float, int]:
+def _divided(search: _Search, nothing: float) -> tuple[HeldDesign | None, float, int]:
     """Divide the boxes until their least bound meets the best design, or as often as is worth it.
 
     Returns
@@ -115,14 +100,13 @@ def _divided(search: _Search, nothing: float) -> tuple[_Found | None, float, int
     return None if np.isinf(bound) and best.design.rank[0] else best, bound, seen
 
 
-class _Search:
+class _Search(HeldDesigns):
     """Boxes of the places of a problem."""
 
     is_shared = True
 
     def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        self.conflict: tuple[str, ...] = ()
+        super().__init__(problem)
         self.relaxation = Relaxation(problem.changed(limits=problem.load_limits), SHARE)
         self._envelope = [limit for limit in problem.limits if limit.measure.channel.is_placing]
         self.places = self.relaxation.places
@@ -132,12 +116,7 @@ class _Search:
         """Of all places."""
         return np.array([p.lower for p in self.places]), np.array([p.upper for p in self.places])
 
-    @staticmethod
-    def better(best: _Found, found: _Found) -> _Found:
-        """The better of the best design so far and another."""
-        return found if found.design.rank < best.design.rank else best
-
-    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | None, _Found | None]]:
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | None, HeldDesign | None]]:
         """Halves of a box, each with the best design at its middle if it may be better than a value."""
         for half in self._halves(box):
             yield half, None if half is None or half.bound >= value else self.at(half.middle)
@@ -171,11 +150,6 @@ class _Search:
         # what the program does not know of moves the places too
         moved = upper - lower if allowed is None else np.abs(allowed - middle)
         return _Box(lower, upper, max(bound, floor), middle if allowed is None else allowed, np.maximum(spread, moved))
-
-    def told(self, conflict: Sequence[str]) -> None:
-        """What cannot be met in one box may be in another: all boxes together tell."""
-        told = {*self.conflict, *conflict}
-        self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in told)
 
     def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
         """Least and largest of each distance that is limited, with its places in a box."""
@@ -235,19 +209,8 @@ class _Search:
             found += [at for at in (np.clip(pushed.x, lower, upper), start) if room(at).min() >= -REACH]
         return min(found, key=away, default=None)
 
-    def at(self, places: Array) -> _Found:
+    def at(self, places: Array) -> HeldDesign:
         """The best design with its places given."""
         where: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
         engine = self.problem.design(list(where.values()), self.places)
-        tolerance = SHARE * self.problem.tolerance
-        held = replace(self.problem, engine=engine, decisions=self.problem.unbalances, tolerance=tolerance)
-        result, samples = None, None
-        values = dict(zip((d.name for d in self.problem.decisions), self.problem.start, strict=True)) | where
-        if self.problem.unbalances:
-            result = solve_unbalances(held)
-            # where none is allowed the unbalances stay as given, and the design breaks its limits
-            if result.status is not Status.INFEASIBLE:
-                found = unbalances_of(held, result)
-                values |= dict(zip((d.name for d in self.problem.unbalances), found, strict=True))
-            samples = result.final.samples
-        return _Found(judged(self.problem, list(values.values()), samples), result)
+        return self.best_with(replace(self.problem, engine=engine, decisions=self.problem.unbalances), where)
