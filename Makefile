@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test test-fast test-long attack matrix faults bench speed pictures docs lint format clean distclean
+.PHONY: help solve study test test-fast test-long attack matrix faults bench proofs speed pictures docs lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
@@ -21,6 +21,7 @@ help:
 	@echo "make format     put the source into the project's style"
 	@echo "make faults     100,000 damaged files, which writes results/faults/; half an hour and more"
 	@echo "make bench      benchmarks, which write results/benchmarks/; an hour and more"
+	@echo "make proofs     every ready problem's value, bound and gap, which writes results/proofs/; minutes"
 	@echo "make speed      what users wait for, timed; SPEED=--benchmark-compare against the last run"
 	@echo "make pictures   the pictures of README.md again, under docs/pictures/"
 	@echo "make docs       the documentation site, docs/_build/index.html"
@@ -68,6 +69,10 @@ matrix: $(STAMP)
 # Scripts that write under results/benchmarks/.
 bench: $(STAMP)
 	@set -e; for script in tests/benchmarks/bench_*.py; do echo "$$script"; $(BIN)/python "$$script"; done
+
+# Value, bound, gap and time of every ready problem; writes results/proofs/README.md.
+proofs: $(STAMP)
+	$(BIN)/python tests/benchmarks/proofs.py
 
 speed: $(STAMP)
 	$(BIN)/python -m pytest tests/benchmarks/speed.py -o addopts="" -p no:xdist --import-mode=importlib --benchmark-autosave --benchmark-storage=.benchmarks $(SPEED)

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,13 +133,21 @@ def star_sum(
 def cancelling_sums(values: NDArray[np.complex128], indices: Sequence[int]) -> NDArray[np.complex128]:
     """Sums of the values (n, c) of each index, shape (largest + 1, c), zero under the rounding of their own terms."""
     # every sum as a product with zeros and ones: a few values cost a few calls
-    members = (np.arange(max(indices) + 1)[:, None] == np.array(indices)).astype(float)
+    members = _members(tuple(indices))
     parts = np.ascontiguousarray(values).view(float)
     size = members @ np.abs(parts)
-    return _flushed((members @ parts).view(complex), size[:, ::2] + size[:, 1::2], members.sum(axis=1, keepdims=True))
+    return _flushed((members @ parts).view(complex), size[:, ::2] + size[:, 1::2], len(indices))
 
 
-def _flushed(sums: NDArray[np.complex128], magnitude: NDArray[np.float64], count: Any) -> NDArray[np.complex128]:
+@lru_cache(maxsize=256)
+def _members(indices: tuple[int, ...]) -> NDArray[np.float64]:
+    """One where a value is of an index, shape (largest + 1, n)."""
+    members = np.asarray(np.arange(max(indices) + 1)[:, None] == np.array(indices), dtype=float)
+    members.setflags(write=False)
+    return members
+
+
+def _flushed(sums: NDArray[np.complex128], magnitude: NDArray[np.float64], count: int) -> NDArray[np.complex128]:
     parts = sums.view(float).reshape(*sums.shape, 2)
     rounding = np.abs(parts) <= ((count + 2) * _EPS * magnitude)[..., None]
     return np.asarray(np.where(rounding, 0.0, parts).view(complex)[..., 0])

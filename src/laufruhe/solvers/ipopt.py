@@ -20,7 +20,7 @@ from laufruhe.solvers.local_optimum import Ending, LocalOptimum
 # seconds that a start has where time is over
 SHORTEST = 0.5
 # programs that are kept built
-_BUILT = 2
+_BUILT = 4
 _QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False, "calc_lam_p": False}
 _OPTIONS = {
     "print_level": 0,
