@@ -630,6 +630,65 @@ def places(rng: Generator) -> Table:
     return with_objective(rng, table, 1)
 
 
+def leads(rng: Generator) -> Table:
+    """Cranks that are geared to, or coupled with, another one at angles that are open; weights on them at times."""
+    engine, gas = {"layout": "parts", **mechanism(rng, plain=True), "cycle": "two-stroke"}, rng.random() < 0.5
+    count, turning = int(rng.integers(1, 3)), float(rng.choice([-1, 1]))
+    engine["shafts"] = [
+        {
+            "name": f"led {k}", "ratio": 1.0 if gas else turning, "lead": {"between": [0, 360]},
+            "position": ["0.0 m", "0.0 m"] if gas else [q(v, "m") for v in rng.uniform(-0.3, 0.3, 2)],
+        }
+        for k in range(count)
+    ]  # fmt: skip
+    on = ["crankshaft", *(shaft["name"] for shaft in engine["shafts"]), *["crankshaft"] * int(rng.integers(0, 2))]
+    engine["slider_cranks"] = [
+        {"x": q(0.15 * k, "m"), "throw": angle(rng), "bank_angle": angle(rng) if rng.random() < 0.3 else 0.0, "shaft": name}
+        for k, name in enumerate(on)
+    ]
+    table: Table = {
+        "engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng), "fidelity": {"samples": 360}
+    }  # fmt: skip
+    if gas:
+        engine |= {"bore": q(rng.uniform(0.06, 0.1), "m"), "fires_together": True}
+        table["gas"] = {
+            "model": "seiliger", "peak_pressure": q(rng.uniform(55, 85), "bar"), "imep": q(rng.uniform(4.0, 8.0), "bar"),
+        }  # fmt: skip
+        table["flywheel"] = {"inertia": q(rng.uniform(20.0, 80.0) * moving_mass(engine), "kg m^2")}
+    if count == 1 and rng.random() < 0.4:
+        table["counterweights"] = counterweights(rng, moving_mass(engine), 1)
+        table["counterweights"][0] |= {"shaft": "led 0", "angle": {"between": [0, 360]}}
+        table["counterweights"][0]["mass"]["between"][0] = "0.0 kg"
+    turning_alone = ["degree of irregularity", "peak to peak stored work", "rms crank torque"]
+    if gas and "counterweights" not in table and rng.random() < 0.4:
+        table["objective"] = {"minimise": str(rng.choice(turning_alone))}
+    else:
+        table = with_objective(rng, table, 1)
+    return limits_at(rng, table, [{"limit": "rms shaking force", "side": "max", "unit": "N"},
+                                  {"limit": "mean roll moment", "side": "max", "unit": "N m"}], 0.4)  # fmt: skip
+
+
+def banks(rng: Generator) -> Table:
+    """A vee twin whose bank angle or split pin is open, and weights on its crank."""
+    engine = {"layout": "vee", **mechanism(rng), **spaced(rng), "cylinders": 2, "firing_order": [1, 2], "throws": "open"}
+    engine.pop("offset", None)
+    opened = {"between": [float(round(rng.uniform(20.0, 60.0), 1)), float(round(rng.uniform(80.0, 150.0), 1))]}
+    if rng.random() < 0.6:
+        engine |= {"bank_angle": opened}
+    else:
+        engine |= {"bank_angle": float(rng.choice([45.0, 60.0, 90.0])), "split_pin_angle": {"between": [-40.0, 70.0]}}
+    if rng.random() < 0.6:
+        engine["bank_stagger"] = q(rng.uniform(-0.03, 0.03), "m")
+    table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
+    table["phasing"] = {"intervals": {"min": 1.0, "max": 719.0}}
+    if rng.random() < 0.6:
+        table["counterweights"] = counterweights(rng, moving_mass({**engine, "throws": [0.0]}), 1)
+        # the throw follows the bank: a weight of any angle is the same beside both
+        table["counterweights"][0] |= {"angle": {"between": [0, 360]}}
+        table["counterweights"][0]["mass"]["between"][0] = "0.0 kg"
+    return with_objective(rng, table, 1, norms=SMOOTH)
+
+
 FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "inline": of_unbalances(inline),
     "vee": of_unbalances(vee),
@@ -651,6 +710,8 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "elastic-balance": balance_on_elastic,
     "uneven": uneven,
     "places": places,
+    "leads": leads,
+    "bank angle": banks,
 }
 
 

@@ -81,7 +81,13 @@ class Openings:
 
     @cached_property
     def weights(self) -> tuple[Weight, ...]:
-        found = [self._weight(t, ("counterweights", k), None, 1.0, "c") for k, t in self._listed("counterweights")]
+        found = []
+        for k, told in self._listed("counterweights"):
+            shafts = [s["name"] for s in self.table["engine"].get("shafts", [])]
+            at = shafts.index(told["shaft"]) if "shaft" in told else None
+            own: Path | None = None if at is None else ("engine", "shafts", at)
+            ratio = 1.0 if own is None else float(_at(self.table, own).get("ratio", 1))
+            found.append(self._weight(told, ("counterweights", k), own, ratio, "c"))
         for k, shaft in self._listed("balancer_shafts"):
             where: Path = ("balancer_shafts", k)
             for j, u in enumerate(shaft["unbalances"]):
@@ -244,6 +250,8 @@ class Openings:
         return [p.throw + 0.5 * split for p in parts[:half]], parts[0].bank - parts[half].bank, split
 
     def _number(self, path: Path, engine: Any, rotors: dict[str, Any], decided: dict[str, float]) -> float:
+        if path[-1] == "lead":
+            return math.degrees(decided[f"{_at(self.table, path[:-1])['name']}.lead"])
         if path[0] == "engine":
             throws, bank, split = self._angles(engine)
             if path[1] == "throws":

@@ -366,11 +366,13 @@ def _parts(e: dict[str, Any]) -> list[Mechanism]:
     for part in e["slider_cranks"]:
         shaft = shafts.get(part.get("shaft", ""), {})
         y, z = (number(v) for v in shaft.get("position", [0.0, 0.0]))
+        ratio, bank = float(shaft.get("ratio", 1)), math.radians(part.get("bank_angle", 0.0))
+        # what a shaft carries is as far ahead as it leads
+        throw = math.radians(part.get("throw", 0.0) + ratio * shaft.get("lead", 0.0))
         found.append(
             Mechanism(
-                number(part["x"]), math.radians(part.get("throw", 0.0)), math.radians(part.get("bank_angle", 0.0)),
-                pin_mass=number({**e, **part}.get("rotating_mass", 0.0)), ratio=float(shaft.get("ratio", 1)),
-                centre=complex(z, y), **_common(e, part),
+                number(part["x"]), throw, bank, pin_mass=number({**e, **part}.get("rotating_mass", 0.0)), ratio=ratio,
+                centre=complex(z, y), fires=(bank - throw) / ratio if "bore" in e else None, **_common(e, part),
             )
         )  # fmt: skip
     return found
