@@ -643,7 +643,12 @@ def leads(rng: Generator) -> Table:
     ]  # fmt: skip
     on = ["crankshaft", *(shaft["name"] for shaft in engine["shafts"]), *["crankshaft"] * int(rng.integers(0, 2))]
     engine["slider_cranks"] = [
-        {"x": q(0.15 * k, "m"), "throw": angle(rng), "bank_angle": angle(rng) if rng.random() < 0.3 else 0.0, "shaft": name}
+        {
+            "x": q(0.15 * k, "m"),
+            "throw": angle(rng),
+            "bank_angle": angle(rng) if rng.random() < 0.3 else 0.0,
+            "shaft": name,
+        }
         for k, name in enumerate(on)
     ]
     table: Table = {
@@ -652,7 +657,8 @@ def leads(rng: Generator) -> Table:
     if gas:
         engine |= {"bore": q(rng.uniform(0.06, 0.1), "m"), "fires_together": True}
         table["gas"] = {
-            "model": "seiliger", "peak_pressure": q(rng.uniform(55, 85), "bar"), "imep": q(rng.uniform(4.0, 8.0), "bar"),
+            "model": "seiliger", "peak_pressure": q(rng.uniform(55, 85), "bar"),
+            "imep": q(rng.uniform(4.0, 8.0), "bar"),
         }  # fmt: skip
         table["flywheel"] = {"inertia": q(rng.uniform(20.0, 80.0) * moving_mass(engine), "kg m^2")}
     if count == 1 and rng.random() < 0.4:
@@ -670,7 +676,14 @@ def leads(rng: Generator) -> Table:
 
 def banks(rng: Generator) -> Table:
     """A vee twin whose bank angle or split pin is open, and weights on its crank."""
-    engine = {"layout": "vee", **mechanism(rng), **spaced(rng), "cylinders": 2, "firing_order": [1, 2], "throws": "open"}
+    engine = {
+        "layout": "vee",
+        **mechanism(rng),
+        **spaced(rng),
+        "cylinders": 2,
+        "firing_order": [1, 2],
+        "throws": "open",
+    }
     engine.pop("offset", None)
     opened = {"between": [float(round(rng.uniform(20.0, 60.0), 1)), float(round(rng.uniform(80.0, 150.0), 1))]}
     if rng.random() < 0.6:

@@ -7,7 +7,7 @@ rod, and to the throw. Loads are affine in them at a given length of the rod: th
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -55,9 +55,13 @@ class Piece:
 
     def scaled(self, factors: Sequence[Array]) -> AffineNorm:
         """The norm with other factors."""
-        parts = zip(factors, self.given, self.at, strict=True)
-        by = np.concatenate([np.repeat(new / old, rows, axis=0) for new, old, (_, _, rows) in parts])
+        by = self.by(factors)
         return replace(self.affine, constant=self.affine.constant * by, slope=self.affine.slope * by[..., None])
+
+    def by(self, factors: Sequence[Array]) -> Array:
+        """What every row is multiplied by for other factors, shape (k, 1 or d)."""
+        parts = zip(factors, self.given, self.at, strict=True)
+        return np.concatenate([np.repeat(new / old, rows, axis=0) for new, old, (_, _, rows) in parts])
 
     def value(self, factors: Sequence[Array], masses: Array) -> float:
         """The norm."""
@@ -104,6 +108,18 @@ class SizeModel:
         """Whether the length of the rod is open, in which nothing is affine."""
         return ROD_LENGTH in self.names
 
+    @property
+    def rod_span(self) -> tuple[float, float]:
+        """Least and largest length of the rod [m]."""
+        if not self.moves_rod:
+            return (self._given[ROD_LENGTH],) * 2
+        k = self.names.index(ROD_LENGTH)
+        return float(self.lower[k]), float(self.upper[k])
+
+    def rod_length(self, x: Array) -> float:
+        """In a design [m]."""
+        return float(x[self.names.index(ROD_LENGTH)]) if self.moves_rod else self._given[ROD_LENGTH]
+
     def engine(self, x: Array) -> Engine:
         """With sizes."""
         key = x.tobytes()
@@ -140,6 +156,14 @@ class SizeModel:
         masses = self.masses(x)
         pieces = self.pieces(measure, engine.slider_cranks[0].rod_length)
         return max(piece.value(self.factors(piece, measure, engine), masses) for piece in pieces)
+
+    def whole_pieces(self, measure: Measure) -> Callable[[float], tuple[Piece, ...]]:
+        """The pieces of a measure at any length of the rod, with the same rows at each."""
+        length = self._given[ROD_LENGTH]
+        base = self.problem.engine.cycle.base_order
+        own = over(base, self._with_masses(length)[0].signals(measure.load))
+        bends = bends_of(measure, own, self.problem.engine)
+        return lambda at: self._cut_up(measure, at, bends)
 
     def pieces(self, measure: Measure, rod_length: float | None = None) -> tuple[Piece, ...]:
         """A measure of loads at a length of the rod, that of the start unless told: the largest of these."""
@@ -184,12 +208,13 @@ class SizeModel:
             self._evaluations[length] = [evaluate(self.problem, engine) for engine in engines]
         return self._evaluations[length]
 
-    def _cut_up(self, measure: Measure, length: float) -> tuple[Piece, ...]:
+    def _cut_up(self, measure: Measure, length: float, told: Sequence[Array] | None = None) -> tuple[Piece, ...]:
+        """Pieces at a length, of all rows where the angles of bends are told."""
         found, problem, channel = self._with_masses(length), self.problem, measure.load
         base = problem.engine.cycle.base_order
         steps = measure.norm.refinement * problem.fidelity.samples
         signals: list[list[Spectrum]] = [over(base, each.signals(channel)) for each in found]
-        bends = bends_of(measure, signals[0], problem.engine)
+        bends = bends_of(measure, signals[0], problem.engine) if told is None else told
         rows = [load_rows(measure, problem.points, own, problem.engine, steps, bends) for own in signals]
         slopes = [own.vectors - rows[0].vectors for own in rows[1:]]
         whole = AffineNorm(rows[0].norm, rows[0].vectors, np.stack(slopes, axis=-1), rows[0].grid)
@@ -205,7 +230,7 @@ class SizeModel:
             affine = replace(whole, constant=whole.constant[own], slope=whole.slope[own], grid=_plain(each))
             at = ((k, place, each),)
             piece = Piece(affine, at, tuple(_factors(measure, found[0].engine, problem, at)))
-            scalar = not piece.given or piece.given[0].size == 1
+            scalar = told is None and (not piece.given or piece.given[0].size == 1)
             pieces.append(piece.pruned(*self.mass_box) if scalar else piece)
         return tuple(pieces)
 

@@ -2,8 +2,9 @@
 
 In a box every factor of a load is least at one corner, for it goes one way with each size; the masses lie between those
 of two corners, for so do they. A norm of rows that are affine in the masses is nowhere under <Z, V>, Z its subgradient
-at any masses: its least value over that interval bounds the norm. Sides of a box on which a limit is broken everywhere,
-or nothing is better than a design known, are cut off; what is left is halved.
+at any masses: its least value over that interval bounds the norm. Over lengths of the rod <Z, V> is a short
+series (Z13). Sides of a box on which a limit is broken everywhere, or nothing is better than a design known, are cut
+off; what is left is halved.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ import copy
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm
+from laufruhe.load_models.rod_series import TERMS, RodSeries, rod_series
 from laufruhe.load_models.sized_model import MASSES, Piece, SizeModel
 from laufruhe.machine import Engine
 from laufruhe.problem.measure import Limit, Measure
@@ -31,23 +33,81 @@ MOST_BOXES = 3000
 SLACK, HALVINGS, ROUNDS, MOST_TOUCHED = 1e-9, 10, 3, 200
 
 
+class _Reach(NamedTuple):
+    """Least and most of the masses, and of the length of the rod, on a box."""
+
+    low: Array
+    high: Array
+    rod: tuple[float, float]
+
+    @property
+    def middle(self) -> tuple[Array, float]:
+        """Masses and length."""
+        return 0.5 * (self.low + self.high), 0.5 * (self.rod[0] + self.rod[1])
+
+
 class _Bundle:
     """Affine functions of the masses that a norm is nowhere under, as many as were asked for (P4)."""
 
-    def __init__(self, affine: AffineNorm) -> None:
-        self.affine = affine
+    def __init__(self, piece: Piece, affine: AffineNorm | None = None) -> None:
+        self.piece, self.affine = piece, piece.affine if affine is None else affine
         self.constants, self.slopes = np.zeros(0), np.zeros((0, MASSES))
 
-    def touch(self, masses: Array) -> None:
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.constants)
+
+    def touch(self, masses: Array, _: float) -> None:
         """One more that the norm meets at these masses."""
         z = self.affine.subgradient(masses)
         self.constants = np.append(self.constants, float(np.vdot(z, self.affine.constant)))
         self.slopes = np.vstack([self.slopes, self.affine.pulled(z)])
 
-    def least(self, low: Array, high: Array) -> float:
-        """Of masses between two."""
-        ends = np.where(self.slopes > 0.0, self.slopes * low, self.slopes * high).sum(axis=1)
+    def scaled(self, factors: Sequence[Array]) -> _Bundle:
+        """Of other factors of its rows, which nothing has been asked of yet."""
+        return _Bundle(self.piece, self.piece.scaled(factors))
+
+    def least(self, reach: _Reach) -> float:
+        """On a box."""
+        ends = np.where(self.slopes > 0.0, self.slopes * reach.low, self.slopes * reach.high).sum(axis=1)
         return max(float((self.constants + ends).max(initial=0.0)), 0.0)
+
+
+class _RodBundle:
+    """The same over lengths of the rod: of each function the series of what it is at any length (Z13)."""
+
+    def __init__(self, series: RodSeries) -> None:
+        self.piece, self.series = series.piece, series
+        self.nodes = np.zeros((0, TERMS, 1 + MASSES))
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.nodes)
+
+    def touch(self, masses: Array, length: float) -> None:
+        """One more that the norm meets at these masses and this length."""
+        z = self.series.at(length).subgradient(masses)
+        self.nodes = np.concatenate([self.nodes, self.series.pulled(z)[None]])
+
+    def scaled(self, factors: Sequence[Array]) -> _RodBundle:
+        """Of other factors of its rows."""
+        return _RodBundle(self.series.scaled(factors))
+
+    def least(self, reach: _Reach) -> float:
+        """Its first two terms at the ends of the box, what the others can take from them, and the rest."""
+        terms = np.einsum("mn,tnj->mtj", self.series.terms(*reach.rod), self.nodes)
+        most = np.maximum(np.abs(reach.low), np.abs(reach.high))
+        further = np.abs(terms[2:]).sum(axis=0) @ np.append(1.0, most)
+        found = np.full(self.count, math.inf)
+        for end in (-1.0, 1.0):
+            at = terms[0] + end * terms[1]
+            slopes = at[:, 1:]
+            ends = np.where(slopes > 0.0, slopes * reach.low, slopes * reach.high).sum(axis=1)
+            found = np.minimum(found, at[:, 0] + ends)
+        rest = float(self.series.rest @ np.append(1.0, most))
+        return max(float((found - further).max(initial=0.0)) - rest, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +127,7 @@ class _Number:
     measure: Measure
     sense: float
     ways: Ways
-    pieces: tuple[tuple[Piece, _Bundle], ...] = ()
+    pieces: tuple[_Bundle | _RodBundle, ...] = ()
 
 
 class SizeBoxes:
@@ -76,12 +136,10 @@ class SizeBoxes:
     Raises
     ------
     ValueError
-        If the length of the rod is open, or a measure does not go one way with a size.
+        If a measure does not go one way with a size, or a bend of a load moves with the length of the rod.
     """
 
     def __init__(self, model: SizeModel) -> None:
-        if model.moves_rod:
-            raise ValueError("loads are not affine where the length of the rod moves")
         self.model, problem = model, model.problem
         # for each size whether masses grow with it or fall
         self._light = self._ways(lambda x: np.abs(self.model.masses(x)))
@@ -106,7 +164,11 @@ class SizeBoxes:
             found = [each.ravel() for piece in pieces for each in self.model.factors(piece, measure, engine)]
             return np.concatenate(found) if found else np.zeros(1)
 
-        return _Number(measure, sense, self._ways(factors), tuple((piece, _Bundle(piece.affine)) for piece in pieces))
+        if not self.model.moves_rod:
+            return _Number(measure, sense, self._ways(factors), tuple(map(_Bundle, pieces)))
+        start = self.model.problem.engine.slider_cranks[0].rod_length
+        series = rod_series(self.model.whole_pieces(measure), start, *self.model.rod_span)
+        return _Number(measure, sense, self._ways(factors), tuple(map(_RodBundle, series)))
 
     def _ways(self, numbers: Callable[[Array], Array]) -> Ways:
         """Of numbers that go one way with each size: which way each of them takes all of them, zero where none."""
@@ -129,49 +191,49 @@ class SizeBoxes:
         other.terms, other.limits = [], [each for each in self.limits if each[2] in limits]
         return other
 
-    def masses(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Least and most of the masses on a box, shape (4,)."""
+    def reach(self, lower: Array, upper: Array) -> _Reach:
+        """Of a box."""
         ends = (self.model.masses(corner(way * self._light, lower, upper)) for way in (1.0, -1.0))
         light, heavy = ends
-        return np.minimum(light, heavy), np.maximum(light, heavy)
+        rod = self.model.rod_length(lower), self.model.rod_length(upper)
+        return _Reach(np.minimum(light, heavy), np.maximum(light, heavy), rod)
 
     def touch(self, lower: Array, upper: Array) -> None:
         """Bounds that loads meet at masses of a box."""
-        low, high = self.masses(lower, upper)
+        reach = self.reach(lower, upper)
+        middle, length = reach.middle
         for number in (*(number for _, number in self.terms), *(number for _, number, _ in self.limits)):
-            for _, bundle in number.pieces:
-                for masses in (low, 0.5 * (low + high)) if len(bundle.constants) < MOST_TOUCHED else ():
-                    bundle.touch(masses)
+            for bundle in number.pieces:
+                for masses in (reach.low, middle) if bundle.count < MOST_TOUCHED else ():
+                    bundle.touch(masses, length)
 
-    def least(self, number: _Number, lower: Array, upper: Array, masses: tuple[Array, Array]) -> float:
+    def least(self, number: _Number, lower: Array, upper: Array, reach: _Reach) -> float:
         """Of a measure on a box."""
         at = corner(number.ways, lower, upper)
         if not number.pieces:
             return number.sense * self.model.value(number.measure, at)
         engine = self.model.engine(at) if np.any(number.ways) else self.model.problem.engine
-        return max(self._piece(piece, bundle, number.measure, engine, masses) for piece, bundle in number.pieces)
+        return max(self._piece(bundle, number.measure, engine, reach) for bundle in number.pieces)
 
-    def _piece(
-        self, piece: Piece, bundle: _Bundle, measure: Measure, engine: Engine, masses: tuple[Array, Array]
-    ) -> float:  # fmt: skip
-        factors = self.model.factors(piece, measure, engine)
-        ratio = piece.ratio(factors)
+    def _piece(self, bundle: _Bundle | _RodBundle, measure: Measure, engine: Engine, reach: _Reach) -> float:
+        factors = self.model.factors(bundle.piece, measure, engine)
+        ratio = bundle.piece.ratio(factors)
         if ratio is not None:
-            return ratio * bundle.least(*masses)
-        own = _Bundle(piece.scaled(factors))
-        own.touch(0.5 * (masses[0] + masses[1]))
-        return own.least(*masses)
+            return ratio * bundle.least(reach)
+        own = bundle.scaled(factors)
+        own.touch(*reach.middle)
+        return own.least(reach)
 
     def objective(self, lower: Array, upper: Array) -> float:
         """Least on a box."""
-        masses = self.masses(lower, upper)
-        return sum(weight * self.least(number, lower, upper, masses) for weight, number in self.terms)
+        reach = self.reach(lower, upper)
+        return sum(weight * self.least(number, lower, upper, reach) for weight, number in self.terms)
 
     def breaks(self, lower: Array, upper: Array, k: int | None = None, way: float = 0.0) -> bool:
         """Whether a limit is broken all over a box; of those limits that go one way with size k, where that is told."""
-        masses = self.masses(lower, upper)
+        reach = self.reach(lower, upper)
         return any(
-            self.least(number, lower, upper, masses) > most
+            self.least(number, lower, upper, reach) > most
             for most, number, _ in self.limits
             if k is None or number.ways[k] == way
         )

@@ -21,6 +21,8 @@ from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.local_programs import LocalProgram, looks, proven, searched, shown
 from laufruhe.solvers.result import Result
 
+MOST_WITH_ROD = 300
+"""Boxes where the length of the rod is open, which take ten times as long."""
 STARTS = 3
 # relative room that local programs leave inside limits, a part of what counts as kept
 INSIDE = 1e-7
@@ -58,7 +60,8 @@ def solve_sizes(problem: Problem) -> Result:
     boxes = _boxes(model)
 
     def bounded(value: float, room: float) -> Divided:
-        most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
+        usual = MOST_WITH_ROD if model.moves_rod else MOST_BOXES
+        most = usual if problem.search.boxes is None else problem.search.boxes
         return Divided(0.0, 0) if boxes is None else divided_sizes(boxes, value, room, most)
 
     found = proven(program, best, bounded)
@@ -96,4 +99,5 @@ def _check_acts(model: SizeModel) -> None:
 
 def _why(problem: Problem) -> str:
     has_rod = any(decision.name == "engine.rod_length" for decision in problem.decisions)
-    return "local programs; nothing bounds the length of the rod" if has_rod else "local programs"
+    why = "local programs; bends of a load move with the length of the rod, and nothing bounds it"
+    return why if has_rod else "local programs"

@@ -1,0 +1,145 @@
+"""Rows of a load over the length l of the rod, as Chebyshev series of 1 / l (Z13).
+
+Where no bend of a load moves with the length of the rod, the load is an analytic function of r / l as far as that is
+under one: its series between two lengths falls off by the same share with every term. The exact model tells its terms
+at as many lengths; the last of them, and two lengths between, tell what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.load_models.sized_model import Piece
+
+Array = NDArray[np.float64]
+
+TERMS, BETWEEN = 20, (0.13, 0.71)
+"""Terms of a series, and where between its ends it is held against the exact model."""
+LAST, TIMES = 2, 10.0
+"""Terms by which the rest is judged, and how many times as large it is taken."""
+CONVERGED = 1e-6
+"""Share of a load that the rest may be."""
+
+
+@dataclass(frozen=True, eq=False)
+class RodSeries:
+    """A piece of a measure at any length of the rod.
+
+    Attributes
+    ----------
+    piece
+        At the length that the problem starts from, whose factors its rows have at every length.
+    low, high
+        Lengths between which it is known [m].
+    constant, slope
+        Rows at the nodes, shapes (n, k, d) and (n, k, d, 4).
+    rest
+        No less than the norm of what the series leave out: of the constant, then for each unit of a mass, shape (5,).
+    """
+
+    piece: Piece
+    low: float
+    high: float
+    constant: Array
+    slope: Array
+    rest: Array
+
+    def at(self, length: float) -> AffineNorm:
+        """At one length."""
+        (shares,) = _shares(np.array([self._place(length)]))
+        constant = np.tensordot(shares, self.constant, axes=1)
+        return replace(self.piece.affine, constant=constant, slope=np.tensordot(shares, self.slope, axes=1))
+
+    def scaled(self, factors: Sequence[Array]) -> RodSeries:
+        """With other factors of its rows."""
+        by = self.piece.by(factors)
+        return replace(self, constant=self.constant * by, slope=self.slope * by[..., None])
+
+    def pulled(self, z: Array) -> Array:
+        """<Z, V> at the nodes: of the constant, then of each mass, shape (n, 5)."""
+        flat, count = z.ravel(), len(self.constant)
+        masses = np.einsum("i,nij->nj", flat, self.slope.reshape(count, z.size, -1))
+        return np.concatenate([(self.constant.reshape(count, -1) @ flat)[:, None], masses], axis=1)
+
+    def terms(self, low: float, high: float) -> Array:
+        """What makes the terms of a series between two lengths of values at the nodes, shape (n, n)."""
+        return _terms() @ _shares(np.array([self._place(length) for length in _lengths(low, high)]))
+
+    def _place(self, length: float) -> float:
+        ends = 1.0 / self.low, 1.0 / self.high
+        return (2.0 / length - ends[0] - ends[1]) / (ends[0] - ends[1])
+
+
+def rod_series(pieces: Callable[[float], Sequence[Piece]], start: float, low: float, high: float) -> list[RodSeries]:
+    """Every piece of a measure between two lengths of the rod.
+
+    Parameters
+    ----------
+    pieces
+        Of a length, with all their rows.
+    start
+        The length whose factors all rows get.
+
+    Raises
+    ------
+    ValueError
+        If the series of a load does not end: a bend of it moves with the length.
+    """
+    given = pieces(start)
+    told = [_like(given, pieces(length)) for length in _lengths(low, high)]
+    found = []
+    for k, piece in enumerate(given):
+        constant, slope = (np.stack([getattr(each[k], part) for each in told]) for part in ("constant", "slope"))
+        found.append(RodSeries(piece, low, high, constant, slope, np.zeros(0)))
+    between = [low + share * (high - low) for share in BETWEEN]
+    exact = [_like(given, pieces(length)) for length in between]
+    return [_with_rest(own, between, [each[k] for each in exact]) for k, own in enumerate(found)]
+
+
+def _like(given: Sequence[Piece], found: Sequence[Piece]) -> list[AffineNorm]:
+    """Pieces at another length with the factors that they are given with."""
+    return [own.scaled(piece.given) if piece.given else own.affine for piece, own in zip(given, found, strict=True)]
+
+
+def _with_rest(own: RodSeries, lengths: Sequence[float], exact: Sequence[AffineNorm]) -> RodSeries:
+    def size(rows: Array) -> float:
+        return own.piece.affine.norm.value(own.piece.affine.grid, rows)
+
+    rest = []
+    parts = [own.constant, *np.moveaxis(own.slope, -1, 0)]
+    for part, j in zip(parts, range(-1, own.slope.shape[-1]), strict=True):
+        series = np.tensordot(_terms(), part, axes=1)
+        left = max(size(each) for each in series[-LAST:])
+        for length, known in zip(lengths, exact, strict=True):
+            at, true = own.at(length), known
+            pairs = (at.constant, true.constant) if j < 0 else (at.slope[..., j], true.slope[..., j])
+            left = max(left, size(pairs[0] - pairs[1]))
+        if TIMES * left > CONVERGED * max(map(size, series)):
+            raise ValueError("a bend of a load moves with the length of the rod")
+        rest.append(TIMES * left)
+    return replace(own, rest=np.array(rest))
+
+
+def _lengths(low: float, high: float) -> list[float]:
+    """Of the nodes of a series between two."""
+    places = np.cos(np.pi * (np.arange(TERMS) + 0.5) / TERMS)
+    return [float(2.0 / ((1.0 + x) / low + (1.0 - x) / high)) for x in places]
+
+
+@lru_cache(maxsize=1)
+def _terms() -> Array:
+    """Terms of a series from values at its nodes, shape (n, n)."""
+    k, i = np.arange(TERMS)[:, None], np.arange(TERMS) + 0.5
+    return np.asarray(np.cos(np.pi * k * i / TERMS) * np.where(k == 0, 1.0, 2.0) / TERMS)
+
+
+def _shares(places: Array) -> Array:
+    """Shares of the nodes in the value of the series at places in -1 ... 1, shape (places, n)."""
+    waves = np.cos(np.arange(TERMS) * np.arccos(np.clip(places, -1.0, 1.0))[:, None])
+    return np.asarray(waves @ _terms())
