@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import zlib
 
 import numpy as np
@@ -13,6 +14,9 @@ from laufruhe.files.reader import load
 from laufruhe.live import page_assets
 from laufruhe.live.saving import written
 from laufruhe.problem.evaluation import objective_value
+from laufruhe.report.result_report import result_document
+from laufruhe.report.web_page import as_html
+from laufruhe.solvers import state
 from live.pages import EVERY_NORM, designs, evaluated, model_of, problem_of
 from problem_files import PROBLEMS
 
@@ -109,6 +113,15 @@ def test_a_problem_with_nothing_open_has_no_sliders():
     )
     model = model_of(load(closed))
     assert model.sliders == model.unmoved == ()
+
+
+def test_headings_of_a_live_report_can_be_gone_to(every):
+    result = state(every[0])
+    page = as_html(result_document(result, ["polar"], "laufruhe"), {"polar": "<svg/>"}, every[1])
+    targets = re.findall('<h2 id="([^"]*)"', page)
+    assert targets[1:3] == ["try", "pictures"]
+    assert targets == re.findall('<a href="#([^"]*)"', page)
+    assert page.count("<script") == 2
 
 
 def test_script_and_style_ask_for_nothing():

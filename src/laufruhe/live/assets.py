@@ -6,7 +6,7 @@ from functools import cache
 from importlib.resources import files
 
 SCRIPT, STYLE = "live.js", "live.css"
-PARTS = ("signals", "norms", "numbers", "design", "drawing", "figures", "controls", "page")
+PARTS = ("signals", "norms", "numbers", "design", "drawing", "figures", "controls", "judge", "page")
 """Of the script, in the order in which they build on each other."""
 
 

@@ -8,8 +8,10 @@ class Slider {
     this.field = field;
     const { name, unit, lower, upper } = field, id = `live-${name.replace(/[^\w-]/g, "-")}`;
     const step = ((upper - lower) * unit.factor) / STEPS || 1;
-    this.range = element("input", { type: "range", id, min: lower * unit.factor, max: upper * unit.factor, step: "any", "data-decision": name });
-    this.number = element("input", { type: "number", min: lower * unit.factor, max: upper * unit.factor, step: "any", "data-number": name, "aria-label": `${name} in ${unit.shown || "its own unit"}` });
+    const bounds = { min: lower * unit.factor, max: upper * unit.factor, step: "any" };
+    const words = unit.shown ? `${name} in ${unit.shown}` : name;
+    this.range = element("input", { type: "range", id, ...bounds, "data-decision": name });
+    this.number = element("input", { type: "number", ...bounds, "data-number": name, "aria-label": words });
     this.range.addEventListener("keydown", (event) => this.key(event, step, told));
     this.range.addEventListener("input", () => told(name, this.range.valueAsNumber / unit.factor, false));
     this.range.addEventListener("change", () => told(name, this.range.valueAsNumber / unit.factor, true));
@@ -17,14 +19,17 @@ class Slider {
     this.rail = element("div", { class: "live-rail" }, this.range);
     this.marks = {};
     for (const [kind, value] of marks) this.setMark(kind, value);
-    const ends = element("span", { class: "live-ends" }, `${trimmed(lower * unit.factor)} to ${trimmed(upper * unit.factor)} ${unit.shown}`.trimEnd());
+    const [low, high] = [lower, upper].map((value) => trimmed(value * unit.factor));
+    const ends = element("span", { class: "live-ends" }, `${low} to ${high} ${unit.shown}`.trimEnd());
+    const typed = element("span", { class: "live-typed" }, this.number, element("span", { "aria-hidden": "true" }, unit.shown));
     this.root = element("div", { class: "live-slider" },
-      element("label", { for: id }, name, ends), this.rail, element("span", { class: "live-typed" }, this.number, element("span", { "aria-hidden": "true" }, unit.shown)));
+      element("label", { for: id }, name, ends), this.rail, typed);
   }
 
   /** Where a known design stands. */
   setMark(kind, value) {
-    const { lower, upper } = this.field, made = this.marks[kind] ??= element("i", { class: `live-mark ${kind}`, "aria-hidden": "true" });
+    const { lower, upper } = this.field;
+    const made = this.marks[kind] ??= element("i", { class: `live-mark ${kind}`, "aria-hidden": "true" });
     if (!made.parentNode) this.rail.append(made);
     // the middle of a thumb runs from one half of it to the other
     made.style.left = `calc(8px + (100% - 16px) * ${(value - lower) / (upper - lower || 1)})`;
@@ -61,12 +66,14 @@ class Slider {
 class Limits {
   constructor(measures) {
     this.rows = measures.map((measure) => this.row(measure));
-    const head = element("tr", {}, ...["limit", "value", "bound", "used"].map((text) => element("th", { scope: "col" }, text)));
-    this.root = element("table", { class: "live-limits" }, element("thead", {}, head), element("tbody", {}, ...this.rows.map((row) => row.root)));
+    const heads = ["limit", "value", "bound", "used"].map((text) => element("th", { scope: "col" }, text));
+    const body = element("tbody", {}, ...this.rows.map((row) => row.root));
+    this.root = element("table", { class: "live-limits" }, element("thead", {}, element("tr", {}, ...heads)), body);
   }
 
   row(measure) {
-    const value = element("td", {}), edge = element("td", { class: "edge" }), bar = element("i"), met = element("span", { class: "live-met" });
+    const value = element("td", {}), edge = element("td", { class: "edge" });
+    const bar = element("i"), met = element("span", { class: "live-met" });
     const root = element("tr", { "data-measure": measure.name }, element("th", { scope: "row" }, measure.name), value, edge,
       element("td", {}, element("span", { class: "live-gauge", "aria-hidden": "true" }, bar), met));
     root.classList.toggle("aside", !measure.followed);

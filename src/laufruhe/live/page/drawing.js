@@ -5,7 +5,9 @@ const SVG = "http://www.w3.org/2000/svg";
 /** An element with attributes and children. */
 function element(name, attributes = {}, ...children) {
   const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) if (value !== false) made.setAttribute(key, value === true ? "" : value);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value !== false) made.setAttribute(key, value === true ? "" : value);
+  }
   made.append(...children);
   return made;
 }

@@ -1,13 +1,15 @@
 // The figures of a page. Each is made once, and follows a design by `update`.
 
 const POINTS = 360;
+// times as many steps, among which results seek maxima of a place (M6)
+const FINER = 8;
 
 /**
  * What is drawn of a load at one design: per place its rows at every step, its mean and its peak.
  * @returns {{length: number, places: {name: string, rows: Float64Array[], lengths: Float64Array, mean: number, most: number}[]}}
  */
 function drawnOf(signal, k, x) {
-  const coarse = rowsAt(signal, 1, x).points[k].groups, fine = rowsAt(signal, 8, x).points[k].groups;
+  const [coarse, fine] = [1, FINER].map((times) => pointAt(signal, gridOf(signal, times).points[k], x).groups);
   const places = signal.places.map((name, place) => {
     const { lengths, rows } = coarse[place];
     let sum = 0;
@@ -20,7 +22,8 @@ function drawnOf(signal, k, x) {
 /** The same in arrays of its own. */
 function keptOf(signal, k, x) {
   const { length, places } = drawnOf(signal, k, x);
-  return { length, places: places.map((place) => ({ ...place, lengths: place.lengths.slice(), rows: place.rows.map((row) => row.slice()) })) };
+  const copied = ({ lengths, rows }) => ({ lengths: lengths.slice(), rows: rows.map((row) => row.slice()) });
+  return { length, places: places.map((place) => ({ ...place, ...copied(place) })) };
 }
 
 /** Largest peak of two designs. */
@@ -30,8 +33,8 @@ function peakOf(now, was) {
 
 /** A figure of a design beside another, whose lines and marks are drawn when these or the scale change. */
 class Compared {
-  constructor(signal, was) {
-    Object.assign(this, { signal, was, scale: new Scale(), isNew: true });
+  constructor(signal, was, key, title) {
+    Object.assign(this, { signal, was, key, title, scale: new Scale(), isNew: true });
   }
 
   compare(was) {
@@ -50,7 +53,7 @@ class Compared {
 /** Tips of forces, seen from the front: a panel for every place. */
 class Polar extends Compared {
   constructor(signal, was) {
-    super(signal, was);
+    super(signal, was, "polar", "Path of the tip over one cycle, seen from the front");
     this.panels = signal.places.map((name, place) => this.panel(name, place));
     this.root = element("div", { class: "live-polars" }, ...this.panels.map((panel) => panel.root));
   }
@@ -61,7 +64,8 @@ class Polar extends Compared {
     const start = drawn("circle", { r: 3.4, class: `dot ${colour(place)}` }), tick = label(194, 94, "", "end");
     for (const r of [45, 90]) svg.append(drawn("circle", { cx: 100, cy: 100, r, class: "grid" }));
     svg.append(drawn("path", { d: "M10 100H190M100 10V190", class: "axis" }), was, now, start, tick);
-    return { svg, was, now, start, tick, name, root: element("figure", { class: "live-polar" }, svg, element("figcaption", {}, name)) };
+    const root = element("figure", { class: "live-polar" }, svg, element("figcaption", {}, name));
+    return { svg, was, now, start, tick, name, root };
   }
 
   update(now) {
@@ -78,8 +82,8 @@ class Polar extends Compared {
 
   say(now) {
     this.panels.forEach(({ svg, name }, k) => {
-      const { mean, most } = now.places[k];
-      svg.setAttribute("aria-label", `Path of the force on ${name}: mean ${figure(mean, this.signal)}, maximum ${figure(most, this.signal)}.`);
+      const [mean, most] = [now.places[k].mean, now.places[k].most].map((value) => figure(value, this.signal));
+      svg.setAttribute("aria-label", `Path of the force on ${name}: mean ${mean}, maximum ${most}.`);
     });
   }
 
@@ -89,15 +93,15 @@ class Polar extends Compared {
   }
 
   path(place, length) {
-    const [y, z] = this.across(place), step = thinned(length, POINTS), count = Math.floor(length / step), share = 90 / this.scale.top;
-    return pathOf(count, (i) => 100 + share * y[i * step], (i) => 100 - share * z[i * step], true);
+    const [y, z] = this.across(place), step = thinned(length, POINTS), share = 90 / this.scale.top;
+    return pathOf(Math.floor(length / step), (i) => 100 + share * y[i * step], (i) => 100 - share * z[i * step], true);
   }
 }
 
 /** Size over the crank angle, a line for every place; of one component with its sign. */
 class OverAngle extends Compared {
   constructor(signal, was, width) {
-    super(signal, was);
+    super(signal, was, "angle", `${signal.parts > 1 ? "Size" : "Value"} over the crank angle [${signal.shown}]`);
     Object.assign(this, { wide: width - 64, isSigned: signal.parts === 1 });
     this.root = picture(width, 304, "");
     this.lines = signal.places.map((_, k) => line(`now ${colour(k)}`));
@@ -127,20 +131,21 @@ class OverAngle extends Compared {
 
   say(now) {
     const most = now.places.reduce((a, b) => (b.most > a.most ? b : a));
-    this.root.setAttribute("aria-label", `${this.signal.name} over the crank angle, at most ${figure(most.most, this.signal)} (${most.name}).`);
+    const words = `${this.signal.name} over the crank angle, at most ${figure(most.most, this.signal)} (${most.name}).`;
+    this.root.setAttribute("aria-label", words);
   }
 
   path(place, length) {
-    const values = this.isSigned ? place.rows[0] : place.lengths, step = thinned(length, POINTS), count = Math.floor(length / step) + 1;
+    const values = this.isSigned ? place.rows[0] : place.lengths, step = thinned(length, POINTS);
     const { top } = this.scale, wide = (this.wide * step) / length;
-    return pathOf(count, (i) => 52 + wide * i, (i) => this.y(values[(i * step) % length] / top));
+    return pathOf(Math.floor(length / step) + 1, (i) => 52 + wide * i, (i) => this.y(values[(i * step) % length] / top));
   }
 }
 
 /** Mean and maximum of every place, the optimum's marked. */
 class Bars extends Compared {
   constructor(signal, was) {
-    super(signal, was);
+    super(signal, was, "bars", "Mean (dark) and maximum (light) over one cycle");
     const height = 16 + 30 * signal.places.length;
     this.root = picture(420, height + 20, "");
     this.rows = signal.places.map((name, k) => this.row(name, k));
@@ -152,7 +157,8 @@ class Bars extends Compared {
     const y = 12 + 30 * k, most = drawn("rect", { x: 120, y, height: 20, class: `most ${colour(k)}` });
     const mean = drawn("rect", { x: 120, y: y + 3, height: 14, class: `mean ${colour(k)}` });
     const marks = [drawn("path", { class: "mark" }), drawn("path", { class: "mark" })];
-    this.root.append(label(112, y + 14, name.length > 17 ? `${name.slice(0, 16)}…` : name, "end", "name"), most, mean, ...marks);
+    const short = name.length > 17 ? `${name.slice(0, 16)}…` : name;
+    this.root.append(label(112, y + 14, short, "end", "name"), most, mean, ...marks);
     return { most, mean, marks, y };
   }
 
@@ -169,7 +175,8 @@ class Bars extends Compared {
   }
 
   say(now) {
-    const words = now.places.map((place) => `${place.name}: mean ${figure(place.mean, this.signal)}, maximum ${figure(place.most, this.signal)}`);
+    const told = (value) => figure(value, this.signal);
+    const words = now.places.map(({ name, mean, most }) => `${name}: mean ${told(mean)}, maximum ${told(most)}`);
     this.root.setAttribute("aria-label", `${words.join("; ")}.`);
   }
 }
@@ -180,6 +187,7 @@ const MOST_ORDERS = 12;
 class Orders {
   constructor(signal, k, designs) {
     Object.assign(this, { signal, point: signal.points[k], scale: new Scale() });
+    Object.assign(this, { key: "orders", title: `Amplitude by order [${signal.shown}]` });
     this.orders = this.counted(designs);
     this.root = picture(420, 194, "");
     this.width = 360 / this.orders.length;
@@ -192,7 +200,9 @@ class Orders {
   counted(designs) {
     const { signal, point } = this, all = ordersOf(signal, point), most = all.map(() => 0);
     for (const x of designs) {
-      signal.places.forEach((_, place) => amplitudesAt(signal, point, place, x, all).forEach((value, j) => { most[j] = Math.max(most[j], value); }));
+      signal.places.forEach((_, place) => {
+        amplitudesAt(signal, point, place, x, all).forEach((value, j) => { most[j] = Math.max(most[j], value); });
+      });
     }
     const top = largest(most), felt = all.map((order, j) => [order, most[j]]).filter(([, value]) => value > 0.01 * top);
     return felt.sort((p, q) => q[1] - p[1]).slice(0, MOST_ORDERS).map(([order]) => order).sort((p, q) => p - q);
@@ -202,7 +212,8 @@ class Orders {
     const left = 48 + this.width * j, each = (0.8 * this.width) / this.signal.places.length;
     this.root.append(label(left + 0.4 * this.width, 174, trimmed(order)));
     return this.signal.places.map((_, place) => {
-      const bar = drawn("rect", { x: left + each * place, width: Math.max(each - 0.6, 0.8), class: `mean ${colour(place)}` });
+      const where = { x: left + each * place, width: Math.max(each - 0.6, 0.8) };
+      const bar = drawn("rect", { ...where, class: `mean ${colour(place)}` });
       this.root.append(bar);
       return bar;
     });
@@ -220,7 +231,27 @@ class Orders {
   }
 
   say() {
-    const words = this.orders.map((order, j) => `order ${trimmed(order)}: ${figure(largest(this.found.map((own) => own[j])), this.signal)}`);
+    const most = (j) => figure(largest(this.found.map((own) => own[j])), this.signal);
+    const words = this.orders.map((order, j) => `order ${trimmed(order)}: ${most(j)}`);
     this.root.setAttribute("aria-label", `Largest amplitudes. ${words.join("; ")}.`);
   }
+}
+
+/** Figures of a load that follow its rows; a path where it is a force or a couple across the crank. */
+function forcesOf(signal, was, width) {
+  const isPath = signal.parts > 1 && signal.unit.startsWith("N");
+  return [...(isPath ? [new Polar(signal, was)] : []), new OverAngle(signal, was, width), new Bars(signal, was)];
+}
+
+/** Names of the places in their colours. */
+function legendOf(signal) {
+  const names = signal.places.map((name, k) => element("span", { class: colour(k) }, name));
+  const made = element("p", { class: "live-legend", "aria-hidden": "true" }, ...names);
+  made.hidden = names.length < 2;
+  return made;
+}
+
+/** A figure with its title. */
+function boxOf({ key, title, root }) {
+  return element("figure", { "data-figure": key, class: `live-figure ${key}` }, element("figcaption", {}, title), root);
 }

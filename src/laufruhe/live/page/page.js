@@ -1,64 +1,5 @@
 // The page: a model, a state and a drawing, kept apart. `show` brings them together.
 
-const KEPT = 1e-5, AT = 5e-5;
-
-/** A model with its numbers. */
-async function opened(model) {
-  const block = model.data ? await inflated(model.data) : new Float64Array(0);
-  return { ...model, signals: model.signals.map((signal) => decoded(signal, block)) };
-}
-
-/** All measures at a decision vector, in their order; rows of one signal are taken once. */
-function measured(model, x) {
-  const known = new Map();
-  return model.measures.map((measure) => {
-    if (measure.signal === null) return measure.value;
-    const key = `${measure.signal} ${measure.refinement}`;
-    if (!known.has(key)) known.set(key, rowsAt(model.signals[measure.signal], measure.refinement, x));
-    return NORMS[measure.norm](known.get(key));
-  });
-}
-
-/** How a value stands to a limit: the side that has least room, and whether it is kept. */
-function standing(measure, value) {
-  if (measure.signal === null) return { value, met: measure.followed ? measure.met : null, side: measure.sides[0] ?? null };
-  const rooms = measure.sides.map(([sense, edge]) => [(sense === "at most" ? edge - value : value - edge) / (Math.abs(edge) || 1), [sense, edge]]);
-  const [room, side] = rooms.reduce((a, b) => (b[0] < a[0] ? b : a), [Infinity, null]);
-  return { value, met: room >= -KEPT, side };
-}
-
-/** What is known of one design: objective, limits, and what is minimised after it. */
-function judged(model, values) {
-  return judgedAt(model, vectorOf(model, values));
-}
-
-function judgedAt(model, x) {
-  const found = measured(model, x);
-  const at = (role) => model.measures.map((measure, k) => ({ measure, value: found[k] })).filter(({ measure }) => measure.role === role);
-  const terms = at("objective");
-  return {
-    x,
-    objective: terms.length && terms.every(({ measure }) => measure.followed) ? terms.reduce((sum, { measure, value }) => sum + measure.weight * value, 0) : null,
-    limits: at("limit").map(({ measure, value }) => standing(measure, value)),
-    ranks: at("rank"),
-  };
-}
-
-/** Largest difference between the page's own numbers and those of the exact model, over the largest of each measure. */
-function difference(model) {
-  const designs = Object.values(model.designs).map(({ x, measured: told }) => [measured(model, Float64Array.from(x)), told]);
-  return largest(model.measures.map((_, k) => {
-    const known = designs.filter(([, told]) => told[k] !== null), size = largest(known.map(([, told]) => Math.abs(told[k])));
-    return largest(known.map(([own, told]) => Math.abs(own[k] - told[k]) / (size || 1)));
-  }));
-}
-
-/** Number of the curve that the objective is of; else the first. */
-function ownCurve(model) {
-  const asked = model.measures.find((measure) => measure.role === "objective" && measure.signal !== null);
-  return Math.max(model.curves.findIndex((curve) => asked && model.signals[curve.signal].name === model.signals[asked.signal].name), 0);
-}
-
 /** A page of a model in an element, and a handle to it. */
 class Page {
   constructor(root) {
@@ -77,7 +18,7 @@ class Page {
     this.optimum = this.known("optimum");
     this.given = this.known("given");
     this.bound = this.model.proved;
-    this.size = largest(Object.values(this.model.designs).map(({ x }) => judgedAt(this.model, Float64Array.from(x)).objective ?? 0));
+    this.size = sizeOf(this.model);
     // the address is that of the first model, whatever was moved since stays
     this.values = fitting(this.model, this.history ? this.values : fromAddress() ?? {}, this.optimum ?? this.given);
     this.history = new History({ ...this.values });
@@ -99,23 +40,31 @@ class Page {
   // what is shown
 
   build() {
-    const { model } = this, told = (name, value, isLast) => this.move({ [name]: value }, isLast);
-    this.sliders = fields(model).map((field) => new Slider(field, this.marks(field), told));
-    this.limits = new Limits(model.measures.filter((measure) => measure.role === "limit"));
+    const told = (name, value, isLast) => this.move({ [name]: value }, isLast);
+    this.sliders = fields(this.model).map((field) => new Slider(field, this.marks(field), told));
+    this.limits = new Limits(ofRole(this.model, "limit"));
+    this.spoken = element("p", { class: "live-spoken", "aria-live": "polite", role: "status" });
+    this.said = element("p", { class: "live-note" });
+    const region = { class: "live-scroll", tabindex: "0", role: "region", "aria-label": "Limits" };
+    const limits = element("div", region, this.limits.root);
+    limits.hidden = this.limits.rows.length === 0;
+    const sliders = this.sliders.map((slider) => slider.root);
+    const group = element("div", { class: "live-sliders", role: "group", "aria-label": "Decisions" }, ...sliders);
+    const parts = [this.card(), limits, this.buttons(), this.said, group, this.spoken];
+    const controls = element("div", { class: "live-controls" }, ...parts);
+    this.figures = element("div", { class: "live-figures" });
+    const views = element("div", { class: "live-views" }, this.choices(), this.figures);
+    this.root.replaceChildren(element("div", { class: "live" }, controls, views), this.notes());
+    this.draw = this.drawing();
+  }
+
+  /** The objective, and how it stands to the optimum. */
+  card() {
+    const name = element("p", { class: "live-name" }, this.model.objective.name || "No objective");
     this.value = element("output", { class: "live-value", "data-measure": "objective" });
     this.regret = element("p", { class: "live-regret", "data-role": "regret" });
     this.ranks = element("p", { class: "live-note" });
-    this.spoken = element("p", { class: "live-spoken", "aria-live": "polite", role: "status" });
-    this.said = element("p", { class: "live-note" });
-    const objective = model.objective.name;
-    const card = element("div", { class: "live-card" }, element("p", { class: "live-name" }, objective || "No objective"), this.value, this.regret, this.ranks);
-    const limits = element("div", { class: "live-scroll", tabindex: "0", role: "region", "aria-label": "Limits" }, this.limits.root);
-    limits.hidden = this.limits.rows.length === 0;
-    const controls = element("div", { class: "live-controls" }, card, limits, this.buttons(), this.said,
-      element("div", { class: "live-sliders", role: "group", "aria-label": "Decisions" }, ...this.sliders.map((slider) => slider.root)), this.spoken);
-    this.figures = element("div", { class: "live-figures" });
-    this.root.replaceChildren(element("div", { class: "live" }, controls, element("div", { class: "live-views" }, this.choices(), this.figures)), this.notes());
-    this.draw = this.drawing();
+    return element("div", { class: "live-card" }, name, this.value, this.regret, this.ranks);
   }
 
   marks(field) {
@@ -124,45 +73,36 @@ class Page {
   }
 
   buttons() {
-    const { given, model } = this;
+    const { given, model } = this, old = { isOld: true };
     this.best = button("optimum", "Back to the optimum", "The design that was decided", () => this.set(this.optimum));
     this.best.hidden = !this.optimum;
-    this.undo = button("undo", "Undo", "Ctrl+Z", () => this.set(this.history.undo(), { isOld: true }));
-    this.redo = button("redo", "Redo", "Ctrl+Shift+Z", () => this.set(this.history.redo(), { isOld: true }));
-    const made = [
-      this.best,
-      ...(given ? [button("given", "As given", "Where the file starts", () => this.set(this.given))] : []),
-      this.undo, this.redo,
-      button("link", "Copy link", "The address holds the design", () => this.copyLink()),
-      ...(model.save.text ? [button("save", "Save as TOML", "A problem file of this design, for laufruhe evaluate", () => this.save())] : []),
-    ];
+    this.undo = button("undo", "Undo", "Ctrl+Z", () => this.set(this.history.undo(), old));
+    this.redo = button("redo", "Redo", "Ctrl+Shift+Z", () => this.set(this.history.redo(), old));
+    const start = button("given", "As given", "Where the file starts", () => this.set(this.given));
+    start.hidden = !given;
+    const link = button("link", "Copy link", "The address holds the design", () => this.copyLink());
+    const save = button("save", "Save as TOML", "A problem file of this design, for laufruhe evaluate", () => this.save());
+    save.hidden = !model.save.text;
+    const made = [this.best, start, this.undo, this.redo, link, save];
     return element("div", { class: "live-buttons", role: "toolbar", "aria-label": "Designs" }, ...made);
   }
 
   choices() {
-    const curves = choice("Load shown", this.model.curves.map((curve) => curve.title), this.curve, (k) => { this.curve = k; this.redraw(); });
-    const points = choice("Operating point", this.model.points, this.point, (k) => { this.point = k; this.redraw(); });
+    const chosen = (key) => (k) => { this[key] = k; this.redraw(); };
+    const titles = this.model.curves.map((curve) => curve.title);
+    const curves = choice("Load shown", titles, this.curve, chosen("curve"));
+    const points = choice("Operating point", this.model.points, this.point, chosen("point"));
     return element("div", { class: "live-choices" }, curves, points);
   }
 
   /** The figures of the load that is chosen, and what brings them to a design. */
   drawing() {
-    const { model, point } = this, curve = model.curves[this.curve], signal = model.signals[curve?.signal];
+    const { model, point } = this, signal = model.signals[model.curves[this.curve]?.signal];
     if (!signal) return { compare() {}, update() {}, say() {} };
-    const known = Object.values(model.designs).map((design) => Float64Array.from(design.x));
-    const was = keptOf(signal, point, this.markedAt());
-    const polar = signal.parts > 1 && signal.unit.startsWith("N") ? new Polar(signal, was) : null;
-    const over = new OverAngle(signal, was, this.root.clientWidth < 560 ? 430 : 860), bars = new Bars(signal, was), orders = new Orders(signal, point, known);
-    const boxes = [
-      polar && ["polar", "Path of the tip over one cycle, seen from the front", polar.root],
-      ["angle", `${signal.parts > 1 ? "Size" : "Value"} over the crank angle [${signal.shown}]`, over.root],
-      ["bars", "Mean (dark) and maximum (light) over one cycle", bars.root],
-      ["orders", `Amplitude by order [${signal.shown}]`, orders.root],
-    ].filter(Boolean);
-    const legend = element("p", { class: "live-legend", "aria-hidden": "true" }, ...signal.places.map((name, k) => element("span", { class: colour(k) }, name)));
-    legend.hidden = signal.places.length < 2;
-    this.figures.replaceChildren(legend, ...boxes.map(([key, title, root]) => element("figure", { "data-figure": key, class: `live-figure ${key}` }, element("figcaption", {}, title), root)));
-    const forces = [polar, over, bars].filter(Boolean);
+    const known = designsOf(model).map(({ x }) => x), was = keptOf(signal, point, this.markedAt());
+    const forces = forcesOf(signal, was, this.root.clientWidth < 560 ? 430 : 860), orders = new Orders(signal, point, known);
+    const legend = legendOf(signal);
+    this.figures.replaceChildren(legend, ...[...forces, orders].map(boxOf));
     return {
       compare: () => {
         const other = keptOf(signal, point, this.markedAt());
@@ -193,13 +133,16 @@ class Page {
   }
 
   notes() {
-    const { model } = this, kept = this.optimum ? "the design that was decided, as rings on the sliders do; bars on them show the one given" : "the design as given, as bars on the sliders do";
+    const { model } = this, hasSliders = model.sliders.length > 0;
+    const kept = this.optimum
+      ? "the design that was decided, as rings on the sliders do; bars on them show the one given"
+      : "the design as given, as bars on the sliders do";
     const notes = [
-      ...(model.whyNot ? [model.whyNot] : []),
-      ...(this.given && model.sliders.length ? [`Thin grey lines and black marks show ${kept}.`] : []),
+      model.whyNot,
+      this.given && hasSliders && `Thin grey lines and black marks show ${kept}.`,
       ...grouped(model.unmoved).map(({ names, why }) => `${names.join(", ")}: ${why}.`),
-      ...(!model.save.text && model.save.note && model.sliders.length ? [model.save.note] : []),
-    ];
+      !model.save.text && hasSliders && model.save.note,
+    ].filter(Boolean);
     this.accuracy = element("p", { "data-role": "accuracy" });
     return element("div", { class: "live-notes" }, ...notes.map((text) => element("p", {}, text)), this.accuracy);
   }
@@ -208,8 +151,13 @@ class Page {
   check() {
     this.error = difference(this.model);
     const size = this.error < 1e-15 ? "less than 1e-15" : exponential(this.error, 2);
-    const bad = this.error > 1e-6 ? " That is more than the figures shown can bear: take the numbers of laufruhe evaluate." : "";
-    this.accuracy.textContent = `Numbers of this page are float64. Held against the exact model at ${Object.keys(this.model.designs).length} designs as it opened, they differ by ${size} of their size at the most.${bad}`;
+    const words = [
+      "Numbers of this page are float64.",
+      `Held against the exact model at ${designsOf(this.model).length} designs as it opened,`,
+      `they differ by ${size} of their size at the most.`,
+      this.error > 1e-6 ? "That is more than the figures shown can bear: take the numbers of laufruhe evaluate." : "",
+    ];
+    this.accuracy.textContent = words.join(" ").trim();
     return this.error;
   }
 
@@ -255,32 +203,24 @@ class Page {
     this.value.setAttribute("data-value", found.objective ?? "");
     this.showRegret(found);
     this.limits.update(found.limits);
-    this.ranks.textContent = found.ranks.map(({ measure, value }) => `${measure.name}: ${figure(value, measure)}`).join("; ");
+    const ranks = found.ranks.map(({ measure, value }) => `${measure.name}: ${figure(value, measure)}`);
+    this.ranks.textContent = ranks.join("; ");
     this.undo.disabled = !this.history.canUndo;
     this.redo.disabled = !this.history.canRedo;
     this.draw.update(found.x);
   }
 
-  showRegret(found) {
-    const { bound, model } = this, broken = this.broken();
+  showRegret({ objective }) {
+    const { bound } = this, broken = this.broken(), isNothing = bound && bound.value <= 1e-9 * this.size;
     this.regret.classList.toggle("broken", broken.length > 0);
     const more = broken.length > 2 ? ` and ${broken.length - 2} more` : "";
     const limits = broken.length ? `Breaks ${broken.slice(0, 2).join(", ")}${more}. ` : "";
-    if (!bound || found.objective === null) { this.regret.textContent = limits; return; }
-    const share = this.isNothing(bound.value) ? found.objective - bound.value : found.objective / bound.value - 1;
-    this.regret.setAttribute("data-value", share);
-    this.regret.textContent = `${limits}${this.against(found.objective, share, limits !== "")}`;
-  }
-
-  /** How the objective stands to the proven one. */
-  against(value, share, isBroken) {
-    const { bound, model } = this, best = `the optimum of ${this.told(bound.value)} (${proofWords(bound)})`;
-    const unknown = model.measures.filter((measure) => !measure.followed).map((measure) => measure.name);
-    const aside = unknown.length ? ` Not followed here: ${unknown.join(", ")}.` : "";
-    if (this.isOptimum()) return `This is ${best}.`;
-    if (Math.abs(value - bound.value) <= AT * Math.abs(bound.value)) return `As much as ${best}.${aside}`;
-    if (share < 0 && (aside || isBroken)) return `Less than ${best}, which keeps all limits.${aside}`;
-    return `${this.isNothing(bound.value) ? `${this.told(share)} more than` : `${percent(share)} against`} ${best}.${aside}`;
+    this.regret.textContent = limits;
+    if (!bound || objective === null) return;
+    const isOptimum = this.optimum !== null && isSame(this.model, this.values, this.optimum);
+    const at = { value: objective, isNothing, isOptimum, isBroken: broken.length > 0 };
+    this.regret.setAttribute("data-value", (objective - bound.value) / (isNothing ? 1 : bound.value));
+    this.regret.textContent = limits + against(this.model, bound, (value) => this.told(value), at);
   }
 
   /** The objective in words; what is a rounding beside the designs known is nothing. */
@@ -288,26 +228,15 @@ class Page {
     return figure(value, this.model.objective, 4, this.size);
   }
 
-  isNothing(value) {
-    return value <= 1e-9 * this.size;
-  }
-
-  /** Whether the design is the one that was decided, but for roundings. */
-  isOptimum() {
-    const x = vectorOf(this.model, this.values), best = vectorOf(this.model, this.optimum ?? this.values);
-    const size = largest(this.model.sliders.map((slider) => slider.upper - slider.lower));
-    return this.optimum !== null && x.every((value, k) => Math.abs(value - best[k]) <= 1e-9 * size);
-  }
-
   /** Names of the limits that are broken. */
   broken() {
-    const limits = this.model.measures.filter((measure) => measure.role === "limit");
-    return limits.filter((_, k) => this.found.limits[k].met === false).map((measure) => measure.name);
+    return ofRole(this.model, "limit").filter((_, k) => this.found.limits[k].met === false).map((measure) => measure.name);
   }
 
   sentence() {
     const broken = this.broken(), kept = this.found.limits.length ? "All limits are kept." : "";
-    return `${this.model.objective.name} ${this.value.textContent}. ${broken.length ? `Broken: ${broken.join(", ")}.` : kept}`;
+    const limits = broken.length ? `Broken: ${broken.join(", ")}.` : kept;
+    return `${this.model.objective.name} ${this.value.textContent}. ${limits}`;
   }
 
   key(event) {
@@ -325,8 +254,12 @@ class Page {
 
   async copyLink() {
     toAddress(this.values);
-    try { await navigator.clipboard.writeText(location.href); this.said.textContent = "The link is copied; it shows this design."; }
-    catch { this.said.textContent = "The address of this page now shows this design: copy it from there."; }
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.said.textContent = "The link is copied; it shows this design.";
+    } catch {
+      this.said.textContent = "The address of this page now shows this design: copy it from there.";
+    }
   }
 
   save() {
@@ -345,9 +278,12 @@ class Page {
   text() { return savedText(this.model, this.values); }
 
   measures() {
-    const { model } = this, objective = { ...unitOf(model.objective), name: "objective", words: model.objective.name, value: this.found.objective, met: true };
-    const limits = this.model.measures.filter((measure) => measure.role === "limit");
-    return [objective, ...limits.map((measure, k) => ({ ...unitOf(measure), name: measure.name, words: measure.name, value: this.found.limits[k].value, met: this.found.limits[k].met }))];
+    const { objective } = this.model, whole = { words: objective.name, value: this.found.objective, met: true };
+    const limits = ofRole(this.model, "limit").map((measure, k) => {
+      const { value, met } = this.found.limits[k];
+      return { ...unitOf(measure), name: measure.name, words: measure.name, value, met };
+    });
+    return [{ ...unitOf(objective), name: "objective", ...whole }, ...limits];
   }
 
   /** Another optimum of the same loads, as limits move. */
@@ -363,7 +299,7 @@ class Page {
   /** Other edges of limits: at most what is told. */
   setLimits(limits) {
     for (const { name, maximum } of limits) {
-      const measure = this.model.measures.find((own) => own.role === "limit" && own.name === name);
+      const measure = ofRole(this.model, "limit").find((own) => own.name === name);
       if (measure) measure.sides = measure.sides.map(([sense, edge]) => [sense, sense === "at most" ? maximum : edge]);
     }
     this.askFrame();
@@ -390,24 +326,6 @@ class Page {
     document.removeEventListener("keydown", this.keys);
     window.removeEventListener("hashchange", this.hash);
   }
-}
-
-/** SI unit, the one that is shown, and its factor. */
-function unitOf({ unit, shown, factor }) {
-  return { unit, shown, factor };
-}
-
-/** What was proven of an optimum. */
-function proofWords({ kind, gap }) {
-  if (kind === "global") return "proven";
-  return kind === "global within gap" ? `proven to ${trimmed(100 * gap, 2)} %` : "a local one";
-}
-
-/** Names that have the same to be said of them. */
-function grouped(unmoved) {
-  const by = new Map();
-  for (const { name, why } of unmoved) by.set(why, [...(by.get(why) ?? []), name]);
-  return [...by].map(([why, names]) => ({ why, names }));
 }
 
 /**

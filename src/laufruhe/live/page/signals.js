@@ -131,7 +131,9 @@ function pointGrid(signal, point, steps, isFine) {
   const length = steps + between.length;
   const parts = Array.from({ length: signal.count * signal.parts }, (_, at) => at);
   const constant = parts.map((at) => constantOf(signal, point, bends, at, steps, between));
-  const bent = (isFine ? point.bent : []).map((own) => ({ column: own.column, rows: parts.map((at) => constantOf(signal, point, own, at, steps, between)) }));
+  const bent = (isFine ? point.bent : []).map((own) => {
+    return { column: own.column, rows: parts.map((at) => constantOf(signal, point, own, at, steps, between)) };
+  });
   const waves = Array.from(point.slope.orders, (order) => waveOf(order, signal.base, steps, between));
   return { share: point.share, length, constant, bent, waves, point };
 }
@@ -227,18 +229,16 @@ function component(signal, own, at, x, out) {
  * @returns {{adds: boolean, points: {share: number, groups: {lengths: Float64Array, rows: Float64Array[]}[]}[]}}
  */
 function rowsAt(signal, times, x) {
-  const grid = gridOf(signal, times);
-  if (grid.x !== x) {
-    grid.x = x;
-    grid.rows = { adds: signal.adds, points: grid.points.map((own) => pointAt(signal, own, x)) };
-  }
-  return grid.rows;
+  return { adds: signal.adds, points: gridOf(signal, times).points.map((own) => pointAt(signal, own, x)) };
 }
 
+/** Rows of one operating point, taken once for one design. */
 function pointAt(signal, own, x) {
-  const groups = own.groups ??= signal.places.map(() => groupOf(signal, own.length));
-  groups.forEach((group, place) => fill(signal, own, place, x, group));
-  return { share: own.share, groups };
+  if (own.x === x) return own;
+  own.x = x;
+  own.groups ??= signal.places.map(() => groupOf(signal, own.length));
+  own.groups.forEach((group, place) => fill(signal, own, place, x, group));
+  return own;
 }
 
 /** Arrays of one place. */
@@ -276,7 +276,8 @@ function ordersOf(signal, point) {
 function amplitudesAt(signal, point, place, x, orders) {
   const stride = signal.count * signal.parts, { series, slope } = point;
   return orders.map((order) => {
-    const j = waveNumber(signal, series, order), k = waveNumber(signal, slope, order), c = new Float64Array(2 * signal.parts);
+    const [j, k] = [series, slope].map((waves) => waveNumber(signal, waves, order));
+    const c = new Float64Array(2 * signal.parts);
     for (let part = 0; part < signal.parts; part++) {
       const at = place * signal.parts + part, [a, b] = k < 0 ? [0, 0] : slopeAt(signal, point, k, at, x);
       const from = 2 * (j * stride + at);

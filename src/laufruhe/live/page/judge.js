@@ -1,0 +1,115 @@
+// What is known of a design: every measure, how it stands to its limits, and how good it is against the optimum.
+
+// relative excess over a limit that counts as none, and difference of objectives that are told as one
+const KEPT = 1e-5, AT = 5e-5;
+
+/** A model with its numbers. */
+async function opened(model) {
+  const block = model.data ? await inflated(model.data) : new Float64Array(0);
+  return { ...model, signals: model.signals.map((signal) => decoded(signal, block)) };
+}
+
+/** All measures at a decision vector, in their order; rows of one signal are taken once. */
+function measured(model, x) {
+  return model.measures.map(({ signal, norm, refinement, value }) => {
+    return signal === null ? value : NORMS[norm](rowsAt(model.signals[signal], refinement, x));
+  });
+}
+
+/** How a value stands to a limit: the side that has least room, and whether it is kept; null where that is not known. */
+function standing(measure, value) {
+  const { signal, sides, followed } = measure;
+  if (signal === null) return { value, met: followed ? measure.met : null, side: sides[0] ?? null };
+  const room = ([sense, edge]) => (sense === "at most" ? edge - value : value - edge) / (Math.abs(edge) || 1);
+  const side = sides.reduce((a, b) => (a && room(a) <= room(b) ? a : b), null);
+  return { value, met: !side || room(side) >= -KEPT, side };
+}
+
+/** Measures of a role. */
+function ofRole(model, role) {
+  return model.measures.filter((measure) => measure.role === role);
+}
+
+/** What is known of one design: objective, limits, and what is minimised after it. */
+function judged(model, values) {
+  return judgedAt(model, vectorOf(model, values));
+}
+
+/** The same of a decision vector. */
+function judgedAt(model, x) {
+  const found = measured(model, x), value = (measure) => found[model.measures.indexOf(measure)];
+  const terms = ofRole(model, "objective"), isKnown = terms.length > 0 && terms.every((measure) => measure.followed);
+  return {
+    x,
+    objective: isKnown ? terms.reduce((sum, measure) => sum + measure.weight * value(measure), 0) : null,
+    limits: ofRole(model, "limit").map((measure) => standing(measure, value(measure))),
+    ranks: ofRole(model, "rank").map((measure) => ({ measure, value: value(measure) })),
+  };
+}
+
+/** Designs that came with the model: their vectors, and what the exact model measures of them. */
+function designsOf(model) {
+  return Object.values(model.designs).map(({ x, measured: told }) => ({ x: Float64Array.from(x), told }));
+}
+
+/** Largest difference between the page's own numbers and those of the exact model, over the largest of each measure. */
+function difference(model) {
+  const designs = designsOf(model).map(({ x, told }) => ({ own: measured(model, x), told }));
+  return largest(model.measures.map((_, k) => {
+    const known = designs.filter(({ told }) => told[k] !== null), size = largest(known.map(({ told }) => Math.abs(told[k])));
+    return largest(known.map(({ own, told }) => Math.abs(own[k] - told[k]) / (size || 1)));
+  }));
+}
+
+/** Largest objective of the designs that came with the model. */
+function sizeOf(model) {
+  return largest(designsOf(model).map(({ x }) => judgedAt(model, x).objective ?? 0));
+}
+
+/** Whether two designs are one, but for roundings. */
+function isSame(model, values, others) {
+  const x = vectorOf(model, values), y = vectorOf(model, others);
+  const size = largest(model.sliders.map((slider) => slider.upper - slider.lower));
+  return x.every((value, k) => Math.abs(value - y[k]) <= 1e-9 * size);
+}
+
+/** What was proven of an optimum. */
+function proofWords({ kind, gap }) {
+  if (kind === "global") return "proven";
+  return kind === "global within gap" ? `proven to ${trimmed(100 * gap, 2)} %` : "a local one";
+}
+
+/**
+ * How an objective stands to the optimum, in words.
+ * @param told of an objective
+ * @param {{value: number, isNothing: boolean, isOptimum: boolean, isBroken: boolean}} at the objective, whether the
+ *   optimum is nothing, whether the design is the optimum, and whether it breaks a limit
+ */
+function against(model, bound, told, at) {
+  const best = `the optimum of ${told(bound.value)} (${proofWords(bound)})`, less = at.value - bound.value;
+  const unknown = model.measures.filter((measure) => !measure.followed).map((measure) => measure.name);
+  const aside = unknown.length ? ` Not followed here: ${unknown.join(", ")}.` : "";
+  if (at.isOptimum) return `This is ${best}.`;
+  if (Math.abs(less) <= AT * Math.abs(bound.value)) return `As much as ${best}.${aside}`;
+  if (less < 0 && (aside || at.isBroken)) return `Less than ${best}, which keeps all limits.${aside}`;
+  return `${at.isNothing ? `${told(less)} more than` : `${percent(less / bound.value)} against`} ${best}.${aside}`;
+}
+
+/** Number of the curve that the objective is of; else the first. */
+function ownCurve(model) {
+  const asked = model.measures.find((measure) => measure.role === "objective" && measure.signal !== null);
+  const name = (curve) => model.signals[curve.signal].name;
+  return Math.max(model.curves.findIndex((curve) => asked && name(curve) === model.signals[asked.signal].name), 0);
+}
+
+/** Names that have the same to be said of them. */
+function grouped(unmoved) {
+  const by = new Map();
+  for (const { name, why } of unmoved) by.set(why, [...(by.get(why) ?? []), name]);
+  return [...by].map(([why, names]) => ({ why, names }));
+}
+
+/** SI unit, the one that is shown, and its factor. */
+function unitOf({ unit, shown, factor }) {
+  return { unit, shown, factor };
+}
