@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from laufruhe.numerics.arrays import Array, ComplexArray
 
 
 class Dynamic(Protocol):

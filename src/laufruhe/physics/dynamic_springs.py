@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine.dynamic import Dynamic, FluidTrack
 from laufruhe.machine.mount import Mount, every_spring
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from laufruhe.numerics.arrays import Array, ComplexArray
 
 
 @dataclass(frozen=True, eq=False)

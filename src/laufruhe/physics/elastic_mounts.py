@@ -23,14 +23,12 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError, UncarriedLoadError
 from laufruhe.machine.block import Block
 from laufruhe.machine.mount import Mount, every_spring
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.dynamic_springs import DynamicSprings, dynamic_springs
 from laufruhe.physics.modes import Modes, modes_of
 from laufruhe.physics.rigid_body import carried, moved_wrench, point_motion
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 UNDRIVEN = 1e-12
 RESONANCE = 1e-8

@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.time_model import TimeModel
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Loads: TypeAlias = Sequence[tuple[Array, ComplexArray]]
 
 NODES, FINE = 4, 64

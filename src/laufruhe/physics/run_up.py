@@ -20,11 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.time_model import TimeModel, time_model
-
-Array = NDArray[np.float64]
 
 STEPS_PER_PERIOD = 24
 LEAST_STEPS, MOST_STEPS = 16, 4000

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.machine.dynamic import FluidTrack
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.dynamic_springs import DynamicSprings
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.rigid_body import moved_wrench
-
-Array = NDArray[np.float64]
-
 
 NO_LAW = "a stiffness measured over frequency has no law in time; give a fluid_track, or leave time and run-ups out"
 

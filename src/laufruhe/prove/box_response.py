@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.rigid_body import moved_wrench
@@ -26,10 +27,6 @@ from laufruhe.problem.channels import Channel, mounting_in
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-Indices = NDArray[np.intp]
 
 NOTHING = 1e-13
 

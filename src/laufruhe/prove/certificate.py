@@ -47,6 +47,10 @@ class Proof(StrEnum):
     NONE = "none"
 
 
+STRENGTH = (Proof.NONE, Proof.LOCAL, Proof.WITHIN_GAP, Proof.GLOBAL).index
+"""Of a proof: of several together the weakest counts."""
+
+
 class Reach(StrEnum):
     """What the bound of a method can prove."""
 

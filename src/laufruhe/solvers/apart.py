@@ -14,14 +14,12 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.prove.certificate import STRENGTH, Certificate, Proof
 from laufruhe.solvers.conclusion import none_within
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 
 Solve = Callable[[Problem], Result]
 Kinds = frozenset[Kind]
-# the weakest of two counts
-_STRENGTH = (Proof.NONE, Proof.LOCAL, Proof.WITHIN_GAP, Proof.GLOBAL)
 _ALONE = (Kind.FLYWHEEL, Kind.TORSION)
 
 
@@ -115,7 +113,7 @@ def _together(found: list[Result], value: float) -> Certificate:
     shown = [(r.certificate, r.objective.value if r.objective else 0.0) for r in found]
     bound = sum(own if certificate is None else certificate.lower_bound for certificate, own in shown)
     told = [certificate for certificate, _ in shown if certificate is not None]
-    kind = min((certificate.kind for certificate in told), key=_STRENGTH.index)
+    kind = min((certificate.kind for certificate in told), key=STRENGTH)
     gap = (value - bound) / value if value > 0.0 else 0.0
     # what cancels in a part counts as zero there
     gap = gap if any(certificate.gap for certificate in told) else 0.0

@@ -19,7 +19,7 @@ from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
+from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, Reach, certified
 from laufruhe.solvers.equal_designs import equal_designs
 from laufruhe.solvers.result import DecisionRange, ObjectiveValue, RankValue, Result, Status
 
@@ -28,7 +28,6 @@ CLOSE, SAMPLED = 1e-9, 1e-5
 """Share by which objectives before another may be exceeded at least; of what is known at sampled angles alone."""
 WIDER = (0.0, 10.0 * SAMPLED)
 """Shares by which they may be exceeded further, where a solver finds no design."""
-_STRENGTH = (Proof.NONE, Proof.LOCAL, Proof.WITHIN_GAP, Proof.GLOBAL)
 _DESIGNED = (Status.OPTIMAL, Status.FEASIBLE)
 
 
@@ -93,7 +92,7 @@ def _together(
     if len(stages) < len(problem.ranks):
         name = problem.ranks[len(stages)].terms[0].measure.name
         message = f"objective {len(stages) + 1}, {name}, found no design under the limits of those before it"
-    weakest = min((rank.proof for rank in ranks), key=_STRENGTH.index)
+    weakest = min((rank.proof for rank in ranks), key=STRENGTH)
     whole = not message and all(stage.status is Status.OPTIMAL for stage in stages)
     first = stages[0]
     shown = last.problem.changed(objective=problem.objective, ranks=problem.ranks, limits=problem.limits)
@@ -146,7 +145,7 @@ def _certificate(first: Result, ranks: tuple[RankValue, ...], weakest: Proof) ->
         ranks[0].final, own.lower_bound, nothing, first.problem.tolerance, Reach.WHOLE, own.kkt_residual,
         f"{own.method}; then {len(ranks) - 1} more in order",
     )  # fmt: skip
-    return replace(found, kind=min(found.kind, weakest, key=_STRENGTH.index))
+    return replace(found, kind=min(found.kind, weakest, key=STRENGTH))
 
 
 def _summed(stages: list[Result]) -> dict[str, float]:

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.fidelity.automatic import ladder
@@ -17,6 +16,7 @@ from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, error_bound, refer
 from laufruhe.fidelity.mount_knobs import TIME_ORDERS, TIME_SAMPLES
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
@@ -31,8 +31,6 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.conic import solve_cones
 from laufruhe.solvers.result import Status
 from laufruhe.studies.rigid_digits import RigidPart, rigid_part
-
-Array = NDArray[np.float64]
 
 REFERENCE_STEPS = 1440
 """Steps over the period at which the optimum beside which a regret is counted is solved."""
