@@ -22,7 +22,7 @@ from browser import chromium
 PICTURES = ROOT / "docs" / "pictures"
 COLOURS = 64
 LIVE, STEPS = "tractor-four-lanchester.toml", 12
-VIEW = {"viewport": {"width": 1280, "height": 862}, "device_scale_factor": 0.7}
+VIEW = {"viewport": {"width": 1280, "height": 900}, "device_scale_factor": 0.7}
 # arguments of the command; picture that it draws; name under docs/pictures
 WANTED = {
     ("solve", "tractor-four-lanchester"): {"bars": "tractor-four-lanchester-bars"},
