@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +109,7 @@ def softest_of(problem: Problem) -> Softest:
     """The least stiffness and the longest arms that the bounds of the decisions leave (E31, E32)."""
     mounting = mounting_in(problem.engine)
     root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
-    least, most = _ranges(problem)
+    least, most = number_ranges(problem)
     floors, arms, dynamic = [np.zeros((6, 6))], list[Array](), list[tuple[Dynamic, Array, bool]]()
     for (place, spring), low, high in zip(every_spring(mounting.mounts), least, most, strict=True):
         middle = 0.5 * (low[POSITION] + high[POSITION])
@@ -140,30 +141,49 @@ def softest_of(problem: Problem) -> Softest:
     )
 
 
-def _ranges(problem: Problem) -> tuple[Array, Array]:
-    """Least and largest values of the numbers of every spring, shape (springs, 14) each."""
+def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | None = None) -> tuple[Array, Array]:
+    """Least and largest values of the numbers of every spring, shape (springs, 14) each.
+
+    Parameters
+    ----------
+    lower, upper
+        Of the open numbers of the mounts; their bounds when left out.
+    """
     low = np.array(problem.mount_numbers, dtype=float)
     high = low.copy()
-    for decision in problem.mount_decisions:
+    decisions = problem.mount_decisions
+    sides = [
+        [getattr(d, side) for d in decisions] if given is None else given.tolist()
+        for side, given in (("lower", lower), ("upper", upper))
+    ]
+    for decision, *edges in zip(decisions, *sides, strict=True):
         for drive in decision.mount_drives:
-            ends = [drive.gain * (edge - decision.start_number) for edge in (decision.lower, decision.upper)]
+            ends = [drive.gain * (edge - decision.start_number) for edge in edges]
             low[drive.mount, drive.number] += min(ends)
             high[drive.mount, drive.number] += max(ends)
     return low, high
 
 
-def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array]]:
-    """L that A is not under, by least frequency and largest sag (E31), and U that it is not over (E43)."""
-    floors, ceilings = [], []
+Band: TypeAlias = tuple[float, float]
+
+
+def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array], list[Band]]:
+    """L that A is not under, by least frequency and largest sag (E31), U that it is not over (E43), and bands (E53).
+
+    Bands are of squares of angular frequencies, less what a limit may be broken by.
+    """
+    floors, ceilings, bands = [], [], []
     weight = weight_wrench(mounting_in(problem.engine).block)
     for limit in problem.mount_limits:
         if limit.measure.channel is channels.FREQUENCIES:
             floors += [(math.tau * limit.minimum) ** 2 * np.eye(6)] if limit.minimum > 0.0 else []
             ceilings += [(math.tau * limit.maximum) ** 2 * np.eye(6)] if limit.maximum < math.inf else []
+            for low, high in [limit.outside] if limit.outside is not None else []:
+                bands.append(((math.tau * low * (1.0 + SLACK)) ** 2, (math.tau * high * (1.0 - SLACK)) ** 2))
         if limit.measure.channel is channels.SAG and 0.0 < limit.maximum < math.inf:
             pull = root @ weight
             floors.append(np.outer(pull, pull) / (limit.maximum * -weight[2]))
-    return floors, ceilings
+    return floors, ceilings, bands
 
 
 def _of_quantity(problem: Problem, quantity: Measure, softest: Softest, model: AffineModel) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem import channels
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
@@ -21,12 +20,12 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided
-from laufruhe.prove.certificate import Reach, gap_of, room_of
-from laufruhe.prove.spring_search import spring_bound
-from laufruhe.prove.subdivision import divided_bound, divides
+from laufruhe.prove.certificate import Reach, gap_of
+from laufruhe.prove.subdivision import divided_bound
 from laufruhe.prove.transmitted_bound import transmitted_bound
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, none_within
 from laufruhe.solvers.local_optimum import LocalOptimum, distinct
+from laufruhe.solvers.mount_bounds import divided_by
 from laufruhe.solvers.mount_convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mount_search import Found, MountSearch, judged_at
 from laufruhe.solvers.mount_starts import columns_of, unbalances_of
@@ -37,15 +36,14 @@ from laufruhe.solvers.unbalances import beyond_mounts, solve_unbalances
 Array = NDArray[np.float64]
 
 WORTH_SAYING = 1.01
-MOST_DIVISIONS = 3
 
 
-def solve_mounts(problem: Problem, workers: int | None = None) -> Result:
-    """Convex where all that is asked is, else from many starts in `workers` processes."""
-    return solve_convex_mounts(problem) if is_convex(problem) else solve_joint(problem, workers)
+def solve_mounts(problem: Problem, workers: int | None = None, among: bool = False) -> Result:
+    """Convex where all that is asked is, else from many starts in `workers` processes; `among` others or alone."""
+    return solve_convex_mounts(problem) if is_convex(problem) else solve_joint(problem, workers, among)
 
 
-def solve_joint(problem: Problem, workers: int | None = None) -> Result:
+def solve_joint(problem: Problem, workers: int | None = None, among: bool = False) -> Result:
     """The best local optimum that many starts find (E20-E24).
 
     Parameters
@@ -54,13 +52,15 @@ def solve_joint(problem: Problem, workers: int | None = None) -> Result:
         On elastic mounts; `search.starts` points are started from.
     workers
         Processes; as many as processors when left out.
+    among
+        Whether it is one of several, whose bounds come once the best of all is known.
 
     Raises
     ------
     SolverError
         If a process of the solver dies.
     """
-    return _solved(problem, workers, None, None)[0]
+    return _solved(problem, workers, None, None, among)[0]
 
 
 def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tuple[Result, Candidate]:
@@ -81,12 +81,17 @@ def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tup
         domains = domains_of(problem.unbalances)
         mounts = [found[decision.name] for decision in problem.mount_decisions]
         first = mounts, columns_of(domains, unbalances_of(problem, even))
-    result, turns = _solved(problem, None, moves, first)
+    # throws that move are in no bound
+    result, turns = _solved(problem, None, moves, first, True)
     return result, moves.candidate(turns)
 
 
 def _solved(
-    problem: Problem, workers: int | None, moves: ThrowMoves | None, first: tuple[list[float], Array] | None
+    problem: Problem,
+    workers: int | None,
+    moves: ThrowMoves | None,
+    first: tuple[list[float], Array] | None,
+    among: bool,
 ) -> tuple[Result, Array]:
     """Result, and deviations of the throws."""
     started = time.perf_counter()
@@ -94,7 +99,7 @@ def _solved(
     search = MountSearch(problem, initial, workers, moves, first)
     modelled = time.perf_counter()
     search.run()
-    divided = _divided(problem, search)
+    divided = divided_by(problem, search, among)
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
     found = search.chosen
     if found is None or found.design.excess > KEPT:
@@ -102,30 +107,6 @@ def _solved(
     proven = _rebalanced(found.design)
     design = found.design if proven is None or proven[0].value >= found.design.value else proven[0]
     return _result(search, initial, replace(found, design=design), proven, divided, timing), search.turns
-
-
-def _divided(problem: Problem, search: MountSearch) -> Divided:
-    """A bound by boxes of stiffness, and searches from where these are least until nothing better comes of it."""
-    divided = Divided(0.0, 0)
-    if search.moves is not None or not divides(problem):
-        return divided
-    for _ in in_time(range(MOST_DIVISIONS)):
-        found = search.chosen
-        value = found.design.value if found is not None and found.design.excess <= KEPT else math.inf
-        room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
-        divided = _by_boxes(problem, value, room)
-        if not divided.places or passed() or not search.again(divided.places):
-            break
-    return divided
-
-
-def _by_boxes(problem: Problem, value: float, room: float) -> Divided:
-    """By the forces of springs, a few boxes of which close many stiffnesses; by expansions what these leave open."""
-    few = spring_bound(problem, value, room)
-    if few.boxes and few.bound >= value - room:
-        return few
-    many = divided_bound(problem, value, room)
-    return Divided(max(few.bound, many.bound), few.boxes + many.boxes, many.places or few.places)
 
 
 def _mounts(design: Design) -> list[float]:
@@ -226,7 +207,7 @@ def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, 
     if proven is not None:
         text += f"; balance on these mounts proven within {proven[1]:.0e}"
     if divided.boxes:
-        text += f"; bounds of stiffness looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
+        text += f"; bounds of mounts looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
     return text
 
 

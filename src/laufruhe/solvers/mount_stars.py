@@ -30,6 +30,7 @@ from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
 from laufruhe.solvers.conclusion import no_star, with_star
+from laufruhe.solvers.mount_bounds import bounded_under
 from laufruhe.solvers.mount_nonlinear import solve_mounts, solve_moved
 from laufruhe.solvers.ranking import RankedStar, ranked_star, ranking_result, told_orders
 from laufruhe.solvers.result import Result, Status
@@ -84,7 +85,7 @@ def solve_star_mounts(problem: Problem) -> Result:
     designs = count - len(ranking) + len(stars)
     ranked = time.perf_counter()
     found = _solved_shortly(problem, phasing, stars)
-    found = _solved_fully(problem, found)
+    found = _bounded(_solved_fully(problem, found), phasing, designs)
     if phasing.continuous:
         found = sorted([*found, *_moved(problem, phasing, found)], key=_rank)
     timing = {"rank": ranked - started, "solve": time.perf_counter() - ranked}
@@ -146,7 +147,7 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> li
     few = starts if len(stars) == 1 else min(starts, max(SHORTEST_SEARCH, starts // FEWER_STARTS))
     problems = [_problem_of(problem, phasing, candidate, few) for candidate, _ in stars]
     # stars side by side, and the starts of each in one process
-    work = partial(solve_mounts, workers=1 if len(stars) > 1 else None)
+    work = partial(solve_mounts, workers=1 if len(stars) > 1 else None, among=True)
     with limited(phasing.time_limit):
         results = in_turn(work, problems, "stars on their mounts")
     found = [StarDesign(star, result, steps) for (star, steps), result in zip(stars, results, strict=False)]
@@ -166,9 +167,27 @@ def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]
         tell("best stars once more", k, whole, value=_least(out))
         more = replace(own, search=replace(own.search, starts=starts))
         with within(f"best star {k + 1} of {whole}"):
-            again = replace(each, result=solve_mounts(more))
+            again = replace(each, result=solve_mounts(more, among=True))
         out[k] = min(again, each, key=_rank)
     return sorted(out, key=_rank)
+
+
+def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[StarDesign]:
+    """With what is proven of every star's mounts, designs worse than the best of all stars left out (E54)."""
+    least = _least(found)
+    if len(found) < designs or phasing.continuous or not 0.0 < least < math.inf:
+        return found
+    pieces = [(k, each.result) for k, each in enumerate(found)]
+    out = list(found)
+    for k, result in in_turn(partial(_bounded_one, value=least), pieces, "bounds of stars on their mounts"):
+        out[k] = replace(out[k], result=result)
+    return out
+
+
+def _bounded_one(piece: tuple[int, Result], value: float) -> tuple[int, Result]:
+    """Of a star, and which it is."""
+    number, result = piece
+    return number, bounded_under(result, value)
 
 
 def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[StarDesign]:
@@ -217,7 +236,7 @@ def _certificate(
     bounds = [c.lower_bound for c in own if c is not None]
     bound = min(bounds) if whole and len(bounds) == len(own) else 0.0
     text = f"{method}; of the best: {best.method}"
-    return certified(found[0].value, bound, nothing, tolerance, Reach.ASIDE, best.kkt_residual, text)
+    return certified(found[0].value, bound, nothing, tolerance, Reach.NEAR, best.kkt_residual, text)
 
 
 def _method(found: list[StarDesign], designs: int) -> str:
