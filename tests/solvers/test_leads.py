@@ -154,6 +154,38 @@ def test_the_angle_between_machines_is_the_least_of_a_scan(asked: str, tmp_path:
     assert objective_value(at_best, evaluate(at_best)) == pytest.approx(value, rel=1e-6)
 
 
+ELASTIC = """[block]
+mass = "120 kg"
+centre_of_gravity = ["0 mm", "0 mm", "50 mm"]
+inertia = ["5 kg m^2", "8 kg m^2", "7 kg m^2"]
+[mounts]
+kind = "elastic"
+stiffness = ["200 N/mm", "200 N/mm", "400 N/mm"]
+loss_factor = 0.1
+"""
+LONGER = (
+    ('cycle  = "two-stroke"', 'cycle  = "four-stroke"'), ('imep = "4 bar"', 'imep = "8 bar"'),
+    ('"50 bar"', '"70 bar"'), ("[0, 360]", "[0, 720]"),
+)  # fmt: skip
+
+
+def test_on_elastic_mounts_and_over_two_turns_no_angle_is_better(tmp_path: Path) -> None:
+    soft, longer = changed(BARE, "[mounts]\n", ELASTIC), BARE
+    for old, new in LONGER:
+        longer = changed(longer, old, new)
+    for text, most in ((soft, 360.0), (longer, 720.0)):
+        result = solve(loaded(tmp_path, text))
+        assert result.certificate is not None
+        assert result.certificate.kind is Proof.GLOBAL
+        values = []
+        for angle in np.linspace(0.0, most, 49):
+            each = loaded(tmp_path, changed(text, f"{{ between = [0, {most:.0f}], start = 90 }}", str(float(angle))))
+            values.append(objective_value(each, evaluate(each)))
+        value = objective_value(result.problem, result.final)
+        assert result.certificate.lower_bound <= value <= min(values) * (1.0 + 1e-6)
+        assert max(values) > 1.05 * value
+
+
 @pytest.mark.slow
 def test_weights_and_the_angle_are_proven_together(tmp_path: Path) -> None:
     """No angle of a scan has weights that are better, each proven by itself; one more limit is never better."""
