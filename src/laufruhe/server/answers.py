@@ -115,7 +115,7 @@ def follow(source: Source, asked: Asked) -> str:
     """The optimum of what loads are affine in, all else as it stands, in milliseconds."""
 
     def found() -> dict[str, Any]:
-        began = time.perf_counter()
+        began, spent = time.perf_counter(), time.process_time()
         tables, problem = _asked_about(source, asked, with_held=True)
         scene = scene_of(problem, tables)
         follows = scene.follower.at(problem.limits) if scene.follower else None
@@ -124,15 +124,16 @@ def follow(source: Source, asked: Asked) -> str:
         if asked.has != scene.key:
             own |= scene.drawn(follows)
         if follows is None or follows.conflict:
-            standing = () if scene.given.final.resonance else limit_values(problem, scene.given.final)
+            standing = () if scene.given.resonance else limit_values(problem, scene.given)
             own |= {"optimum": None, "limits": told.limits(standing, problem)}
-        if follows is None and scene.given.objective:
-            own["given"] = told.figures(scene.given.objective.value, problem)
+        if follows is None and scene.value is not None:
+            own["given"] = told.figures(scene.value, problem)
         elif follows is not None and follows.conflict:
             own["conflict"] = list(follows.conflict)
         elif follows is not None:
             own |= _followed(follows, problem, scene)
-        return {**own, "milliseconds": 1e3 * (time.perf_counter() - began)}
+        took = {"wall": time.perf_counter() - began, "processor": time.process_time() - spent}
+        return {**own, "seconds": took}
 
     return _said(found, source)
 
@@ -153,7 +154,7 @@ def _standing(limit: Limit, value: float, price: float, found: Followed, scene: 
         # a price that would not move the objective by its rounding is none
         active = price * limit.maximum > ROUNDING * found.value
         return LimitValue(limit.name, value, limit.maximum, limit.measure.unit, active, price if active else 0.0)
-    (given,) = limit_values(scene.problem.changed(limits=(limit,)), scene.given.final)
+    (given,) = limit_values(scene.problem.changed(limits=(limit,)), scene.given)
     moves = limit.measure.channel.is_moved_by(kinds_of(scene.problem))
     return replace(given, value=math.nan, active=False, shadow_price=math.nan) if moves else given
 

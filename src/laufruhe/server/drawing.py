@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from laufruhe.machine import Rotor
+from laufruhe.machine import Rotor, SliderCrank
 from laufruhe.machine.rotor import Role
 from laufruhe.present.poses import STEEL, THICKNESS, Pose, bore_of
 from laufruhe.problem.problem import Problem
@@ -24,19 +25,26 @@ def drawing_of(problem: Problem) -> dict[str, Any] | None:
     parts = engine.slider_cranks
     if not parts or len(parts) > _MOST_PARTS:
         return None
-    turns = engine.cycle.angle / math.tau
-    steps = round(STEPS * turns)
-    angles = np.arange(steps) * engine.cycle.angle / steps
-    poses = [[Pose.of(part, float(phi)) for phi in angles] for part in parts]
     return {
-        "steps": steps,
+        "steps": _steps(engine.cycle.angle),
         "cycle": math.degrees(engine.cycle.angle),
         "bore": 1e3 * bore_of(engine),
         "disc": 1.5e9 / (STEEL * THICKNESS),
-        "parts": [_part(own) for own in poses],
+        "parts": _parts(parts, engine.cycle.angle),
         "rotors": [_rotor(problem, rotor) for rotor in engine.rotors if rotor.role is not Role.THROW],
         "mounts": [{"name": m.name, "at": [_mm(m.position[1]), _mm(m.position[2])]} for m in engine.mounts],
     }
+
+
+def _steps(cycle: float) -> int:
+    return round(STEPS * cycle / math.tau)
+
+
+@lru_cache(maxsize=4)
+def _parts(parts: tuple[SliderCrank, ...], cycle: float) -> list[dict[str, Any]]:
+    """Of slider-cranks, at the steps of a cycle [rad]; the same for every speed and load."""
+    angles = np.arange(_steps(cycle)) * cycle / _steps(cycle)
+    return [_part([Pose.of(part, float(phi)) for phi in angles]) for part in parts]
 
 
 def _part(poses: list[Pose]) -> dict[str, Any]:

@@ -10,14 +10,18 @@ from typing import Any
 
 from laufruhe.errors import ModelError
 from laufruhe.live import live_model
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.measure import Limit
+from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import NO_TOLERANCES
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.server.drawing import drawing_of
 from laufruhe.server.front import partners
-from laufruhe.solvers import kinds_of, state
-from laufruhe.solvers.conclusion import Shown, concluded, judged
+from laufruhe.solvers import kinds_of
+from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.following import Followed, Follower, can_follow
+from laufruhe.solvers.result import ObjectiveValue, Result, Status
 
 _SIDES = ("max", "min", "outside")
 _KEPT = 6
@@ -34,24 +38,49 @@ class Scene:
         self.problem = problem if can_follow(problem) else replace(
             problem, phasing=None, over=None, assembly=None, tolerances=NO_TOLERANCES, decisions=problem.unbalances
         )  # fmt: skip
-        self.given = state(self.problem, to_start_from=True)
+        self.given = evaluate_start(self.problem)
         self.follower: Follower | None = None
-        if can_follow(self.problem) and not self.given.final.resonance:
+        if can_follow(self.problem) and not self.given.resonance:
             try:
                 self.follower = Follower(self.problem)
             except ModelError:
                 # an engine on mounts in time has no loads that are affine in anything
                 self.follower = None
 
+    @property
+    def value(self) -> float | None:
+        """Objective of the design as given; None where there is none."""
+        return objective_value(self.problem, self.given) if self.problem.objective else None
+
     def drawn(self, found: Followed | None) -> dict[str, Any]:
         """What the page draws from, with the optimum where it is known; why there is nothing to slide else."""
-        result = self.given
-        if found is not None and not found.conflict:
-            shown = Shown(found.bound, Reach.WHOLE, 0.0, "second-order cones at few angles")
-            result = concluded(judged(self.problem, found.values), self.given.final, shown, {})
-        model = live_model(self.whole, result)
+        model = live_model(self.whole, self._result(found))
         about = {"engine": drawing_of(self.problem), "partners": list(partners(self.problem))}
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
+
+    def _result(self, found: Followed | None) -> Result:
+        """The design that follows, as far as a model of the page asks; nothing of it is proven but the bound."""
+        problem, known = self.problem, found is not None and not found.conflict
+        bare = Result(problem, Status.FEASIBLE, None, None, (), (), self.given, self.given)
+        if found is None or not known:
+            return bare
+        entries = [e for d, v in zip(problem.decisions, found.values, strict=True) for e in decision_values(d, v)]
+        unread = [limit for limit in problem.limits if not self._reads(limit)]
+        limits = limit_values(problem.changed(limits=tuple(unread)), self._at(found)) if unread else ()
+        return replace(
+            bare,
+            objective=ObjectiveValue.of(problem, found.value, self.value or 0.0),
+            certificate=Certificate(Proof.WITHIN_GAP, found.bound, found.gap, 0.0, "second-order cones at few angles"),
+            decisions=tuple(entries),
+            limits=limits,
+        )
+
+    def _reads(self, limit: Limit) -> bool:
+        """Whether a limit stands still, or is one that follows."""
+        return limit in self.problem.load_limits or not limit.measure.channel.is_moved_by(kinds_of(self.problem))
+
+    def _at(self, found: Followed) -> Evaluation:
+        return evaluate(self.problem, self.problem.design(found.values))
 
     def simplified(self, is_held: bool) -> Iterator[str]:
         """What of the whole problem is left out while sliders move: a bound holds for the rest alone."""
@@ -66,9 +95,7 @@ class Scene:
             yield "no parts assigned"
         if whole.ranks:
             yield "the first objective alone"
-        kinds = kinds_of(self.problem)
-        told = {limit.measure for limit in self.problem.load_limits}
-        if any(limit.measure not in told and limit.measure.channel.is_moved_by(kinds) for limit in whole.limits):
+        if not all(map(self._reads, self.problem.limits)):
             yield "limits on numbers left out"
 
 

@@ -16,9 +16,10 @@ from laufruhe.solvers.result import LimitValue
 
 def as_text(found: dict[str, Any]) -> str:
     """As JSON; a model is JSON already, and what is no finite number is null."""
-    told = {key: entry for key, entry in found.items() if key != "model"}
+    told = {key: entry for key, entry in found.items() if key not in ("model", "engine")}
     text = json.dumps(_finite(told), allow_nan=False)
-    return f'{text[:-1]}, "model": {found["model"]}}}' if "model" in found else text
+    drawn = {"model": found.get("model"), "engine": json.dumps(found["engine"]) if "engine" in found else None}
+    return "".join([text[:-1], *(f', "{key}": {entry}' for key, entry in drawn.items() if entry is not None), "}"])
 
 
 def _finite(value: Any) -> Any:

@@ -119,7 +119,8 @@ export class Controls {
       const own = limits.find((limit) => limit.name === control.limit);
       const against = conflict.includes(control.limit);
       box.classList.toggle("conflict", against);
-      said.textContent = against ? "contradicts the others marked so, or the bounds" : own ? price(own) : "";
+      const words = against ? "contradicts the others marked so, or the bounds" : own ? price(own) : "";
+      if (said.textContent !== words) said.textContent = words;
     }
   }
 

@@ -39,8 +39,8 @@ const state = {
   /** Whether a design was set by the page and not by the user. */
   setting: false,
 };
-/** For who measures: milliseconds from an input to the picture drawn. */
-const latencies = /** @type {number[]} */ ([]);
+/** For who measures: milliseconds from an input to the picture drawn, to the answer, and of the server's processor. */
+const latencies = /** @type {number[][]} */ ([]);
 let inputAt = 0;
 
 const controls = new Controls(byId("controls"), (edit, control) => changed(control.name, edit));
@@ -100,10 +100,12 @@ async function follow() {
   state.dropped = 0;
   try {
     const answer = await ask("follow", asked());
+    const answered = performance.now() - from;
     if (!answer.dropped) await show(answer);
     // another page of this server was faster
     else setTimeout(follow, RETRY);
-    if (from) requestAnimationFrame(() => setTimeout(() => latencies.push(performance.now() - from)));
+    const mark = () => latencies.push([performance.now() - from, answered, 1e3 * answer.seconds.processor]);
+    if (from && answer.seconds) requestAnimationFrame(() => setTimeout(mark));
     rest();
   } catch (error) {
     failed(error);

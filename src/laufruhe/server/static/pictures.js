@@ -12,6 +12,7 @@ export class Pictures {
   /** @param {boolean} has whether there is an optimum to be drawn */
   offer(has) {
     this.asking?.abort();
+    if (!has && byId("pictures").hidden) return;
     byId("pictures").hidden = !has;
     byId("pictures-state").textContent = "";
     byId("drawn").replaceChildren();

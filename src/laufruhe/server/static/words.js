@@ -67,6 +67,7 @@ export function busy(optimum) {
 /** @param {string} text one line, or nothing where all is well */
 export function complain(text) {
   const place = byId("complaint");
+  if (place.textContent === text) return;
   place.hidden = !text;
   place.textContent = text;
 }
