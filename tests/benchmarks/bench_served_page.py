@@ -48,9 +48,9 @@ screen included, {moves} events each, on a machine where {waiting:.0f} other pro
 | --- | --- | ---: | ---: | ---: | ---: | ---: |
 {rows}
 
-While a limit slides only the optimum is sent; where loads are others, they are made and sent anew, with all
-pictures. Processor time of the server is that of one cone program at 48 angles, its bound, and the reading of
-the changed problem, whatever else runs on the machine.
+While a limit slides all pictures follow in that frame; where loads are others they are made anew, and drawn when
+the slider rests if that takes long. Processor time of the server is that of one cone program at 48 angles, its
+bound, and the reading of the changed problem, whatever else runs on the machine.
 """
 
 

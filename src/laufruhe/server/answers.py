@@ -24,7 +24,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.server import told
-from laufruhe.server.asked import CRANK, Asked, Edit
+from laufruhe.server.asked import CRANK, LATER, Asked, Edit
 from laufruhe.server.controls import as_json, controls_of, offered_by, typed
 from laufruhe.server.front import Front, partners, places
 from laufruhe.server.held import held_by, ranking_of
@@ -121,7 +121,7 @@ def follow(source: Source, asked: Asked) -> str:
         follows = scene.follower.at(problem.limits) if scene.follower else None
         own: dict[str, Any] = {"key": scene.key, "stage": "following" if follows else "given"}
         own["but"] = list(scene.simplified(bool(asked.held)))
-        if asked.has != scene.key:
+        if asked.has not in (scene.key, LATER):
             own |= scene.drawn(follows)
         if follows is None or follows.conflict:
             standing = () if scene.given.resonance else limit_values(problem, scene.given)

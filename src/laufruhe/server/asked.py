@@ -43,7 +43,7 @@ class Asked:
     design
         Numbers of the design that is shown, by name [SI].
     has
-        Key of the model that the page has.
+        Key of the model that the page has; `LATER` where it wants none yet.
     """
 
     edits: tuple[Edit, ...] = ()
@@ -156,5 +156,6 @@ _WAYS: Mapping[str, Callable[[Tables, str, Any], dict[str, Any]]] = {
     "open crank": _open_crank,
     "first": _first,
 }
+LATER = "later"
 STAR, CRANK, OBJECTIVE = "star", "crank", "objective"
 """Names of what is changed as a whole."""

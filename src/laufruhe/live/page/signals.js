@@ -64,32 +64,53 @@ function summed(orders, coefficient, n) {
   return any ? transformed(re, im)[0] : null;
 }
 
+/** Lengths up to which a transform is summed as it stands. */
+const SHORT = 32;
+
 /** Discrete Fourier transform with e^(+), of any length, by the smallest factors first. */
 function transformed(re, im) {
   const n = re.length, p = factorOf(n);
-  if (n === 1) return [re, im];
+  if (n <= SHORT || p === n) return summedUp(re, im);
   const m = n / p, parts = [];
   for (let q = 0; q < p; q++) {
     const a = new Float64Array(m), b = new Float64Array(m);
     for (let k = 0, from = q; k < m; k++, from += p) { a[k] = re[from]; b[k] = im[from]; }
-    parts.push(m === 1 ? [a, b] : transformed(a, b));
+    parts.push(transformed(a, b));
   }
   return joined(parts, n, m);
+}
+
+/** A transform as it stands. */
+function summedUp(re, im) {
+  const n = re.length, { cosine, sine } = tableOf(n);
+  const out = [new Float64Array(n), new Float64Array(n)];
+  for (let k = 0; k < n; k++) {
+    let a = 0, b = 0;
+    for (let j = 0, turn = 0; j < n; j++) {
+      a += re[j] * cosine[turn] - im[j] * sine[turn];
+      b += re[j] * sine[turn] + im[j] * cosine[turn];
+      turn += k;
+      if (turn >= n) turn -= n;
+    }
+    out[0][k] = a;
+    out[1][k] = b;
+  }
+  return out;
 }
 
 /** Parts of a transform put together. */
 function joined(parts, n, m) {
   const { cosine, sine } = tableOf(n);
   const re = new Float64Array(n), im = new Float64Array(n);
-  for (let k = 0; k < n; k++) {
-    let a = 0, b = 0;
-    for (let q = 0; q < parts.length; q++) {
-      const [x, y] = parts[q], at = k % m, turn = (q * k) % n;
-      a += x[at] * cosine[turn] - y[at] * sine[turn];
-      b += x[at] * sine[turn] + y[at] * cosine[turn];
+  for (let q = 0; q < parts.length; q++) {
+    const [x, y] = parts[q];
+    for (let k = 0, at = 0, turn = 0; k < n; k++) {
+      re[k] += x[at] * cosine[turn] - y[at] * sine[turn];
+      im[k] += x[at] * sine[turn] + y[at] * cosine[turn];
+      if (++at === m) at = 0;
+      turn += q;
+      if (turn >= n) turn -= n;
     }
-    re[k] = a;
-    im[k] = b;
   }
   return [re, im];
 }

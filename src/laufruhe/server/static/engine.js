@@ -105,7 +105,8 @@ export class EngineView {
  * @param {number} cycle
  */
 export function turned(angle, milliseconds, cycle) {
-  return (angle + (PACE * milliseconds) / 1000) % cycle;
+  // a frame may have begun before it was asked for
+  return (angle + (PACE * Math.max(milliseconds, 0)) / 1000) % cycle;
 }
 
 /** @param {Engine} engine */

@@ -8,42 +8,24 @@ import { EngineView } from "./engine.js";
 import { Pictures } from "./pictures.js";
 import { Trade } from "./trade.js";
 import { byId, download, element } from "./parts.js";
+import { latencies, state } from "./state.js";
 import { busy, complain, tellFile, tellGone, tellOptimum } from "./words.js";
 
 /** Milliseconds of rest after which the whole problem is solved, and before something is asked again. */
 const [REST, RETRY, MOST_RETRIES] = [350, 100, 3];
+/** Milliseconds beyond which a model is opened when sliders rest. */
+const SLOW = 40;
 const CRANK = ["star", "crank"];
 
 /** @typedef {import("./controls.js").Edit} Edit */
 
-const state = {
-  /** @type {Map<string, Edit>} by the name of the number */
-  edits: new Map(),
-  /** @type {Edit[]} */
-  held: [],
-  key: "",
-  /** @type {any} */
-  handle: null,
-  /** @type {any} the last answer that has an optimum */
-  optimum: null,
-  /** @type {string[]} */
-  conflict: [],
-  version: 0,
-  gone: false,
-  asking: false,
-  again: false,
-  resting: 0,
-  writing: 0,
-  serial: 0,
-  dropped: 0,
-  /** Whether a design was set by the page and not by the user. */
-  setting: false,
-};
-/** For who measures: milliseconds from an input to the picture drawn, to the answer, and of the server's processor. */
-const latencies = /** @type {number[][]} */ ([]);
 let inputAt = 0;
 
-const controls = new Controls(byId("controls"), (edit, control) => changed(control.name, edit));
+const controls = new Controls(byId("controls"), (edit, control) => {
+  // loads that take long to open are drawn when the slider rests
+  state.isLater = control.group !== "Limits" && state.opening > SLOW;
+  changed(control.name, edit);
+});
 const crank = new Crank(byId("controls"), (edit) => {
   CRANK.forEach((name) => state.edits.delete(name));
   state.held = [];
@@ -84,7 +66,7 @@ function written() {
 }
 
 /** @returns {{edits: Edit[], held: Edit[], has: string}} */
-const asked = () => ({ edits: [...state.edits.values()], held: state.held, has: state.key });
+const asked = () => ({ edits: [...state.edits.values()], held: state.held, has: state.isLater ? "later" : state.key });
 
 /** Ask for the optimum that follows; while an answer is on its way only the newest state waits. */
 async function follow() {
@@ -125,7 +107,14 @@ async function follow() {
 /** The whole problem is solved when nothing has moved for a while. */
 function rest() {
   clearTimeout(state.resting);
-  state.resting = setTimeout(settle, REST);
+  state.resting = setTimeout(rested, REST);
+}
+
+/** Nothing has moved for a while: pictures that wait are drawn, then all of it is solved. */
+function rested() {
+  if (!state.isLater) return settle();
+  state.isLater = false;
+  return follow();
 }
 
 async function settle() {
@@ -169,13 +158,22 @@ async function settled(answer) {
  */
 async function show(answer) {
   complain("");
+  const isStale = answer.engine === undefined && answer.key !== state.key;
+  byId("live").classList.toggle("stale", isStale);
+  if (isStale) {
+    controls.tell(answer.limits, answer.conflict || []);
+    tellOptimum(answer);
+    return;
+  }
   if (answer.engine !== undefined) {
+    const began = performance.now();
     state.key = answer.key;
     if (answer.model && state.handle) await state.handle.setModel(answer.model);
     else if (answer.model) await first(answer.model);
     else unshown(answer.unshown);
     engine.load(answer.engine);
     trade.offer(answer.partners);
+    state.opening = performance.now() - began;
   }
   tell(answer);
 }
