@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import in_time, left
+from laufruhe.numerics.budget import in_time, left, passed
 from laufruhe.numerics.progress import tell, telling
 from laufruhe.solvers.local_optimum import Ending, LocalOptimum
 
@@ -127,7 +127,10 @@ def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptim
     y, iterations, ending = point / task.scales, 0, Ending.FAILED
     sides = {"lbx": task.lower, "ubx": task.upper, "lbg": task.constraint_lower, "ubg": task.constraint_upper}
     m = b = np.zeros(0)
-    for stage in task.stages:
+    for number, stage in enumerate(task.stages):
+        if number and passed():
+            ending = Ending.UNFINISHED
+            break
         built.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
         found = built.solver(x0=y, p=list(stage), **sides)
         stats = built.solver.stats()

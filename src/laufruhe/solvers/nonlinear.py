@@ -22,6 +22,7 @@ than the last e from the truth.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
@@ -120,9 +121,10 @@ def solve_nonlinear(
     max_seconds: float = 60.0,
     enough: Enough | None = None,
 ) -> tuple[LocalOptimum, ...]:
-    """Different local optima that the starts lead to, the best usable one first.
+    """Local optima that the starts lead to, the best usable one first.
 
-    Every start goes through the first stage; of those that end there at one point, one goes on.
+    A search of many starts, which `enough` may end, takes all through the first stage; of those that end there at one
+    point, one goes on. Else each goes through all stages: from one point a solver may come to several optima.
 
     Parameters
     ----------
@@ -145,27 +147,30 @@ def solve_nonlinear(
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
     task = _task(program, max_iterations, max_seconds, len(points) >= WORTH_EXPANDING)
     with ExitStack() as stack:
-        found, several = _first_ends(task, points, workers, enough, stack)
-        optima = _polished(task, found, several)
+        if enough is None:
+            optima = _first_ends(task, points, workers, None, stack)[0]
+        else:
+            first = replace(task, stages=task.stages[:1])
+            found, several = _first_ends(first, points, workers, enough, stack)
+            optima = _polished(task, _grouped(found, task), several)
     return tuple(sorted(optima, key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
 
 
 def _first_ends(
     task: Task, points: Sequence[tuple[int, Array]], workers: int | None, enough: Enough | None, stack: ExitStack
 ) -> tuple[list[LocalOptimum], Several]:
-    """Different ends of the first stage, and who looked for them."""
-    first = replace(task, stages=task.stages[:1])
+    """Where starts end, and who looked for that."""
     # one start tells whether the others are worth processes of their own
     began = time.perf_counter()
-    found, rest = run((first, points[:1])), points[1:]
+    found, rest = run((task, points[:1])), points[1:]
     count = min(len(rest), workers if workers is not None else count_of())
     spent = sum(o.seconds for o in found)
     pays = spent * len(rest) > WORTH_PROCESSES + (time.perf_counter() - began - spent)
     several: Several = _Shared(stack, count) if count > 1 and pays else run
     while rest and not passed() and not (enough is not None and enough(_grouped(found, task))):
         some, rest = (rest[:ROUND], rest[ROUND:]) if enough is not None else (rest, [])
-        found += several((first, some))
-    return _grouped(found, task), several
+        found += several((task, some))
+    return found, several
 
 
 class _Shared:
@@ -206,9 +211,10 @@ def _polished(task: Task, groups: Sequence[LocalOptimum], several: Several) -> l
         return list(groups)
     if passed():
         return [replace(end, ending=Ending.UNFINISHED) if end.usable else end for end in groups]
-    usable = [end for end in groups if end.usable]
-    # what led nowhere goes on only where all did
-    left = usable or [end for end in groups if end.ending not in (Ending.FAILED, Ending.INFEASIBLE)]
+    least = min((end.value for end in groups if end.usable), default=math.inf)
+    # what is not there yet and worse than what is goes no further
+    left = [end for end in groups if end.ending not in (Ending.FAILED, Ending.INFEASIBLE)
+            and (end.usable or end.value < least)]  # fmt: skip
     later = {o.start: o for o in several((replace(task, stages=task.stages[1:]), [(o.start, o.x) for o in left]))}
     found = []
     for end in groups:
