@@ -18,8 +18,8 @@ from laufruhe.problem.evaluation import over
 from laufruhe.problem.measure import Measure, bends_of, selected
 
 PEAK = NORMS["maximum"]
-NOTHING = 1e-16
-"""Share of the largest order under which one is left out: less than a rounding of the sum."""
+NOTHING = 1e-13
+"""Share of the largest order that all orders left out come to at the most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,9 @@ class Waves:
     def of(cls, coefficients: ComplexArray) -> Waves:
         """Of a whole series, shape (n, ...)."""
         size = np.abs(coefficients).reshape(len(coefficients), -1).max(axis=1, initial=0.0)
-        used = np.flatnonzero(size > NOTHING * size.max(initial=0.0))
+        smallest = np.argsort(size, kind="stable")
+        left_out = smallest[np.cumsum(size[smallest]) <= NOTHING * size.max(initial=0.0)]
+        used = np.setdiff1d(np.arange(len(size)), left_out)
         return cls(used, coefficients[used])
 
 
