@@ -147,9 +147,10 @@ class StarModel:
 
     def at(self, samples: int, averaged: bool = False) -> StarProblem:
         """Rows of every star at `samples` steps over the period of the loads; those of means averaged (P7)."""
-        key = samples, averaged
+        means = averaged and any(measure.is_load and measure.norm.averages for measure in self.problem.measures)
+        key = samples, means
         if key not in self._cache:
-            self._cache[key] = self._rows(samples, averaged).compressed
+            self._cache[key] = self._rows(samples, means).compressed
         return self._cache[key]
 
     def _rows(self, samples: int, averaged: bool) -> StarProblem:

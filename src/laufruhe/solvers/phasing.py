@@ -16,7 +16,7 @@ from laufruhe.numerics.progress import tell
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import Reach, certified, gap_of, room_of
+from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.solvers.conclusion import no_star, with_star
 from laufruhe.solvers.even_turning import floors, of_wheel, solve_told_alike
 from laufruhe.solvers.ranking import (
@@ -35,8 +35,8 @@ from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.star_families import Family, families_of
 from laufruhe.solvers.uneven_starts import none_fires
 
-FINER = 4
-"""Times as many angles for a search whose own are too few to meet the value of its best star."""
+FINER, ROUNDS = 16, 2
+"""Times as many angles at most for a search whose own are too few to prove its best star, and how often."""
 
 
 def solve_phasing(problem: Problem) -> Result:
@@ -96,24 +96,27 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
         why = f"no feasible design was found in phasing.time_limit = {phasing.time_limit:g} s; raise it"
         return no_star(problem, why, Status.FAILED)
     result = _best_of(problem, phasing, answer)
-    if _is_coarse(problem, answer, result):
-        result = _with_more_angles(problem, families) or result
+    if answer.complete:
+        result = _with_more_angles(problem, families, result)
     return _uneven(problem, phasing, result) if phasing.continuous else result
 
 
-def _with_more_angles(problem: Problem, families: Sequence[Family]) -> Result | None:
-    """The same search at more angles."""
-    finer = problem.at(replace(problem.fidelity, samples=FINER * problem.fidelity.samples))
-    assert finer.phasing is not None
-    answer = searched(replace(finer, tolerance=_share(problem)), finer.phasing, families)
-    return _best_of(finer, finer.phasing, answer) if answer.designs else None
-
-
-def _is_coarse(problem: Problem, answer: Answer, result: Result) -> bool:
-    """Whether the angles that the search looks at are all that keeps a gap open."""
-    if result.certificate is None or result.certificate.gap <= problem.tolerance or not answer.complete or passed():
-        return False
-    return gap_of(answer.designs[0].value, answer.bound, nothing_of(problem)) <= problem.tolerance
+def _with_more_angles(problem: Problem, families: Sequence[Family], result: Result) -> Result:
+    """The same search at more angles, while these are all that keeps a gap open (P7)."""
+    for _ in range(ROUNDS):
+        gap = result.certificate.gap if result.certificate else 0.0
+        if gap <= problem.tolerance or passed():
+            break
+        # averages about angles fall short of means by the square of their step
+        times = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), FINER)
+        problem = problem.at(replace(problem.fidelity, samples=times * problem.fidelity.samples))
+        assert problem.phasing is not None
+        answer = searched(replace(problem, tolerance=_share(problem)), problem.phasing, families)
+        found = _best_of(problem, problem.phasing, answer) if answer.designs else result
+        if found.certificate is None or found.certificate.gap >= gap or not answer.complete:
+            break
+        result = found
+    return result
 
 
 def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:

@@ -235,38 +235,40 @@ def solve_design(
 ) -> tuple[Solved, Cut] | None:
     """The optimum of one star with one set of shafts, and what it proves of all others; None if there is none."""
     full = model.samples
-    fine = model.at(full)
+    # what bounds means that are averaged bounds the whole cycle (P7)
+    fine, sound = model.at(full), model.at(full, averaged=True)
     kept = tuple(own < 0 or own in built for own in owners)
-    whole = _only(fine.at(star), kept)
+    whole, averaged = _only(fine.at(star), kept), _only(sound.at(star), kept)
     idle = [not norm.slope.any() for _, norm in whole.limits]
     if _broken(model, star, whole, idle):
         return None
     if not any(kept):
-        return _fixed(fine, fine.at(star), star, built)
+        return _fixed(sound, whole, star, built)
     best: tuple[Solved, Multipliers] | None = None
     for samples in _grids(full):
         solution = solve_cones(_acting(_only(model.at(samples).at(star), kept), idle))
         if solution.x is None:
             # a mean at a few angles may be more than over the cycle, averages never are (P7)
-            averaged = _acting(_only(model.at(samples, averaged=True).at(star), kept), idle)
-            solution = solve_cones(replace(averaged, limits=tuple((m * (1.0 + KEPT), n) for m, n in averaged.limits)))
+            rough = _acting(_only(model.at(samples, averaged=True).at(star), kept), idle)
+            solution = solve_cones(replace(rough, limits=tuple((m * (1.0 + KEPT), n) for m, n in rough.limits)))
             if solution.x is None:
                 return None
             if samples < full:
                 continue
         judged = _acting(whole, idle)
-        bound = best_bound(judged, solution.x, solution.multipliers)
+        bound = best_bound(_acting(averaged, idle), solution.x, solution.multipliers)
         value, excess = judged.objective(solution.x), judged.excess(solution.x)
         # where the angles forbid what averages allow, what is proven at the angles is too much
         least = bound.value if excess <= FEASIBLE else min(bound.value, value)
         found = Solved(star, built, value, least, _spread(solution.x, fine.at(star), kept))
         best = (found, _with_idle(bound.multipliers, whole, idle))
-        if excess <= FEASIBLE and gap_of(value, least, nothing) <= 0.25 * tolerance:
+        # what averages fall short by, no grid of this fidelity gains
+        if excess <= FEASIBLE and gap_of(averaged.objective(solution.x), least, nothing) <= 0.25 * tolerance:
             break
     if best is None:
         return None
     found, multipliers = best
-    return found, cut_of(fine, multipliers)
+    return found, cut_of(sound, multipliers)
 
 
 def _broken(model: StarModel, star: Sequence[int], whole: AffineProblem, idle: Sequence[bool]) -> bool:
@@ -299,14 +301,15 @@ def _with_idle(multipliers: Multipliers, whole: AffineProblem, idle: Sequence[bo
 
 
 def _fixed(
-    fine: StarProblem, whole: AffineProblem, star: tuple[int, ...], built: tuple[int, ...]
+    sound: StarProblem, whole: AffineProblem, star: tuple[int, ...], built: tuple[int, ...]
 ) -> tuple[Solved, Cut]:
     """A star with nothing to decide: its rows are its proof."""
-    x = np.zeros(whole.size)
-    value = whole.objective(x)
-    terms = tuple(n.subgradient(x) for _, n in whole.terms)
-    limits = tuple(np.zeros_like(n.constant) for _, n in whole.limits)
-    return Solved(star, built, value, value, x), cut_of(fine, Multipliers(terms, limits))
+    averaged = sound.at(star)
+    x = np.zeros(averaged.size)
+    value = whole.objective(np.zeros(whole.size))
+    terms = tuple(n.subgradient(x) for _, n in averaged.terms)
+    limits = tuple(np.zeros_like(n.constant) for _, n in averaged.limits)
+    return Solved(star, built, value, min(averaged.objective(x), value), x), cut_of(sound, Multipliers(terms, limits))
 
 
 def _grids(full: int) -> list[int]:
