@@ -35,8 +35,9 @@ from laufruhe.report.grid import Grid
 from laufruhe.report.sections import stars
 from laufruhe.solvers import solve
 from laufruhe.solvers.mixed_conic import solve_program
-from laufruhe.solvers.star_cuts import owners_of, search_designs, solve_design
+from laufruhe.solvers.star_cuts import search_designs
 from laufruhe.solvers.star_families import families_of
+from laufruhe.solvers.star_program import owners_of, solve_design
 from laufruhe.solvers.star_search import enumerate_stars, search_stars
 
 OUT = PAGES / "crank-phasing.md"

@@ -30,9 +30,9 @@ from laufruhe.solvers.ranking import (
 )
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.star_answers import Answer, Decided, searched
-from laufruhe.solvers.star_cuts import owners_of, solve_design
 from laufruhe.solvers.star_design import StarDesign, solve_fixed
 from laufruhe.solvers.star_families import Family, families_of
+from laufruhe.solvers.star_program import owners_of, solve_design
 from laufruhe.solvers.uneven_starts import none_fires
 
 FINER, ROUNDS = 16, 2

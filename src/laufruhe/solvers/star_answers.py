@@ -17,8 +17,9 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
 from laufruhe.solvers.firing_search import MOST_SLOTS, enumerate_orders
 from laufruhe.solvers.ranking import RankedStar, ranked_star
-from laufruhe.solvers.star_cuts import CutsFound, owners_of, search_designs, solve_design
+from laufruhe.solvers.star_cuts import CutsFound, search_designs
 from laufruhe.solvers.star_families import Family, FiringFamily
+from laufruhe.solvers.star_program import owners_of, solve_design
 from laufruhe.solvers.star_search import StarsFound, enumerate_stars, search_stars
 
 MOST_LISTED = 1_000_000
