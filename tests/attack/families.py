@@ -641,12 +641,13 @@ def leads(rng: Generator) -> Table:
         }
         for k in range(count)
     ]  # fmt: skip
+    # with gas upright: of torque the plain model knows these alone
     on = ["crankshaft", *(shaft["name"] for shaft in engine["shafts"]), *["crankshaft"] * int(rng.integers(0, 2))]
     engine["slider_cranks"] = [
         {
             "x": q(0.15 * k, "m"),
             "throw": angle(rng),
-            "bank_angle": angle(rng) if rng.random() < 0.3 else 0.0,
+            "bank_angle": angle(rng) if not gas and rng.random() < 0.3 else 0.0,
             "shaft": name,
         }
         for k, name in enumerate(on)
