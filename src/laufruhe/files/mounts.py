@@ -66,7 +66,7 @@ class BlockTable(Table):
 
 
 class StopTable(Table):
-    """A bump stop along each of the mount's own axes; it acts in run-ups."""
+    """A bump stop along each of the mount's own axes; it acts in run-ups and under load cases."""
 
     gap: f.PositiveLength
     stiffness: f.Stiffness

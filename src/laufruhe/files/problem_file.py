@@ -20,6 +20,7 @@ from laufruhe.files.friction import FrictionTable
 from laufruhe.files.gas import GasTable
 from laufruhe.files.geared import GearedInertiaTable
 from laufruhe.files.hover import explained
+from laufruhe.files.load_cases import LoadCaseTable
 from laufruhe.files.mounts import BlockTable, MountsTable
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
@@ -60,6 +61,7 @@ class ProblemFile(Table):
     mounts: MountsTable | None = None
     block: BlockTable | None = None
     run_up: RunUpTable | None = None
+    load_cases: list[LoadCaseTable] = Field(default_factory=list)
     main_bearings: list[MainBearingTable] = Field(default_factory=list)
     running_gear: RunningGearTable | None = None
     torsion: TorsionTable | None = None

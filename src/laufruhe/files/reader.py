@@ -30,6 +30,7 @@ from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.geared import geared_of
 from laufruhe.files.leads import leads_of
+from laufruhe.files.load_cases import load_cases_of
 from laufruhe.files.mounts import mounts_of
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
@@ -42,7 +43,9 @@ from laufruhe.files.scene import Scene
 from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbers
 from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Cycle, Engine, SliderCrank
+from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.layouts import throw_rotors
+from laufruhe.machine.running_gear import RunningGear
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem, Search
 from laufruhe.problem.tolerance import Drawing, Tolerances
@@ -276,11 +279,10 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     run = run_of(file.run_up, found.block, found.mounts, [point.name for point in points])
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run, gear, geared
-    )
-    of_sizes = size_decisions(file.running_gear, table, file.main_bearings, bearings)
-    if of_sizes and gear is not None and gear.density is not None:
-        check_factors(file.counterweights, "counts masses that follow from sizes, which are open")
+        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run, gear, geared,
+        load_cases_of(file.load_cases, found.block),
+    )  # fmt: skip
+    of_sizes = _sizes(file, table, bearings, gear)
     check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)
     scene, decisions = Scene(engine, points), (*loads, *found.decisions, *of_wheel, *of_chain, *of_sizes)
@@ -304,6 +306,16 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         assembly=assembly_of(file.assembly, engine, path.parent),
     )
     return at_fidelity(replace(problem, friction=tuple(brake.tests if brake else ())), file.fidelity)
+
+
+def _sizes(
+    file: ProblemFile, table: EngineTable, bearings: Sequence[Bearing], gear: RunningGear | None
+) -> tuple[Decision, ...]:
+    """Open sizes of the running gear."""
+    found = tuple(size_decisions(file.running_gear, table, file.main_bearings, bearings))
+    if found and gear is not None and gear.density is not None:
+        check_factors(file.counterweights, "counts masses that follow from sizes, which are open")
+    return found
 
 
 def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:

@@ -31,6 +31,7 @@ _NEEDS = {
     Needs.ROTORS: ("needs the rotors of a rotary engine", 'take layout = "rotary"'),
     Needs.RIM: ("needs the rim of a flywheel", "add [flywheel.rim]"),
     Needs.RUN: ("needs elastic mounts that an engine is run up on", "add [run_up] and [mounts] of kind elastic"),
+    Needs.CASES: ("needs load cases", "add [[load_cases]], and [mounts] of kind elastic"),
     Needs.ARMS: ("needs the arms of a flywheel", "add [flywheel.rim.arms]"),
 }
 PLACES = {
@@ -40,7 +41,17 @@ PLACES = {
     "sections": "shaft section",
     "webs": "web",
 }
-_KEYS = ("operating_points", "orders", *PLACES, "direction_weights", "motions", "frequency", "wanted", "of")
+_KEYS = (
+    "operating_points",
+    "orders",
+    *PLACES,
+    "direction_weights",
+    "load_cases",
+    "motions",
+    "frequency",
+    "wanted",
+    "of",
+)
 _ROUNDING = 1e-9
 
 
@@ -59,6 +70,7 @@ class QuantityTable(Table):
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     direction_weights: f.Three[f.NonNegative] | None = None
+    load_cases: list[str] | None = f.told("Load cases that count, by name; all by default.")
     motions: list[Motion] | None = f.told("Motions that should have a mode of their own; all by default.")
     wanted: f.Part | None = f.told("Share of a motion in a mode of its own that is enough; 1 by default.")
     frequency: f.OpenFrequency | None = f.told(
@@ -90,6 +102,7 @@ class Scene:
             channel, norm, self._places(channel, table, at), as_tuple(table.operating_points), as_tuple(of),
             as_tuple(table.orders), None if weights is None else (weights[0], weights[1], weights[2]),
             as_tuple(table.motions), _band(table.frequency), 1.0 if table.wanted is None else table.wanted,
+            as_tuple(table.load_cases),
         )  # fmt: skip
         if found.is_mass:
             self._counts(found, of, at)
@@ -114,6 +127,7 @@ class Scene:
             Needs.FLYWHEEL: wheel is not None or chain is not None,
             Needs.RIM: rim is not None,
             Needs.RUN: engine.run is not None,
+            Needs.CASES: bool(engine.load_cases),
             Needs.ROTORS: any(not part.has_rod for part in engine.slider_cranks),
             Needs.ARMS: rim is not None and rim.arms is not None,
         }
@@ -136,6 +150,8 @@ class Scene:
                 raise Refused(f"{at}.{key}", of if key == "of" else None, _stray(key, channel), "leave it out")
         points = [point.name for point in self.points]
         _known(table.operating_points, points, f"{at}.operating_points", "operating point")
+        cases = [case.name for case in self.engine.load_cases]
+        _known(table.load_cases, cases, f"{at}.load_cases", "load case")
         if "frequency" in channel.keys and not channel.open_frequency:
             remedy = "say which natural frequency about the axis is wanted"
             if table.frequency is None:

@@ -41,8 +41,10 @@ class SymbolicMounts:
     rows, directions
         Of the springs whose stiffness depends on frequency: travel per motion, shape (n, 6), and where their forces
         act, (3 mounts, n) (E50).
+    own
+        Travel along the own axes of every spring, shape (3 springs, 6) (E52).
     laws
-        Their stiffness.
+        Stiffness of those that depend on frequency.
     """
 
     stiffness: Any
@@ -54,6 +56,7 @@ class SymbolicMounts:
     dampers: Any
     rows: Any
     directions: Any
+    own: Any
     laws: tuple[Dynamic, ...] = ()
 
     def added(self, omegas: Array) -> tuple[Any, Any]:
@@ -71,7 +74,7 @@ def mount_matrices(problem: Problem, block: Block) -> Any:
     totals = [ca.SX(6, 6) for _ in range(3)]
     maps: list[list[Any]] = [[], [], [], []]
     found = problem.numbers([decisions[k] for k in range(len(problem.mount_decisions))], problem.mount_decisions)
-    rows, directions, mounts = [], [], len(problem.engine.mounts)
+    rows, directions, own, mounts = [], [], [], len(problem.engine.mounts)
     springs = every_spring(problem.engine.mounts)
     for (place, given), numbers in zip(springs, found.mounts or problem.mount_numbers, strict=True):
         axes = turned_axes(lib, numbers[TURNED])
@@ -79,6 +82,7 @@ def mount_matrices(problem: Problem, block: Block) -> Any:
         motion = ca.SX(point_motion(lib, arm))
         spring = along_axes(lib, axes, numbers[STIFFNESS])
         held = spring
+        own.append(ca.SX(axes) @ motion @ root.T)
         for law in given.dynamic:
             axis = ca.SX(axes)[law.axis, :]
             held = held + law.static * (axis.T @ axis)
@@ -94,7 +98,9 @@ def mount_matrices(problem: Problem, block: Block) -> Any:
             maps[k + 1][place:] = [sum(maps[k + 1][place:], felt)]
     stacked = [ca.vertcat(*parts) for parts in maps]
     told = [ca.vertcat(*rows) if rows else ca.SX(0, 6), ca.horzcat(*directions) if rows else ca.SX(3 * mounts, 0)]
-    return ca.Function("mounts", [decisions], [*(root @ total @ root.T for total in totals), *stacked, *told])
+    return ca.Function(
+        "mounts", [decisions], [*(root @ total @ root.T for total in totals), *stacked, *told, ca.vertcat(*own)]
+    )
 
 
 def symbolic_mounts(problem: Problem, block: Block, decisions: Any) -> SymbolicMounts:

@@ -15,6 +15,7 @@ from laufruhe.machine.block import Block
 from laufruhe.machine.chambers import GasModel
 from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.geared import GearedInertia
+from laufruhe.machine.load_case import LoadCase
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
 from laufruhe.machine.run import Run
@@ -92,6 +93,8 @@ class Engine:
         Sizes of its running gear; None where nothing is asked of them.
     geared
         Shares of the inertia of all that turns on shafts of other speeds.
+    load_cases
+        Loads that are held, under which mounts give way.
     """
 
     name: str
@@ -106,6 +109,7 @@ class Engine:
     run: Run | None = None
     gear: RunningGear | None = None
     geared: tuple[GearedInertia, ...] = ()
+    load_cases: tuple[LoadCase, ...] = ()
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "bearings", "geared"):

@@ -33,7 +33,7 @@ CURVES = (
     "torque", "indicator", "chambers", "twist-response", "twist-modes", "critical-speeds", "uneven-firing", "shares",
 )  # fmt: skip
 """Further ones, which `report.curves` fills."""
-PRINTED = ("weights", "assembly", "ranks", "robust", "torque", "torsion", "run_up")
+PRINTED = ("weights", "assembly", "ranks", "robust", "torque", "torsion", "load_cases", "run_up")
 """Sections of the report whose tables are files as they are printed, and how many each may have."""
 MOST_PRINTED = 8
 PRINTED_SHEETS = tuple(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from laufruhe.machine import Engine
@@ -27,6 +28,17 @@ class Asked(Protocol):
     @property
     def rotors(self) -> tuple[str, ...] | None:
         """Rotors, or shafts, that count."""
+
+    @property
+    def cases(self) -> tuple[str, ...] | None:
+        """Load cases that count."""
+
+    @property
+    def direction_weights(self) -> tuple[float, float, float] | None:
+        """Factors on the components of what is measured at places."""
+
+    def places(self, names: Sequence[str]) -> list[int]:
+        """Of the places that count among all of these names."""
 
     @property
     def frequency(self) -> tuple[float, float]:

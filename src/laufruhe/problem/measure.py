@@ -46,6 +46,8 @@ class Measure:
         That are to have a mode of their own; all when None.
     frequency
         Least and largest natural frequency about the torque-roll axis that is wanted [Hz].
+    cases
+        Names of the load cases that count; all when None.
     wanted
         Share of a motion in a mode of its own that is enough.
     """
@@ -60,6 +62,7 @@ class Measure:
     motions: tuple[str, ...] | None = None
     frequency: tuple[float, float] = (0.0, math.inf)
     wanted: float = 1.0
+    cases: tuple[str, ...] | None = None
 
     @property
     def name(self) -> str:
@@ -73,6 +76,8 @@ class Measure:
             text += " on " + ", ".join(self.at)
         if self.points is not None:
             text += " at " + ", ".join(self.points)
+        if self.cases is not None:
+            text += " under " + ", ".join(self.cases)
         return text
 
     @property

@@ -12,6 +12,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.balance_factor import balance_factors
 from laufruhe.physics.modes import MOTIONS
+from laufruhe.physics.static_cases import settled
 from laufruhe.physics.torque import torque_facts
 from laufruhe.physics.torsion import absorber_heat, chain_of
 from laufruhe.physics.wrench import WRENCH
@@ -20,7 +21,7 @@ from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.run_up import run_of, run_point, runs_up, shown_runs
 from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range
 from laufruhe.present.torsion import facts_of as torsion_of
-from laufruhe.problem.channels import LoadChannel
+from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import Evaluation, measured, over, samples_of
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
@@ -65,8 +66,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         **{key: _all_points(result, [point[key] for point in points]) for key in places},
         "shaking": _largest([point["shaking"] for point in points]),
         "points": [{key: point[key] for key in own} for point in points],
-        **({"modes": _modes(result.final)} if is_elastic(result) else {}),
-        **({"run_up": _runs(result)} if runs_up(result) else {}),
+        **(_on_mounts(result) if is_elastic(result) else {}),
         **({"torsion": _torsion(result)} if is_twisted(result) else {}),
         **_running(result),
         **_phasing(result),
@@ -247,6 +247,19 @@ def _torsion(result: Result) -> Record:
             {"name": each.name, "heat": [float(at[k]) for at in heat]} for k, each in enumerate(chain.absorbers)
         ],
     }
+
+
+def _on_mounts(result: Result) -> Record:
+    """Of a block on elastic mounts."""
+    cases = {"load_cases": _load_cases(result)} if result.final.engine.load_cases else {}
+    return {"modes": _modes(result.final), **cases, **({"run_up": _runs(result)} if runs_up(result) else {})}
+
+
+def _load_cases(result: Result) -> Record:
+    """Travel of every mount, and the force on it, in the axes of C2, under each load that is held."""
+    mounting = mounting_in(result.final.engine)
+    cases = {case.name: settled(mounting, case) for case in result.final.engine.load_cases}
+    return {name: _of(found, "motion travel force on_stops") for name, found in cases.items()}
 
 
 def _runs(result: Result) -> Record:

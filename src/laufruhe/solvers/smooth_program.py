@@ -44,6 +44,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.gathered import Gathered
 from laufruhe.solvers.local_optimum import LocalOptimum
 from laufruhe.solvers.nonlinear import NonlinearProgram
+from laufruhe.solvers.smooth_cases import StaticCases
 from laufruhe.solvers.smooth_modes import ModeVariables
 
 SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
@@ -100,6 +101,7 @@ class SmoothProgram:
             self._mounting = mounting_in(problem.engine)
             self._root = mass_root(self._mounting.block)
             self._mounts = symbolic_mounts(problem, self._mounting.block, self._d)
+            self._cases = StaticCases(self._mounts, self._mounting, self._root, self._held)
             self._points = self._responses()
             self._modes.hold(self._mounts.stiffness, self._root, self._mounting)
         self.program = self._built()
@@ -227,6 +229,8 @@ class SmoothProgram:
             return ca.dot(load, settled) / -weight[2]
         if quantity.channel.of_axis is not None:
             return self._residual(quantity.channel.of_axis(self._mounting.block, quantity.frequency))
+        if quantity.channel.of_cases is not None:
+            return self._cases.largest(quantity, self.problem.engine)
         if quantity.channel is channels.DECOUPLING_SHORTFALL:
             return self._modes.shortfall(quantity)
         if quantity.channel is channels.TOTAL_STIFFNESS:

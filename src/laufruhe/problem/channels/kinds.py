@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,7 @@ class Needs(StrEnum):
     RIM = "rim"
     ARMS = "arms"
     RUN = "run-up"
+    CASES = "load cases"
     ROTORS = "rotors of a rotary engine"
 
 
@@ -91,9 +92,9 @@ class Channel:
     of_loads
         Whether it depends on what excites the block.
     size
-        Of an engine, of what cancels in it where it is zero; zero where loads, masses or nothing do.
+        Of an engine, of what cancels in it where it is zero; else zero.
     rises
-        Whether it never falls where a number of the flywheel grows, if it is of that; else it never rises.
+        Whether it never falls where a number of the flywheel grows; else it never rises.
     of_wheel
         The value as a function of the flywheel of an engine, if it is of that.
     of_run
@@ -104,6 +105,8 @@ class Channel:
         The value as a function of an engine, if it is of its sizes alone and goes one way with each of them.
     of_constant_stiffness
         Whether it has no meaning where stiffness depends on frequency.
+    of_cases
+        Of a block under a held load what it is the largest length of, shape (mounts, 3), if it is of that.
     of_axis
         What turning about the torque-roll axis lacks to be a mode, if it is of that.
     open_frequency
@@ -131,6 +134,7 @@ class Channel:
     of_torque: bool = False
     of_modes: bool = False
     of_constant_stiffness: bool = False
+    of_cases: Callable[[Any], Any] | None = None
     of_axis: Callable[[Block, Band], AxisResidual] | None = None
     open_frequency: bool = False
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
@@ -210,8 +214,7 @@ class LoadChannel(Channel):
     factors
         Of a twist of the crankshaft, what its places make of that of each section.
     of_sizes
-        Factors of the sizes of an engine that it is a load inside the crankcase times, one for each place, or for each
-        of its components (Z1).
+        Factors of sizes that it is a load inside the crankcase times, of each place or component (Z1).
     """
 
     keys: tuple[str, ...] = ON_BLOCK

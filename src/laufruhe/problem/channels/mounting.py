@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from laufruhe.machine import Block, Engine
+from laufruhe.machine.load_case import LoadCase
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.static_cases import settled
 from laufruhe.problem.asking import Answered, Asked
-from laufruhe.problem.channels.kinds import ON_BLOCK, MountChannel
+from laufruhe.problem.channels.kinds import ON_BLOCK, MountChannel, Needs
 
 
 def mounting_in(engine: Engine) -> ElasticMounting:
@@ -60,6 +65,30 @@ def _of_axis(
     )
 
 
+def counted_cases(measure: Asked, engine: Engine) -> list[LoadCase]:
+    """Load cases that count."""
+    return [case for case in engine.load_cases if measure.cases is None or case.name in measure.cases]
+
+
+def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
+    """The largest at any mount that counts, under any load case that counts."""
+
+    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+        mounting = mounting_in(evaluation.engine)
+        chosen = measure.places([mount.name for mount in mounting.mounts])
+        weights = np.array(measure.direction_weights or (1.0, 1.0, 1.0))
+        found = [part(settled(mounting, case))[chosen] * weights for case in counted_cases(measure, evaluation.engine)]
+        return (max((float(np.linalg.norm(rows, axis=1).max()) for rows in found), default=0.0),)
+
+    keys = ("load_cases", "mounts", "direction_weights")
+    return MountChannel(
+        name, unit, keys, Needs.CASES, values=values, of_cases=part,
+        places=lambda engine: [mount.name for mount in engine.mounts],
+    )  # fmt: skip
+
+
+STATIC_TRAVEL = _of_cases("static travel", "m", lambda found: found.travel)
+STATIC_FORCE = _of_cases("static mount force", "N", lambda found: found.force)
 TRANSMISSIBILITY = MountChannel("transmissibility", "", ON_BLOCK, values=_transmissibility, of_loads=True)
 SAG = MountChannel(
     "static sag", "m", sides=("min", "max"), values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting))
@@ -92,4 +121,5 @@ TOTAL_STIFFNESS = MountChannel(
 )  # fmt: skip
 OF_MOUNTING = (
     TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, DECOUPLING_SHORTFALL, TORQUE_ROLL, RAW_TORQUE_ROLL, TOTAL_STIFFNESS,
+    STATIC_TRAVEL, STATIC_FORCE,
 )  # fmt: skip

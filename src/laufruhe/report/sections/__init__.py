@@ -7,6 +7,7 @@ from laufruhe.report.sections import (
     assembly,
     decisions,
     limits,
+    load_cases,
     modes,
     mounts,
     orders,
@@ -21,7 +22,8 @@ from laufruhe.report.sections import (
 from laufruhe.solvers.result import Result
 
 SECTIONS = (
-    stars, assembly, ranks, decisions, weights, robust, limits, mounts, torque, torsion, modes, run_up, orders,
+    stars, assembly, ranks, decisions, weights, robust, limits, mounts, torque, torsion, modes, load_cases, run_up,
+    orders,
 )  # fmt: skip
 
 

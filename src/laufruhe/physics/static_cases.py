@@ -1,0 +1,133 @@
+"""Where a block settles on its mounts under a load that is held, bump stops included (E52).
+
+    K q + sum T' s (T q - gap) = w    beyond the gaps
+
+T are the travels along the own axes of the springs. The energy is convex, and its second derivative is constant between
+gaps: Newton's method with a line search ends at the one place where forces balance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import SolverError
+from laufruhe.machine.block import Block
+from laufruhe.machine.load_case import LoadCase
+from laufruhe.machine.mount import every_spring
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.modes import GRAVITY
+
+Array = NDArray[np.float64]
+
+MOST_STEPS, HALVINGS, CLOSED = 200, 40, 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Stops:
+    """Bump stops of all springs along their own axes.
+
+    Attributes
+    ----------
+    rows
+        Travel along each axis per motion, shape (3 springs, 6).
+    gaps, stiffness
+        Shape (3 springs,); zero stiffness where there is no stop.
+    directions
+        Of the force along each axis among those of the mounts, shape (3 mounts, 3 springs).
+    """
+
+    rows: Array
+    gaps: Array
+    stiffness: Array
+    directions: Array
+
+    def beyond(self, travel: Array) -> Array:
+        """What of a travel is beyond the gaps, shape (3 springs,)."""
+        return np.asarray(travel - np.clip(travel, -self.gaps, self.gaps))
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A block under a load that is held.
+
+    Attributes
+    ----------
+    motion
+        (u, theta) of its centre of gravity, shape (6,).
+    travel, force
+        Of the engine at its mounts and on them, in the axes of C2, shape (mounts, 3) [m], [N].
+    on_stops
+        Mounts that stand on a stop.
+    """
+
+    motion: Array
+    travel: Array
+    force: Array
+    on_stops: tuple[str, ...]
+
+
+def case_wrench(block: Block, case: LoadCase) -> Array:
+    """Of a load case about the centre of gravity, shape (6,) [N, N m]."""
+    arm = np.array(case.place) - np.array(block.centre_of_gravity)
+    weight = block.mass * GRAVITY * np.array(case.times_weight)
+    return np.concatenate([weight + case.force, np.array(case.moment) + np.cross(arm, case.force)])
+
+
+def stops_of(mounting: ElasticMounting) -> Stops:
+    """Of a mounting."""
+    found = every_spring(mounting.mounts)
+    rows = np.array([np.array(spring.orientation) @ mounting.motions[place] for place, spring in found])
+    directions = np.zeros((3 * len(mounting.mounts), 3 * len(found)))
+    for k, (place, spring) in enumerate(found):
+        directions[3 * place : 3 * place + 3, 3 * k : 3 * k + 3] = np.array(spring.orientation).T
+    gaps = np.repeat([spring.stop_gap for _, spring in found], 3)
+    stiffness = np.repeat([spring.stop_stiffness for _, spring in found], 3)
+    return Stops(rows.reshape(-1, 6), gaps, np.where(np.isfinite(gaps), stiffness, 0.0), directions)
+
+
+def settled(mounting: ElasticMounting, case: LoadCase) -> Settled:
+    """Where the block stands under a load case (E52).
+
+    Raises
+    ------
+    SolverError
+        If no balance is found: it always is on mounts that hold every motion.
+    """
+    wrench, stops = case_wrench(mounting.block, case), stops_of(mounting)
+    q = _balanced(mounting.stiffness, stops, wrench)
+    beyond = stops.stiffness * stops.beyond(stops.rows @ q)
+    travel = mounting.motions @ q
+    force = np.einsum("mij,mj->mi", mounting.springs, travel) + (stops.directions @ beyond).reshape(-1, 3)
+    met = np.any((stops.directions != 0.0) & (beyond != 0.0), axis=1).reshape(-1, 3).any(axis=1)
+    names = tuple(mount.name for mount, is_met in zip(mounting.mounts, met, strict=True) if is_met)
+    return Settled(q, travel, force, names)
+
+
+def _balanced(stiffness: Array, stops: Stops, wrench: Array) -> Array:
+    """q of least energy, shape (6,)."""
+
+    def energy(q: Array) -> float:
+        over = stops.beyond(stops.rows @ q)
+        return float(0.5 * q @ stiffness @ q + 0.5 * stops.stiffness @ over**2 - wrench @ q)
+
+    q: Array = np.asarray(np.linalg.solve(stiffness, wrench), dtype=np.float64)
+    for _ in range(MOST_STEPS):
+        over = stops.beyond(stops.rows @ q)
+        pull = wrench - stiffness @ q - stops.rows.T @ (stops.stiffness * over)
+        met = stops.rows * (stops.stiffness * (over != 0.0))[:, None]
+        step: Array = np.asarray(np.linalg.solve(stiffness + met.T @ stops.rows, pull), dtype=np.float64)
+        if np.linalg.norm(step) <= CLOSED * np.linalg.norm(q):
+            return q
+        here, share = energy(q), 1.0
+        for _ in range(HALVINGS):
+            if energy(q + share * step) <= here - 1e-4 * share * float(pull @ step):
+                break
+            share *= 0.5
+        else:
+            # nothing falls any more but roundings
+            return q
+        q = q + share * step
+    raise SolverError("no balance was found under a load case; check the stiffness of bump stops")

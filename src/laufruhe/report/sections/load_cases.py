@@ -1,0 +1,29 @@
+"""How far mounts give way under loads that are held, and what they carry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from laufruhe.physics.static_cases import settled
+from laufruhe.present.mounting import is_elastic
+from laufruhe.present.numbers import DASH, number
+from laufruhe.problem.channels import mounting_in
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import Result
+
+HEAD = ("load case", "mount", "travel x [mm]", "y [mm]", "z [mm]", "force [N]", "on its stop")
+
+
+def tables(result: Result) -> list[Grid]:
+    """Of the design as decided."""
+    if not is_elastic(result) or not result.final.engine.load_cases:
+        return []
+    mounting, rows = mounting_in(result.final.engine), []
+    for case in result.final.engine.load_cases:
+        found = settled(mounting, case)
+        for mount, travel, force in zip(mounting.mounts, found.travel, found.force, strict=True):
+            moved = (number(1e3 * along) for along in travel)
+            met = "yes" if mount.name in found.on_stops else DASH
+            rows.append((case.name, mount.name, *moved, number(float(np.linalg.norm(force))), met))
+    note = "From where the engine stands without these loads."
+    return [Grid("Load cases", HEAD, tuple(rows), left=2, note=note)]

@@ -1,0 +1,177 @@
+"""Loads that are held: closed forms, minimisation of the energy, bounds, and designs that keep a travel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import differential_evolution, minimize
+
+from laufruhe.errors import InputError
+from laufruhe.machine import Mount
+from laufruhe.machine.load_case import LoadCase
+from laufruhe.physics import mount_numbers
+from laufruhe.physics.elastic_mounts import elastic_mounting
+from laufruhe.physics.static_cases import case_wrench, settled
+from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.prove.box_numbers import RANGES
+from laufruhe.prove.box_response import BoxModel
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+from laufruhe.solvers.result import Status
+from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
+from mounts.powertrain import random_mounting
+from prove.test_subdivision import boxes
+
+TORQUE = LoadCase("torque", moment=(180.0, 0.0, 0.0), force=(0.0, 300.0, -50.0), place=(0.3, -0.1, 0.2))
+BUMP = LoadCase("bump", times_weight=(0.2, -0.5, -3.0))
+CASES = """
+[[load_cases]]
+name = "bump"
+times_weight = [0, 0, -3]
+[[load_cases]]
+name = "torque"
+torque = "400 N m"
+"""
+
+
+def test_weight_alone_is_the_sag() -> None:
+    mounting = random_mounting(4)
+    found = settled(mounting, LoadCase("weight", times_weight=(0.0, 0.0, -1.0)))
+    assert -found.motion[2] == pytest.approx(mount_numbers.sag(mounting), rel=1e-10)
+
+
+@pytest.mark.parametrize("case", [TORQUE, BUMP])
+def test_mounts_carry_the_load(case: LoadCase) -> None:
+    stopped = [replace(m, stop_gap=5e-4, stop_stiffness=2e6) for m in random_mounting(2).mounts]
+    mounting = elastic_mounting(random_mounting(2).block, stopped)
+    found, centre = settled(mounting, case), np.array(mounting.block.centre_of_gravity)
+    arms = np.array([mount.position for mount in mounting.mounts]) - centre
+    carried = np.concatenate([found.force.sum(axis=0), np.cross(arms, found.force).sum(axis=0)])
+    assert carried == pytest.approx(case_wrench(mounting.block, case), rel=1e-9, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("case", [TORQUE, BUMP])
+def test_the_block_settles_where_its_energy_is_least(seed: int, case: LoadCase) -> None:
+    plain = random_mounting(seed)
+    stopped = [replace(m, stop_gap=1e-4 * (k + 1), stop_stiffness=3e6) for k, m in enumerate(plain.mounts)]
+    mounting = elastic_mounting(plain.block, stopped)
+    found, wrench, size = settled(mounting, case), case_wrench(plain.block, case), 1e-3
+
+    def energy(x):
+        q, total = size * x, 0.0
+        for mount, motion in zip(mounting.mounts, mounting.motions, strict=True):
+            own = np.array(mount.orientation) @ motion @ q
+            over = np.maximum(np.abs(own) - mount.stop_gap, 0.0)
+            total += 0.5 * np.sum(np.array(mount.stiffness) * own**2 + mount.stop_stiffness * over**2)
+        return total - float(wrench @ q)
+
+    other = minimize(energy, np.zeros(6), method="BFGS", options={"gtol": 1e-12, "maxiter": 5000})
+    assert energy(found.motion / size) <= other.fun + 1e-9 * abs(other.fun)
+    assert found.motion == pytest.approx(size * other.x, abs=2e-4 * np.abs(found.motion).max())
+    assert found.on_stops
+
+
+def test_one_mount_meets_its_stop_as_two_springs_do() -> None:
+    # by hand: k x to the gap, then (k + s) beyond it
+    block = random_mounting(0).block
+    block = replace(block, mass=100.0, centre_of_gravity=(0.0, 0.0, 0.0))
+    places = [(x, y, 0.0) for x in (-0.3, 0.3) for y in (-0.2, 0.2)]
+    mounts = [Mount(str(k), p, (1e5,) * 3, stop_gap=2e-3, stop_stiffness=3e5) for k, p in enumerate(places)]
+    load = LoadCase("down", force=(0.0, 0.0, -4.0 * 500.0))
+    assert settled(elastic_mounting(block, mounts), load).motion[2] == pytest.approx(-(2e-3 + 300.0 / 4e5), rel=1e-12)
+    # a second stop farther out, on a spring that is joined: three slopes
+    pad = Mount("pad", places[0], (0.0, 0.0, 0.0), stop_gap=2.5e-3, stop_stiffness=6e5)
+    joined = elastic_mounting(block, [replace(m, joined=(replace(pad, position=m.position),)) for m in mounts])
+    assert settled(joined, load).motion[2] == pytest.approx(-(2.5e-3 + 100.0 / 1e6), rel=1e-12)
+
+
+ASKED = {
+    "travel": '[objective]\nminimise = "static travel"\n',
+    "of one": '[objective]\nminimise = "static travel"\nload_cases = ["torque"]\nmounts = ["front left"]\n',
+    "along z": '[objective]\nminimise = "static travel"\ndirection_weights = [0, 0, 1]\n',
+    "force": '[objective]\nminimise = "static mount force"\n',
+}
+TILTED = BLOCK + 'inertia_products = ["2 kg m^2", "-3 kg m^2", "1 kg m^2"]\n'
+AHEAD = TILTED.replace('"0 mm", "0 mm", "120 mm"', '"60 mm", "20 mm", "120 mm"')
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_no_design_of_a_box_is_under_its_bound(name: str, tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, ENGINE, AHEAD, MOUNTS, CASES, ASKED[name])
+    measure, given = problem.objective[0].measure, evaluate(problem)
+    model, generator, ratios = BoxModel(problem, given), np.random.default_rng(1), []
+    for low, high in zip(*boxes(problem, 30, 3), strict=True):
+        (least,), _ = RANGES[measure.channel](model, measure, low[None], high[None])
+        drawn = [problem.design((low + s * (high - low)).tolist()) for s in generator.random((5, 2))]
+        ratios.append(float(least) / min(remounted(given, engine).value(measure) for engine in drawn))
+    assert max(ratios) <= 1.0 + 1e-9
+    assert max(ratios) > 0.99
+
+
+LIMIT = '[[constraints]]\nlimit = "static travel"\nmax = "9 mm"\n[search]\nstarts = 4\n'
+SOFT = '[objective]\nminimise = "total stiffness"\n'
+STOPPED = changed(MOUNTS, ("loss_factor = 0.1", 'loss_factor = 0.1\nstop = { gap = "6 mm", stiffness = "1500 N/mm" }'))
+
+
+@pytest.fixture(scope="module")
+def least_stiff(tmp_path_factory):
+    """Least stiffness that keeps a travel, without bump stops and with them."""
+    found = {}
+    for name, mounts in (("free", MOUNTS), ("stopped", STOPPED)):
+        problem = problem_of(tmp_path_factory.mktemp(name), ENGINE, AHEAD, mounts, CASES, SOFT, LIMIT)
+        found[name] = problem, solve(problem)
+    return found
+
+
+def _by_evolution(problem) -> float:
+    given, (limit,) = evaluate(problem), problem.limits
+
+    def worth(x):
+        design = remounted(given, problem.design(np.exp(x).tolist()))
+        return objective_value(problem, design) * (1.0 + 100.0 * max(design.standing(limit).excess, 0.0))
+
+    bounds = [(np.log(d.lower), np.log(d.upper)) for d in problem.decisions]
+    return float(differential_evolution(worth, bounds, seed=1, maxiter=60, popsize=8, tol=1e-9).fun)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["free", "stopped"])
+def test_the_least_stiffness_that_keeps_a_travel_is_that_of_a_search(name: str, least_stiff) -> None:
+    problem, result = least_stiff[name]
+    assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
+    assert result.objective.value == pytest.approx(_by_evolution(problem), rel=2e-3)
+    assert result.limits[0].value <= 9e-3 * (1.0 + 1e-6)
+    assert result.certificate.lower_bound <= result.objective.value * (1.0 + 1e-9)
+
+
+def test_the_free_one_is_proven_and_stops_save_stiffness(least_stiff) -> None:
+    free, stopped = (least_stiff[name][1] for name in ("free", "stopped"))
+    assert free.certificate.kind is Proof.GLOBAL
+    assert stopped.objective.value < 0.999 * free.objective.value
+
+
+@pytest.mark.parametrize(
+    ("cases", "more", "told"),
+    [
+        ("", LIMIT, "needs load cases"),
+        ('[[load_cases]]\nname = "nothing"\n', "", "is no load"),
+        (CASES + CASES, "", "bump"),
+        (CASES, LIMIT.replace("max", 'load_cases = ["pothole"]\nmax'), "is no load case here"),
+        (CASES, LIMIT.replace("max", 'mounts = ["rear"]\nmax'), "is no mount here"),
+        (CASES.replace('"400 N m"', '"400 N"'), "", "torque"),
+    ],
+)
+def test_what_means_nothing_is_refused_in_a_line(cases, more, told, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as refused:
+        problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, cases, SOFT, more)
+    assert told in str(refused.value)
+
+
+def test_load_cases_need_mounts_that_give_way(tmp_path: Path) -> None:
+    rigid = '[mounts]\npositions = [["300 mm", "200 mm", "0 mm"], ["-300 mm", "-200 mm", "0 mm"]]\n'
+    with pytest.raises(InputError, match="needs elastic mounts"):
+        problem_of(tmp_path, ENGINE, rigid, CASES)
