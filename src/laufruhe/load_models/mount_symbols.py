@@ -42,7 +42,7 @@ class SymbolicMounts:
         Of the springs whose stiffness depends on frequency: travel per motion, shape (n, 6), and where their forces
         act, (3 mounts, n) (E50).
     own
-        Travel along the own axes of every spring, shape (3 springs, 6) (E52).
+        Travel along the own axes of every spring, shape (3 springs, 6) (E55).
     laws
         Stiffness of those that depend on frequency.
     """

@@ -9,7 +9,7 @@ from laufruhe.machine.mount import Vector3
 
 @dataclass(frozen=True)
 class LoadCase:
-    """Forces and moments on the block; travel counts from where it stands without them (E52).
+    """Forces and moments on the block; travel counts from where it stands without them (E55).
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Where a block settles on its mounts under a load that is held, bump stops included (E52).
+"""Where a block settles on its mounts under a load that is held, bump stops included (E55).
 
     K q + sum T' s (T q - gap) = w    beyond the gaps
 
@@ -89,7 +89,7 @@ def stops_of(mounting: ElasticMounting) -> Stops:
 
 
 def settled(mounting: ElasticMounting, case: LoadCase) -> Settled:
-    """Where the block stands under a load case (E52).
+    """Where the block stands under a load case (E55).
 
     Raises
     ------

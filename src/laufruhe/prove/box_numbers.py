@@ -73,7 +73,7 @@ def _most_along(vector: Array, modes: Array, parts: Array) -> Array:
 
 
 def held_loads(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
-    """Least of the largest travel or force under load cases over boxes, shape (boxes,) (E37, E52).
+    """Least of the largest travel or force under load cases over boxes, shape (boxes,) (E37, E55).
 
     Nothing is known where bump stops bend the stiffness.
     """

@@ -1,4 +1,4 @@
-"""A block under loads that are held, as expressions of what is open (E52)."""
+"""A block under loads that are held, as expressions of what is open (E55)."""
 
 from __future__ import annotations
 
