@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 # what the commands write is not kept
 WRITTEN = ROOT / "results"
-KEPT = (WRITTEN / "benchmarks", *(WRITTEN / name / "README.md" for name in ("", "attack", "faults")))
+KEPT = (WRITTEN / "benchmarks", *(WRITTEN / name / "README.md" for name in ("", "attack", "faults", "proofs")))
 PAGES = sorted(
     path
     for pattern in (
@@ -18,6 +18,7 @@ PAGES = sorted(
         "results/benchmarks/*.md",
         "results/attack/README.md",
         "results/faults/README.md",
+        "results/proofs/README.md",
     )
     for path in ROOT.glob(pattern)
 )
