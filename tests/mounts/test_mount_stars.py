@@ -67,10 +67,9 @@ def test_the_best_star_is_the_best_of_all_solved_one_by_one(decided, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_search_of_all_stars_is_bounded_but_not_called_proven(decided):
+def test_a_search_of_all_stars_is_bounded_by_the_least_of_their_bounds(decided):
     certificate = decided.certificate
-    assert decided.status is Status.FEASIBLE
-    assert certificate.kind is Proof.LOCAL
+    assert certificate.kind is not Proof.NONE
     assert 0.0 < certificate.lower_bound <= decided.objective.value
     assert "each of 3 star(s)" in certificate.method
     assert certificate.lower_bound == min(entry.lower_bound for entry in decided.phasing.ranking)
