@@ -2,6 +2,7 @@
 
 import pytest
 
+import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.solvers import solve, state
@@ -109,6 +110,17 @@ def test_refused(tmp_path, cylinders, engine, phasing, rest, said):
     with pytest.raises(InputError, match=said) as refusal:
         engines.problem(tmp_path, cylinders, engine=engine, phasing=phasing, rest=rest)
     assert len(str(refusal.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("key", ["stroke", "reciprocating_mass"])
+def test_open_throws_ask_for_what_given_throws_ask_for(key):
+    given = {"stroke": '"100 mm"', "reciprocating_mass": '"1 kg"'}
+    keys = "\n".join(f"{name} = {value}" for name, value in given.items() if name != key)
+    head = f'layout = "inline"\ncycle = "four-stroke"\ncylinders = 4\nrod_ratio = 0.28\n{keys}'
+    rest = '[[operating_points]]\nspeed = "3000 rpm"\n[objective]\nminimise = "rms shaking force"'
+    for throws in (OPEN, "throws = [0, 180, 180, 0]\nfiring_order = [1, 3, 4, 2]"):
+        with pytest.raises(InputError, match=rf"engine\.{key}: is missing; add it"):
+            laufruhe.load(f'[engine]\n{head}\ncylinder_spacing = "100 mm"\n{throws}\n{rest}')
 
 
 def test_cylinders_are_asked_for(tmp_path):

@@ -154,6 +154,7 @@ def _check_drive(table: EngineTable) -> None:
 
 def layout_of(table: EngineTable) -> Layout:
     """Places, banks and pins, without masses."""
+    _check_pistons(table)
     with blamed_on("engine.cylinders"):
         return table.kind.place(_asked(table))
 
