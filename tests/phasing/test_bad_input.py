@@ -120,7 +120,7 @@ def test_open_throws_ask_for_what_given_throws_ask_for(key):
     rest = '[[operating_points]]\nspeed = "3000 rpm"\n[objective]\nminimise = "rms shaking force"'
     for throws in (OPEN, "throws = [0, 180, 180, 0]\nfiring_order = [1, 3, 4, 2]"):
         with pytest.raises(InputError, match=rf"engine\.{key}: is missing; add it"):
-            laufruhe.load(f'[engine]\n{head}\ncylinder_spacing = "100 mm"\n{throws}\n{rest}')
+            laufruhe.load(f'title = "x"\n[engine]\n{head}\ncylinder_spacing = "100 mm"\n{throws}\n{rest}')
 
 
 def test_cylinders_are_asked_for(tmp_path):
