@@ -232,7 +232,9 @@ class Scene:
 
     def mass(self, channel: str) -> float:
         role = {"counterweight mass": "c", "balancer mass": "b", "added mass": "cb"}[channel]
-        return sum(abs(u) / radius for *_, u, radius, own in self.rotors if own in role)
+        machines = _machine(self._key, self.order).mechanisms if "c" in role else []
+        levers = sum(m.lever.weight for m in machines if m.lever is not None)
+        return levers + sum(abs(u) / radius for *_, u, radius, own in self.rotors if own in role)
 
     @cached_property
     def objective(self) -> float:

@@ -48,7 +48,7 @@ def spoilt(folder: Path, old: str, new: str) -> Path:
     return written(folder, scenes.GIVEN.replace(old, new))
 
 
-DAMAGED = [("check", 0, 400), ("evaluate", 3000, 30), ("explain", 4000, 30)]
+DAMAGED = [("check", 0, 800), ("evaluate", 3000, 30), ("explain", 4000, 30)]
 
 
 @pytest.mark.slow

@@ -102,8 +102,8 @@ def _terms(table: ObjectiveTable, scene: Scene, where: str) -> tuple[Term, ...]:
 def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Measure:
     found = scene.measure(name, table, where)
     if not found.channel.minimised:
-        others = [n for n, (channel, _) in MEASURES.items() if channel.is_number and channel.minimised]
-        raise Refused(where, name, "is not minimised but limited", "use one of: " + ", ".join(others))
+        remedy = f"limit it ([[constraints]], limit = '{name}'), and minimise a force, a moment or a mass"
+        raise Refused(where, name, "is not minimised but limited", remedy)
     return found
 
 
