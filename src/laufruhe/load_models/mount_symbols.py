@@ -13,17 +13,15 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine.block import Block
 from laufruhe.machine.dynamic import Dynamic
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import symbols
 from laufruhe.physics.rigid_body import along_axes, carried, point_motion, turned_axes
 from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, TURNED
 from laufruhe.problem.problem import Problem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

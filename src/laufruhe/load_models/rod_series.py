@@ -12,12 +12,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.load_models.sized_model import Piece
-
-Array = NDArray[np.float64]
+from laufruhe.numerics.arrays import Array
 
 TERMS, BETWEEN = 20, (0.13, 0.71)
 """Terms of a series, and where between its ends it is held against the exact model."""

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.machine.running_gear import ROD_LENGTH, Size
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.spectrum import Spectrum
@@ -25,7 +25,6 @@ from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, bends_of, load_rows
 from laufruhe.problem.problem import Problem
 
-Array = NDArray[np.float64]
 MASSES, MOST_KEPT = 4, 4096
 
 

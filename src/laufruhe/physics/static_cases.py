@@ -11,16 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import SolverError
 from laufruhe.machine.block import Block
 from laufruhe.machine.load_case import LoadCase
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import GRAVITY
-
-Array = NDArray[np.float64]
 
 MOST_STEPS, HALVINGS, CLOSED = 200, 40, 1e-12
 

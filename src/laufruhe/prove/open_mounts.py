@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.dynamic_springs import DynamicSprings
 from laufruhe.physics.rigid_body import carried, point_motion
@@ -22,8 +23,6 @@ from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, T
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.opened_springs import Opened, Place, Spring, own_axes
 from laufruhe.prove.transmitted_bound import SLACK, limited_stiffness, number_ranges
-
-Array = NDArray[np.float64]
 
 # share of a square that is spent on the arms of mounts whose places are open
 STRETCH = 0.2

@@ -9,15 +9,13 @@ from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.decision import LAG, LOSS, POSITION, STIFFNESS, TURNED
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.transmitted_bound import number_ranges
-
-Array = NDArray[np.float64]
 
 # angle by which a mount is turned to see which of its axes stay [rad]
 ASIDE = 0.3

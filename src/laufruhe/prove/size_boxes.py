@@ -16,16 +16,15 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.load_models.rod_series import TERMS, RodSeries, rod_series
 from laufruhe.load_models.sized_model import MASSES, Piece, SizeModel
 from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.best_first import Box, Divided, Halving, halves, widest
 
-Array = NDArray[np.float64]
 Ways: TypeAlias = Array
 
 MOST_BOXES = 3000

@@ -17,11 +17,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.prove.spring_conditions import Held
-
-Array = NDArray[np.float64]
 
 # shifts that make a matrix convex, in parts of its largest eigenvalue
 _SHIFTS = np.concatenate([[0.0], 10.0 ** np.arange(-14.0, 0.1, 0.25)])

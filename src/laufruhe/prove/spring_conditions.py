@@ -13,14 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.prove.open_mounts import OpenMounts
 from laufruhe.prove.opened_springs import Place, Spring
 from laufruhe.prove.spring_lines import Line, product
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,13 +17,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.rigid_body import carried
 from laufruhe.prove.open_mounts import OpenMounts
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 # of the largest of a kind, the least that a product is counted in
 SMALL = 0.1

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.physics.rigid_body import moved_wrench
@@ -21,9 +21,6 @@ from laufruhe.prove.box_response import is_travel
 from laufruhe.prove.open_mounts import OpenMounts
 from laufruhe.prove.spring_bound import Cap
 from laufruhe.prove.spring_lines import Felt, Line, in_parts, most_felt
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 # share of the squares of the best design that orders left out have, and orders that are kept
 LEFT_OUT, MOST_ORDERS = 1e-6, 12

@@ -6,14 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.prove.quadratics import answered, column, triangle
 from laufruhe.prove.spring_bound import Cap, Multipliers, Program, Proposed
 from laufruhe.prove.spring_conditions import Held
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 # what a solver leaves of a price of one for every square, so that what its multipliers leave over is convex
 ASIDE = 3e-7

@@ -8,9 +8,9 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel
+from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_resonance import off_resonance
@@ -24,9 +24,6 @@ from laufruhe.prove.spring_lines import Felt, Line, line_of, squared
 from laufruhe.prove.spring_orders import Asked, Head, Order, asked, heads_of
 from laufruhe.prove.spring_program import proposed
 from laufruhe.prove.subdivision import StiffnessBoxes, divides
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 # what all relaxations may cost together, a number of moments squared being one, and how many they may be
 WORK, MOST_BOXES = 4e7, 100

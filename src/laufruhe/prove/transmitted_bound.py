@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine.dynamic import Dynamic
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.spectrum import common_base
@@ -35,9 +35,6 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.quadratics import Quadratic, best_prices, covering
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 # designs are taken as feasible when they break a limit by less
 SLACK = 1e-6

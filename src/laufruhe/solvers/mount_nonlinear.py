@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem import channels
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
@@ -32,8 +32,6 @@ from laufruhe.solvers.mount_starts import columns_of, unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth_program import SmoothProgram
 from laufruhe.solvers.unbalances import beyond_mounts, solve_unbalances
-
-Array = NDArray[np.float64]
 
 WORTH_SAYING = 1.01
 

@@ -7,18 +7,16 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.mount_symbols import SymbolicMounts, elimination
 from laufruhe.machine import Engine
 from laufruhe.machine.load_case import LoadCase
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.static_cases import case_wrench, settled, stops_of
 from laufruhe.problem.channels import counted_cases
 from laufruhe.problem.measure import Measure
 from laufruhe.solvers.gathered import Gathered
-
-Array = NDArray[np.float64]
 
 # of a gap, over which a stop sets in: under it all along, so that a design does not stand better than it is
 SOFT = 1e-3
