@@ -22,12 +22,11 @@ from laufruhe.physics.time_model import frequencies_with_fluid, time_model
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.subdivision import StiffnessBoxes
 from laufruhe.prove.transmitted_bound import transmitted_bound
 from laufruhe.solvers import solve
+from mounts.bounds_seen import bounds_over_designs, by_springs, designs
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from mounts.powertrain import random_mounting, wrench
-from mounts.test_springs_of_a_place import _by_springs, _designs
 from prove.test_subdivision import boxes
 
 TRACK = FluidTrack(2, mass=30.0, bulge=2.5e5, stiffness=8e3, damping=600.0)
@@ -179,10 +178,7 @@ ASKED = {
 @pytest.mark.parametrize("name", ASKED)
 def test_bounds_know_hydraulic_mounts(name: str, tmp_path: Path) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, HYDRAULIC, ASKED[name])
-    search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, evaluate(problem)))
-    low, high = boxes(problem, 12, 5)
-    bounds, _ = search.bounds(low, high)
-    ratios = [bound / min(_designs(problem, *ends, 1)) for *ends, bound in zip(low, high, bounds, strict=True)]
+    ratios = bounds_over_designs(problem)
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
 
@@ -190,14 +186,14 @@ def test_bounds_know_hydraulic_mounts(name: str, tmp_path: Path) -> None:
 def test_bounds_by_springs_and_by_what_is_transmitted_know_them_too(tmp_path: Path) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, HYDRAULIC, RMS)
     low, high = boxes(problem, 3, 7)
-    ratios = [_by_springs(problem, *ends, min(_designs(problem, *ends, 1))) for ends in zip(low, high, strict=True)]
+    ratios = [by_springs(problem, *ends, min(designs(problem, *ends, 1))) for ends in zip(low, high, strict=True)]
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
     for position in ('"300 mm"', '{ between = ["250 mm", "350 mm"], start = "300 mm" }'):
         moved = changed(HYDRAULIC, ('"300 mm"', position))
         problem = problem_of(tmp_path, ENGINE, BLOCK, moved, RMS)
         low, high = (np.array([getattr(d, side) for d in problem.decisions]) for side in ("lower", "upper"))
-        assert 0.0 < transmitted_bound(problem) <= min(_designs(problem, low, high, 4))
+        assert 0.0 < transmitted_bound(problem) <= min(designs(problem, low, high, 4))
 
 
 def test_symbols_and_numbers_agree(tmp_path: Path) -> None:

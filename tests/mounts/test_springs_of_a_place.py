@@ -17,12 +17,11 @@ from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
-from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.spring_search import SpringBoxes
 from laufruhe.prove.subdivision import StiffnessBoxes
 from laufruhe.prove.transmitted_bound import transmitted_bound
 from laufruhe.solvers import solve
+from mounts.bounds_seen import bounds_over_designs, by_springs, designs
 from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN, changed, problem_of
 from mounts.powertrain import BLOCK as POWERTRAIN
 from mounts.powertrain import random_mounting, wrench
@@ -72,26 +71,10 @@ ASKED = {
 }
 
 
-def _by_springs(problem: Problem, low: np.ndarray, high: np.ndarray, least: float) -> float:
-    """Bound of a box by the forces of springs over the least design seen in it; a worse one is what is known."""
-    return SpringBoxes(problem, 1.2 * least, 1e-4, problem.start).relaxed(low, high)[0] / least
-
-
-def _designs(problem: Problem, low, high, seed: int) -> list[float]:
-    generator, given = np.random.default_rng(seed), evaluate(problem)
-    shares = generator.random((6, len(low)))
-    return [
-        objective_value(problem, remounted(given, problem.design((low + s * (high - low)).tolist()))) for s in shares
-    ]
-
-
 @pytest.mark.parametrize("name", ASKED)
 def test_bounds_know_damping_that_follows(name: str, tmp_path: Path) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, FOLLOWING, ASKED[name])
-    search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, evaluate(problem)))
-    low, high = boxes(problem, 12, 5)
-    bounds, _ = search.bounds(low, high)
-    ratios = [bound / min(_designs(problem, *ends, 1)) for *ends, bound in zip(low, high, bounds, strict=True)]
+    ratios = bounds_over_designs(problem)
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
 
@@ -99,11 +82,11 @@ def test_bounds_know_damping_that_follows(name: str, tmp_path: Path) -> None:
 def test_bounds_by_springs_know_damping_that_follows(tmp_path: Path) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, FOLLOWING, RMS)
     low, high = boxes(problem, 3, 7)
-    ratios = [_by_springs(problem, *ends, min(_designs(problem, *ends, 1))) for ends in zip(low, high, strict=True)]
+    ratios = [by_springs(problem, *ends, min(designs(problem, *ends, 1))) for ends in zip(low, high, strict=True)]
     model = StiffnessBoxes(problem, 1.0).model
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
-    assert transmitted_bound(problem) <= min(_designs(problem, model.lower, model.upper, 2))
+    assert transmitted_bound(problem) <= min(designs(problem, model.lower, model.upper, 2))
 
 
 def test_the_best_stiffness_with_its_damping_is_that_of_a_grid(tmp_path: Path) -> None:
@@ -204,12 +187,12 @@ def test_bounds_know_joined_springs(tmp_path: Path) -> None:
     low, high = boxes(problem, 8, 2)
     ratios = []
     for k, ends in enumerate(zip(low, high, strict=True)):
-        least = min(_designs(problem, *ends, 3))
+        least = min(designs(problem, *ends, 3))
         ratios.append(float(plain.bounds(ends[0][None], ends[1][None])[0][0]) / least)
-        ratios += [_by_springs(problem, *ends, least)] if k < 2 else []
+        ratios += [by_springs(problem, *ends, least)] if k < 2 else []
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
-    assert 0.0 < transmitted_bound(problem) <= min(_designs(problem, plain.model.lower, plain.model.upper, 2))
+    assert 0.0 < transmitted_bound(problem) <= min(designs(problem, plain.model.lower, plain.model.upper, 2))
 
 
 JOINED = '[[mounts.places]]\nname = "pad"\njoined_to = "front left"\nstiffness = ["1 N/mm", "1 N/mm", "1 N/mm"]\n'

@@ -1,0 +1,32 @@
+"""Bounds of boxes of stiffness over the least design that is seen in each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.spring_search import SpringBoxes
+from laufruhe.prove.subdivision import StiffnessBoxes
+from prove.test_subdivision import boxes
+
+
+def by_springs(problem: Problem, low: np.ndarray, high: np.ndarray, least: float) -> float:
+    """Bound of a box by the forces of springs over the least design seen in it; a worse one is what is known."""
+    return SpringBoxes(problem, 1.2 * least, 1e-4, problem.start).relaxed(low, high)[0] / least
+
+
+def designs(problem: Problem, low, high, seed: int) -> list[float]:
+    generator, given = np.random.default_rng(seed), evaluate(problem)
+    shares = generator.random((6, len(low)))
+    return [
+        objective_value(problem, remounted(given, problem.design((low + s * (high - low)).tolist()))) for s in shares
+    ]
+
+
+def bounds_over_designs(problem: Problem) -> list[float]:
+    """Of a dozen boxes at random the bound over the least of some designs in it."""
+    search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, evaluate(problem)))
+    low, high = boxes(problem, 12, 5)
+    bounds, _ = search.bounds(low, high)
+    return [bound / min(designs(problem, *ends, 1)) for *ends, bound in zip(low, high, bounds, strict=True)]
