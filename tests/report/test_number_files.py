@@ -93,6 +93,9 @@ def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) 
     assert {"modes", "transmissibility", "run-up", "forces"} <= set(found)
     assert any(head.startswith("travel at front left") for head in found["forces"].head)
     assert len(found["modes"].rows) == 6
+    criticals = found["mount-critical-speeds"]
+    # an order meets a frequency where it shakes as often
+    assert all(row[6] / 60.0 * row[5] == pytest.approx(row[3]) for row in criticals.rows)
 
 
 @pytest.mark.slow
@@ -100,6 +103,10 @@ def test_ranked_stars_are_a_sheet() -> None:
     found = sheets_of(solve(load(PROBLEMS / "inline-five-open.toml")))
     assert found["rankings"].rows[0][0] == 1
     assert found["rankings"].rows[0][3] is True
+    # an even five-cylinder star has no free force of any order shown
+    forces = [k for k, head in enumerate(found["rankings"].head) if head.startswith("free force of order")]
+    assert forces
+    assert all(abs(found["rankings"].rows[0][k]) < 1e-12 for k in forces)
 
 
 def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
@@ -187,3 +194,63 @@ def test_chambers_of_rotors_make_the_torque_of_the_gas() -> None:
     volumes = rows[:, 2].reshape(-1, steps)
     assert volumes.min(axis=1) == pytest.approx(0.0, abs=1e-12)
     assert np.ptp(volumes.max(axis=1)) < 1e-12
+
+
+@pytest.mark.slow
+def test_a_willans_line_is_a_file_with_its_readings() -> None:
+    """The line of the file is that of NumPy's least squares, and meets no fuel at the friction."""
+    result = state(load(PROBLEMS / "car-four-willans.toml"))
+    sheet, test = sheets_of(result)["willans"], result.problem.friction[0]
+    rows = [row for row in sheet.rows if row[0] == test.at]
+    measured_rows = np.array([row[2:] for row in rows if row[1] == "measured"], dtype=float)
+    assert len(measured_rows) == len(test.x)
+    x, y = measured_rows[:, 1 if test.is_motored else 0], measured_rows[:, 3 if test.is_motored else 2]
+    slope, intercept = np.polyfit(x, y, 1)
+    assert measured_rows[:, 4] == pytest.approx(intercept + slope * x, rel=1e-9)
+    told = next(row for row in rows if row[1] == "friction")
+    assert told[2] == pytest.approx(-intercept / slope, rel=1e-9)
+    assert told[7] == test.friction.deviation
+
+
+@pytest.mark.slow
+def test_wear_and_forces_on_the_crank_are_those_of_the_forces() -> None:
+    """Wear counted load by load, and lengths that no turn changes, against the forces of the other file."""
+    found = sheets_of(state(load(PROBLEMS / "tractor-four-bearings.toml")))
+    forces, crank, wear = found["forces"], found["bearings-on-crank"], found["wear"]
+    name = wear.head[3].removeprefix("wear of ").removesuffix(" [-]")
+    point = crank.rows[0][0]
+    lateral, vertical = (
+        np.array([row[forces.head.index(f"force on {name} {axis} [N]")] for row in forces.rows if row[0] == point])
+        for axis in "yz"
+    )
+    along, across = (
+        np.array(
+            [row[crank.head.index(f"force on {name} {way} the crank [N]")] for row in crank.rows if row[0] == point]
+        )
+        for way in ("along", "across")
+    )
+    step = len(along) // len(lateral)
+    assert np.hypot(along, across)[::step] == pytest.approx(np.hypot(lateral, vertical), rel=1e-6)
+    assert across[0] == pytest.approx(lateral[0], abs=1e-6 * np.hypot(lateral, vertical).max())
+    shares = {row[2]: row[3] for row in wear.rows if row[1] == point}
+    assert max(shares.values()) == 1.0
+    turned = np.arange(len(along)) * (720.0 / len(along))
+    place = np.degrees(np.arctan2(across, along)) + turned
+    sizes = np.hypot(along, across)
+    sums = {at: sizes[np.abs((place - at + 180.0) % 360.0 - 180.0) <= 60.0].sum() for at in shares}
+    most = max(sums.values())
+    assert {at: total / most for at, total in sums.items()} == pytest.approx(shares, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_what_turns_with_and_against_the_crank_adds_up_to_the_order() -> None:
+    """Largest and least length of an order's ellipse are the sum and the difference of its two circles."""
+    result = state(load(PROBLEMS / "twin-vee-offset-pins.toml"))
+    sheet = sheets_of(result)["turning-parts"]
+    loads = result.final.loads[0]
+    row = next(row for row in sheet.rows if row[1] == loads.point.name and row[2] == "force" and row[3] == 1)
+    angles = np.radians(np.arange(0.0, 360.0, 0.05))
+    lateral, vertical = ((coefficient * np.exp(1j * angles)).real for coefficient in loads.wrench.at(1)[1:3])
+    sizes = np.hypot(lateral, vertical)
+    assert sizes.max() == pytest.approx(row[4] + row[6], rel=1e-5)
+    assert sizes.min() == pytest.approx(abs(row[4] - row[6]), abs=1e-5 * sizes.max() + 1e-9)

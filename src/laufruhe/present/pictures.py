@@ -31,6 +31,7 @@ SHEETS = (
 """Curves and tables of a result as files: `report.tables` fills them in full precision."""
 CURVES = (
     "torque", "indicator", "chambers", "twist-response", "twist-modes", "critical-speeds", "uneven-firing", "shares",
+    "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
 )  # fmt: skip
 """Further ones, which `report.curves` fills."""
 PRINTED = ("weights", "assembly", "ranks", "robust", "torque", "torsion", "load_cases", "run_up")

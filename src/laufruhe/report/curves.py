@@ -19,6 +19,7 @@ from laufruhe.present.measures import has_loads, has_ranking, objective_unit, ra
 from laufruhe.present.torque import asks_torque
 from laufruhe.present.torsion import facts_of, is_twisted, speed_range, speeds_between, torque_over_speed
 from laufruhe.problem.curves import STEPS
+from laufruhe.report.part_curves import PART_CURVES
 from laufruhe.report.sheet import Sheet
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.robust_result import SHARES
@@ -176,5 +177,6 @@ CURVES: dict[str, Callable[[Result], Sheet | None]] = {
     "critical-speeds": _critical_speeds,
     "uneven-firing": _uneven_firing,
     "shares": _shares,
+    **PART_CURVES,
 }
 """By the name of the file."""

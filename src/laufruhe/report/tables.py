@@ -137,13 +137,17 @@ def _rankings(result: Result) -> Sheet | None:
         return None
     rows = [
         [rank, star.value, star.lower_bound, star.proven, _degrees(star.throws), ", ".join(star.shafts),
-         "-".join(map(str, order.order)), _degrees(order.intervals), order.neighbours, order.roll_content]
+         "-".join(map(str, order.order)), _degrees(order.intervals), order.neighbours, order.roll_content,
+         *(free for pair in zip(star.forces, star.couples, strict=True) for free in pair)]
         for rank, star in enumerate(ranking_of(result).ranking, 1)
         for order in star.firing_orders
     ]  # fmt: skip
     unit = result.objective.unit if result.objective else ""
     head = ["rank", f"objective [{unit or '-'}]", f"not under [{unit or '-'}]", "proven", "throws [deg]", "shafts",
             "firing order", "intervals [deg]", "neighbours", "roll content"]  # fmt: skip
+    for order in ranking_of(result).ranking[0].orders:
+        # in forces of one throw, and that times their spacing
+        head += [f"free force of order {order} [-]", f"free couple of order {order} [-]"]
     return Sheet(head, rows)
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import Array
+from laufruhe.physics.bearing_wear import wear_of
 from laufruhe.plots.style import ORANGE, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
 from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks, rows_of
 from laufruhe.present.measures import BEARINGS, has_loads, load_designs, places_of
@@ -22,8 +22,6 @@ from laufruhe.solvers.result import Result
 MOST_BEARINGS, MOST_COLUMNS, PANEL, STEPS = 6, 4, 1.95, 180
 # of a panel: where the ring of wear begins, how thick it is at most, and what the paths fill
 RING, THICK, FILLED = 0.86, 0.12, 0.80
-# a load wears its bearing this far to either side
-SIDES = math.radians(60.0)
 Plane = NDArray[np.complex128]
 
 
@@ -84,13 +82,6 @@ def _draw(axes: Axes, paths: Sequence[Plane], series: Sequence[Series], size: fl
         axes.plot(whole.imag, whole.real, color=one.colour, linewidth=1.5, solid_joinstyle="round")
         axes.plot(path[:1].imag, path[:1].real, "o", color=one.colour, markersize=4.0)
     _wear(axes, paths[-1], size)
-
-
-def wear_of(path: Plane, angles: Array) -> Array:
-    """Load of every direction over the cycle as a share of the most loaded, each load taken SIDES to both sides."""
-    apart = np.abs(np.angle(np.exp(1j * (np.angle(path)[:, None] - angles))))
-    total = (np.abs(path)[:, None] * (apart <= SIDES)).sum(axis=0)
-    return np.asarray(total / (total.max() or 1.0))
 
 
 def _wear(axes: Axes, path: Plane, size: float) -> None:

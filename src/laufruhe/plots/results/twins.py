@@ -4,34 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from laufruhe.machine import Engine
 from laufruhe.machine.crank_names import name_of_crank
-from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.wrench import turning_parts
 from laufruhe.plots.style import entry, headed, page, point_name, styled
 from laufruhe.plots.words import FAINT, INK, SMALL
-from laufruhe.present.measures import hardest_point, has_loads
+from laufruhe.present.measures import hardest_point
 from laufruhe.present.numbers import figure as told
+from laufruhe.present.twins import KINDS, ORDERS, Parts, is_twin, parts_of
 from laufruhe.solvers.result import Result
 
-ORDERS = {1: "primary", 2: "secondary"}
-KINDS = {"force": ((1, 2), "N"), "couple": ((4, 5), "N m")}
-"""Lateral and vertical columns of the wrench, and unit."""
-Parts: TypeAlias = dict[tuple[str, int], tuple[complex, complex]]
 FORWARD, BACKWARD = "#0072b2", "#d55e00"
 TURN = np.linspace(0.0, math.tau, 361)
 SIZE = 1.9
 
-
-def applies(result: Result) -> bool:
-    """Whether two cylinders fire, and the loads are known."""
-    return len(result.final.engine.cylinders) == 2 and has_loads(result)
+applies = is_twin
 
 
 @styled()
@@ -40,7 +31,7 @@ def figure(result: Result) -> Figure:
     engine, k = result.final.engine, hardest_point(result)
     drawn = page(2, 3, (SIZE, SIZE), gap=0.7, lead=0.3, across=0.72)
     _firings(drawn.panels[0], result)
-    parts, given = _parts(result, engine, k), _parts(result, result.initial.engine, k)
+    parts, given = parts_of(result, engine, k), parts_of(result, result.initial.engine, k)
     # what is a rounding of the design as given is nothing
     largest = {kind: max(_sizes(parts, kind) + _sizes(given, kind)) for kind in KINDS}
     _bars(drawn.panels[3], parts, largest)
@@ -57,16 +48,6 @@ def figure(result: Result) -> Figure:
     crank = name_of_crank([part.throw for part in engine.slider_cranks])
     lines = f"At {point_name(result, k)}, seen from the front{f'; crank {crank}' if crank else ''}."
     return headed(drawn, result, "Firings, and what turns forward and backward", lines, legend)
-
-
-def _parts(result: Result, engine: Engine, k: int) -> Parts:
-    """Forward and backward part of force and couple of every order."""
-    wrench = shaking_loads(engine, result.problem.points[k], result.problem.fidelity)
-    return {
-        (kind, order): turning_parts(*wrench.at(order)[list(columns)])
-        for kind, (columns, _) in KINDS.items()
-        for order in ORDERS
-    }
 
 
 def _sizes(parts: Parts, kind: str) -> list[float]:
