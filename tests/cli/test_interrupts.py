@@ -27,7 +27,8 @@ def started(folder: Path, code: str) -> subprocess.Popen[str]:
     words = [sys.executable, "-c", code + RUN, "solve", str(path), "--no-plots"]
     running = subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     until = time.monotonic() + 60.0
-    while not list(folder.glob("results/.unfinished-*/.laufruhe.json")) and time.monotonic() < until:
+    unfinished = "results/.unfinished-*/.laufruhe.json"
+    while not list(folder.glob(unfinished)) and running.poll() is None and time.monotonic() < until:
         time.sleep(0.02)
     time.sleep(0.5)
     return running
