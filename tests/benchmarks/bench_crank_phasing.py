@@ -34,11 +34,11 @@ from laufruhe.problem.problem import Problem
 from laufruhe.report.grid import Grid
 from laufruhe.report.sections import stars
 from laufruhe.solvers import solve
-from laufruhe.solvers.mixed_conic import solve_program
-from laufruhe.solvers.star_cuts import search_designs
-from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_program import owners_of, solve_design
-from laufruhe.solvers.star_search import enumerate_stars, search_stars
+from laufruhe.solvers.stars.cuts import search_designs
+from laufruhe.solvers.stars.families import families_of
+from laufruhe.solvers.stars.mixed_conic import solve_program
+from laufruhe.solvers.stars.program import owners_of, solve_design
+from laufruhe.solvers.stars.search import enumerate_stars, search_stars
 
 OUT = PAGES / "crank-phasing.md"
 RANKED = (

@@ -11,7 +11,7 @@ from pages import PAGES, publish
 from laufruhe.files.reader import load
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
-from laufruhe.solvers.mount_convex import is_convex
+from laufruhe.solvers.mounts.convex import is_convex
 from problem_files import ELASTIC
 
 SEEDS = range(10)

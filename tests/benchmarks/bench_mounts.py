@@ -20,11 +20,11 @@ from laufruhe.physics.speed_map import speed_map, split_loads
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.mount_nonlinear import solve_joint
-from laufruhe.solvers.mount_search import ITERATIONS
-from laufruhe.solvers.mount_starts import start_points
-from laufruhe.solvers.nonlinear import NonlinearProgram, solve_nonlinear
-from laufruhe.solvers.smooth_program import SmoothProgram
+from laufruhe.solvers.mounts.nonlinear import solve_joint
+from laufruhe.solvers.mounts.search import ITERATIONS
+from laufruhe.solvers.mounts.starts import start_points
+from laufruhe.solvers.smooth.nonlinear import NonlinearProgram, solve_nonlinear
+from laufruhe.solvers.smooth.program import SmoothProgram
 from mounts.test_moving_block import simulated_forces
 
 PROBLEM = ROOT / "problems" / "tractor-four-elastic.toml"

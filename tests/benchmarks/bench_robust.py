@@ -13,7 +13,7 @@ from laufruhe.load_models.built_engines import BuiltEngines, values_of
 from laufruhe.problem.tolerance import Law, Tolerances
 from laufruhe.report.grid import piped
 from laufruhe.solvers import solve
-from laufruhe.solvers.robust import decided_values
+from laufruhe.solvers.tolerances.robust import decided_values
 
 OUT = PAGES / "robust.md"
 ENGINES, PIECE = 1_000_000, 50_000

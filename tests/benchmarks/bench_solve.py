@@ -20,7 +20,7 @@ from pages import PAGES, ROOT, publish
 from laufruhe import load
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conic import solve_cones
+from laufruhe.solvers.cones.conic import solve_cones
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester.toml"
 OUT = PAGES / "solve.md"

@@ -25,7 +25,7 @@ from scipy.optimize import NonlinearConstraint, differential_evolution, minimize
 from laufruhe import load  # noqa: E402
 from laufruhe.load_models.affine import AffineModel, AffineProblem  # noqa: E402
 from laufruhe.solvers import solve  # noqa: E402
-from laufruhe.solvers.conic import solve_cones  # noqa: E402
+from laufruhe.solvers.cones.conic import solve_cones  # noqa: E402
 from laufruhe.studies import run  # noqa: E402
 from laufruhe.studies.reader import load_study  # noqa: E402
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.spring_search import SpringBoxes
-from laufruhe.prove.subdivision import StiffnessBoxes
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes
+from laufruhe.prove.springs.search import SpringBoxes
 from prove.test_subdivision import boxes
 
 

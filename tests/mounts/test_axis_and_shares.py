@@ -16,9 +16,9 @@ from laufruhe.physics.mount_numbers import decoupling_shortfall, raw_residual, r
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_resonance import evaluate_start
-from laufruhe.prove.box_numbers import RANGES
-from laufruhe.prove.box_response import BoxModel
 from laufruhe.prove.certificate import Proof
+from laufruhe.prove.mounts.box_numbers import RANGES
+from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 from mounts.powertrain import powertrain, random_mounting

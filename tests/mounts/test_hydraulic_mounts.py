@@ -22,7 +22,7 @@ from laufruhe.physics.time_model import frequencies_with_fluid, time_model
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.transmitted_bound import transmitted_bound
+from laufruhe.prove.mounts.transmitted import transmitted_bound
 from laufruhe.solvers import solve
 from mounts.bounds_seen import bounds_over_designs, by_springs, designs
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of

@@ -16,9 +16,9 @@ from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.static_cases import case_wrench, settled
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
-from laufruhe.prove.box_numbers import RANGES
-from laufruhe.prove.box_response import BoxModel
 from laufruhe.prove.certificate import Proof
+from laufruhe.prove.mounts.box_numbers import RANGES
+from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of

@@ -16,8 +16,8 @@ from laufruhe.physics.mount_numbers import total_stiffness
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.mount_convex import ConvexDuals, convex_program, dual_bound, is_convex, solve_convex_mounts
-from laufruhe.solvers.mount_nonlinear import solve_mounts
+from laufruhe.solvers.mounts.convex import ConvexDuals, convex_program, dual_bound, is_convex, solve_convex_mounts
+from laufruhe.solvers.mounts.nonlinear import solve_mounts
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
 
@@ -145,7 +145,7 @@ def test_what_is_not_convex_is_not_called_so(tmp_path):
 
 def test_a_solver_that_lies_is_found_out(tmp_path, monkeypatch):
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
-    from laufruhe.solvers import mount_cones
+    from laufruhe.solvers.mounts import cones as mount_cones
 
     honest = mount_cones.solve_cones
     monkeypatch.setattr(mount_cones, "solve_cones", lambda program: (0.9 * honest(program)[0], honest(program)[1]))

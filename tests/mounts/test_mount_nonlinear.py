@@ -18,10 +18,10 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.mount_nonlinear import solve_joint, solve_mounts
+from laufruhe.solvers.cones.unbalances import solve_unbalances
+from laufruhe.solvers.mounts.nonlinear import solve_joint, solve_mounts
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.smooth_program import SmoothProgram
-from laufruhe.solvers.unbalances import solve_unbalances
+from laufruhe.solvers.smooth.program import SmoothProgram
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, problem_of
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

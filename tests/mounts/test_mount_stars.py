@@ -15,7 +15,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.smooth_program import SmoothProgram
+from laufruhe.solvers.smooth.program import SmoothProgram
 from mounts.files import BLOCK, MOUNTS, SAG, changed, problem_of
 
 ENGINE = """

@@ -18,8 +18,8 @@ from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.subdivision import StiffnessBoxes
-from laufruhe.prove.transmitted_bound import transmitted_bound
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes
+from laufruhe.prove.mounts.transmitted import transmitted_bound
 from laufruhe.solvers import solve
 from mounts.bounds_seen import bounds_over_designs, by_springs, designs
 from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN, changed, problem_of

@@ -11,13 +11,13 @@ from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.prove.certificate import Multipliers, Proof, gap_of, lower_bound
-from laufruhe.prove.star_cut import cut_of
+from laufruhe.prove.throws.star_cut import cut_of
 from laufruhe.solvers import solve
-from laufruhe.solvers.mixed_conic import solve_program
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.star_cuts import search_designs
-from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_program import owners_of, solve_design
+from laufruhe.solvers.stars.cuts import search_designs
+from laufruhe.solvers.stars.families import families_of
+from laufruhe.solvers.stars.mixed_conic import solve_program
+from laufruhe.solvers.stars.program import owners_of, solve_design
 from phasing import engines
 
 TWO_SHAFTS = engines.shaft("against", -1) + engines.shaft("second", 2)

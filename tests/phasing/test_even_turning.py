@@ -16,7 +16,7 @@ from laufruhe.physics.irregularity import irregularity
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.swing_bound import SwingBound
+from laufruhe.prove.throws.swing import SwingBound
 from laufruhe.solvers import Result, Status
 
 THROWS = [0, 50, 130, 180, 265]

@@ -18,9 +18,9 @@ from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.firing_search import enumerate_orders
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.star_families import families_of
+from laufruhe.solvers.stars.families import families_of
+from laufruhe.solvers.stars.firing_search import enumerate_orders
 from problem_files import PROBLEMS
 
 READY = PROBLEMS / "inline-five-torsion.toml"

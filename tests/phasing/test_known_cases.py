@@ -19,7 +19,7 @@ from laufruhe.report.json_result import as_dict
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.star_search import search_stars
+from laufruhe.solvers.stars.search import search_stars
 from phasing import engines
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

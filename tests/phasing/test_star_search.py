@@ -12,8 +12,8 @@ from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
 from laufruhe.machine.layouts import inline
 from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.physics.star_space import Partial, StarSpace, outside_in
-from laufruhe.solvers import star_search
-from laufruhe.solvers.star_search import enumerate_stars, search_stars
+from laufruhe.solvers.stars import search as star_search
+from laufruhe.solvers.stars.search import enumerate_stars, search_stars
 
 NONE = (0.0,) * 4
 ORDERS = (1, 2, 3, 4)

@@ -15,12 +15,12 @@ from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.throw_arcs import ArcBox
+from laufruhe.prove.throws.arcs import ArcBox
 from laufruhe.solvers import Status, solve
-from laufruhe.solvers.star_design import StarDesign, solve_fixed
-from laufruhe.solvers.throw_boxes import ThrowPrograms
-from laufruhe.solvers.throw_riders import Riders
-from laufruhe.solvers.throw_windows import firing_of, nearest, windows_of
+from laufruhe.solvers.stars.design import StarDesign, solve_fixed
+from laufruhe.solvers.throws.boxes import ThrowPrograms
+from laufruhe.solvers.throws.riders import Riders
+from laufruhe.solvers.throws.windows import firing_of, nearest, windows_of
 from phasing import engines
 
 GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "8 bar"\n'

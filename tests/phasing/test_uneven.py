@@ -14,11 +14,11 @@ from laufruhe.load_models.uneven_model import Symbols, UnevenModel, rides_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.uneven_bound import star_bounds, throw_costs, uneven_bound
+from laufruhe.prove.throws.uneven import star_bounds, throw_costs, uneven_bound
 from laufruhe.solvers import solve
-from laufruhe.solvers.star_families import families_of
-from laufruhe.solvers.star_search import search_stars
-from laufruhe.solvers.uneven import local_optimum
+from laufruhe.solvers.stars.families import families_of
+from laufruhe.solvers.stars.search import search_stars
+from laufruhe.solvers.throws.uneven import local_optimum
 from phasing import engines
 from problem_files import loaded
 from smooth import AtItsValues, smooth_value

@@ -15,15 +15,15 @@ from laufruhe.files.reader import load
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
-from laufruhe.prove import spring_search as search
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.open_mounts import OpenMounts, open_mounts
-from laufruhe.prove.spring_bound import Multipliers, Program, Proposed
-from laufruhe.prove.spring_conditions import conditions
-from laufruhe.prove.spring_lines import Felt
-from laufruhe.prove.spring_program import proposed
-from laufruhe.prove.spring_search import SpringBoxes, spring_bound
-from laufruhe.prove.subdivision import StiffnessBoxes, divided_bound
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound
+from laufruhe.prove.springs import search
+from laufruhe.prove.springs.bound import Multipliers, Program, Proposed
+from laufruhe.prove.springs.conditions import conditions
+from laufruhe.prove.springs.lines import Felt
+from laufruhe.prove.springs.open_mounts import OpenMounts, open_mounts
+from laufruhe.prove.springs.program import proposed
+from laufruhe.prove.springs.search import SpringBoxes, spring_bound
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from prove.test_subdivision import DAMPED, asked_for

@@ -14,12 +14,12 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.box_norms import under
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.subdivision import StiffnessBoxes, divided_bound, divides
+from laufruhe.prove.mounts.box_norms import under
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound, divides
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
-from laufruhe.solvers.mount_search import judged_at
+from laufruhe.solvers.mounts.search import judged_at
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

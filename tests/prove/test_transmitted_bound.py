@@ -16,8 +16,8 @@ from laufruhe.physics.mounting import mounting_of
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.measure import Measure, Term
+from laufruhe.prove.mounts.transmitted import least_transmitted, softest_of, transmitted_bound
 from laufruhe.prove.quadratics import Quadratic, best_prices, covering
-from laufruhe.prove.transmitted_bound import least_transmitted, softest_of, transmitted_bound
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 
 PROBLEMS = Path(__file__).parents[2] / "problems"

@@ -20,8 +20,9 @@ from laufruhe.problem import channels
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, lower_bound
-from laufruhe.solvers import Status, conic, solve
-from laufruhe.solvers.conic import TIGHT, solve_cones
+from laufruhe.solvers import Status, solve
+from laufruhe.solvers.cones import conic
+from laufruhe.solvers.cones.conic import TIGHT, solve_cones
 from problem_files import loaded
 
 PROBLEMS = Path(__file__).resolve().parents[2] / "problems"

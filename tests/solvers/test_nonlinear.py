@@ -11,9 +11,9 @@ from scipy.optimize import minimize
 
 from laufruhe.numerics.budget import limited
 from laufruhe.numerics.norms import softened_lengths
-from laufruhe.solvers.local_optimum import Ending, distinct, is_explored
-from laufruhe.solvers.mount_starts import spread_starts
-from laufruhe.solvers.nonlinear import NonlinearProgram, solve_nonlinear
+from laufruhe.solvers.mounts.starts import spread_starts
+from laufruhe.solvers.smooth.local_optimum import Ending, distinct, is_explored
+from laufruhe.solvers.smooth.nonlinear import NonlinearProgram, solve_nonlinear
 
 
 def rosenbrock(radius: float = 1.0) -> NonlinearProgram:

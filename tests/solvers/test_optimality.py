@@ -21,7 +21,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Sector
 from laufruhe.prove.certificate import Proof, best_bound, kkt_residual
 from laufruhe.solvers import Status, solve
-from laufruhe.solvers.conic import solve_cones
+from laufruhe.solvers.cones.conic import solve_cones
 from tractor import GAS, engine, free_unbalance, problem, shaft_rotor, web
 
 EXACT = Fidelity("exact", 720)

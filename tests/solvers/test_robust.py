@@ -20,7 +20,7 @@ from laufruhe.problem.tolerance import Over, Tolerances
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.robust import decided_values
+from laufruhe.solvers.tolerances.robust import decided_values
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft
 
 ENGINE = (

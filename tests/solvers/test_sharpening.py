@@ -12,7 +12,7 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.sharpening import SHARP, _derivatives
+from laufruhe.solvers.cones.sharpening import SHARP, _derivatives
 from problem_files import PROBLEMS
 
 NAMES = ["tractor-four-lanchester", "tractor-single", "tractor-six", "vee-six-60"]

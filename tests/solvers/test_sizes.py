@@ -16,8 +16,8 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.load_models.sized_model import SizeModel
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.evaluation import evaluate
+from laufruhe.prove.boxes.sizes import SizeBoxes
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.size_boxes import SizeBoxes
 from laufruhe.solvers import Status
 from laufruhe.solvers.result import Result
 from problem_files import PROBLEMS, changed, loaded

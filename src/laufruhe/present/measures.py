@@ -17,8 +17,8 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import limit_values
-from laufruhe.solvers.ranking import PhasingResult
 from laufruhe.solvers.result import LimitValue, Result
+from laufruhe.solvers.stars.ranking import PhasingResult
 
 
 @dataclass(frozen=True)

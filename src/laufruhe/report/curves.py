@@ -22,7 +22,7 @@ from laufruhe.problem.curves import STEPS
 from laufruhe.report.part_curves import PART_CURVES
 from laufruhe.report.sheet import Sheet
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.robust_result import SHARES
+from laufruhe.solvers.tolerances.result import SHARES
 from laufruhe.units import readable
 
 RPM = readable("rad/s")[1]

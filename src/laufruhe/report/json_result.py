@@ -27,8 +27,8 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
 from laufruhe.report.wording import why_star
-from laufruhe.solvers.ranking import RankedStar
 from laufruhe.solvers.result import Result, objective_of
+from laufruhe.solvers.stars.ranking import RankedStar
 
 Record = dict[str, Any]
 

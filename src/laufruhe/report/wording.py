@@ -9,8 +9,8 @@ from laufruhe.present.measures import breaks_a_limit, changed
 from laufruhe.present.numbers import figure, number, percent, trimmed
 from laufruhe.problem.plausibility import together
 from laufruhe.prove.certificate import Certificate, Proof
-from laufruhe.solvers.ranking import RankedStar
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.ranking import RankedStar
 
 # A change that would be printed as 0.0 %.
 UNFELT = 5e-4

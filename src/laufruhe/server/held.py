@@ -11,8 +11,8 @@ from laufruhe.files.complaints import Refused
 from laufruhe.present.numbers import figure
 from laufruhe.server.asked import STAR, Edit
 from laufruhe.server.controls import typed
-from laufruhe.solvers.ranking import RankedOrder, RankedStar
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.stars.ranking import RankedOrder, RankedStar
 
 _DIGITS = 9
 """Of an angle in degrees: steps of a turn are found again from them."""

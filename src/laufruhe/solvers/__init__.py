@@ -18,16 +18,16 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.apart import is_apart, solve_apart
-from laufruhe.solvers.assembly import solve_assembly
+from laufruhe.solvers.boxes.leads import solve_leads
+from laufruhe.solvers.boxes.places import solve_places
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
+from laufruhe.solvers.cones.run_limits import solve_runs
+from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_sharply
 from laufruhe.solvers.in_order import solve_in_order
-from laufruhe.solvers.leads import solve_leads
-from laufruhe.solvers.mount_convex import is_convex, solve_convex_mounts
-from laufruhe.solvers.places import solve_places
+from laufruhe.solvers.mounts.convex import is_convex, solve_convex_mounts
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.robust import solve_robust
-from laufruhe.solvers.run_limits import solve_runs
-from laufruhe.solvers.unbalances import beyond_mounts, solve_sharply
+from laufruhe.solvers.tolerances.assembly import solve_assembly
+from laufruhe.solvers.tolerances.robust import solve_robust
 
 __all__ = ["METHODS", "Result", "Status", "solve", "state"]
 
@@ -73,19 +73,19 @@ def _named(kinds: frozenset[Kind]) -> str:
 
 
 def _smooth(problem: Problem) -> Result:
-    from laufruhe.solvers.mount_nonlinear import solve_joint
+    from laufruhe.solvers.mounts.nonlinear import solve_joint
 
     return solve_joint(problem)
 
 
 def _stars(problem: Problem) -> Result:
-    from laufruhe.solvers.phasing import solve_phasing
+    from laufruhe.solvers.stars.phasing import solve_phasing
 
     return solve_within(problem, solve_phasing)
 
 
 def _stars_on_mounts(problem: Problem) -> Result:
-    from laufruhe.solvers.mount_stars import solve_star_mounts
+    from laufruhe.solvers.mounts.stars import solve_star_mounts
 
     return solve_star_mounts(problem)
 
@@ -95,19 +95,19 @@ def _places(problem: Problem) -> Result:
 
 
 def _flywheel(problem: Problem) -> Result:
-    from laufruhe.solvers.flywheel import solve_flywheel
+    from laufruhe.solvers.boxes.flywheel import solve_flywheel
 
     return solve_flywheel(problem)
 
 
 def _torsion(problem: Problem) -> Result:
-    from laufruhe.solvers.torsion import solve_torsion
+    from laufruhe.solvers.boxes.torsion import solve_torsion
 
     return solve_within(problem, solve_torsion)
 
 
 def _sizes(problem: Problem) -> Result:
-    from laufruhe.solvers.sizes import solve_sizes
+    from laufruhe.solvers.boxes.sizes import solve_sizes
 
     return solve_within(problem, solve_sizes)
 

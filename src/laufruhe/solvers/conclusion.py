@@ -21,8 +21,8 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.ranking import PhasingResult, none_of_given
 from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible, objective_of
+from laufruhe.solvers.stars.ranking import PhasingResult, none_of_given
 
 FEASIBLE = 1e-6
 """Relative excess over a limit that counts as none."""

@@ -19,9 +19,9 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import best_bound, gap_of
 from laufruhe.solvers.conclusion import KEPT
-from laufruhe.solvers.conic import solve_cones
-from laufruhe.solvers.equations import on_grid
-from laufruhe.solvers.unbalances import conflict_of, settled
+from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.cones.equations import on_grid
+from laufruhe.solvers.cones.unbalances import conflict_of, settled
 
 FEW_ANGLES = 48
 """Over the period of the loads, where the problem itself takes more."""

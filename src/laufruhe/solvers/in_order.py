@@ -20,7 +20,7 @@ from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, Reach, certified
-from laufruhe.solvers.equal_designs import equal_designs
+from laufruhe.solvers.cones.equal_designs import equal_designs
 from laufruhe.solvers.result import DecisionRange, ObjectiveValue, RankValue, Result, Status
 
 Solve = Callable[[Problem], Result]

@@ -14,9 +14,9 @@ from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate, Proof
-from laufruhe.solvers.assembly_result import AssemblyResult
-from laufruhe.solvers.ranking import PhasingResult
-from laufruhe.solvers.robust_result import RobustResult
+from laufruhe.solvers.stars.ranking import PhasingResult
+from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
+from laufruhe.solvers.tolerances.result import RobustResult
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -28,7 +28,7 @@ from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
-from laufruhe.solvers.conic import solve_cones
+from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.result import Status
 from laufruhe.studies.rigid_digits import RigidPart, rigid_part
 

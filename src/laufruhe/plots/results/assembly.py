@@ -8,7 +8,7 @@ from laufruhe.plots.style import AFTER, BEFORE, SKY, entry, headed, page, styled
 from laufruhe.plots.words import INK
 from laufruhe.present.measures import objective_unit
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.robust_result import SHARES
+from laufruhe.solvers.tolerances.result import SHARES
 
 MEAN = (0, (1, 2))
 

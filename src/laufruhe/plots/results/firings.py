@@ -13,8 +13,8 @@ from matplotlib.patches import Patch
 from laufruhe.plots.style import AFTER, BEFORE, PALE, WIDEST, headed, page, styled
 from laufruhe.plots.words import SMALL, ink_on, width_of
 from laufruhe.present.measures import has_ranking, ranking_of
-from laufruhe.solvers.ranking import PhasingResult, RankedOrder
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.stars.ranking import PhasingResult, RankedOrder
 
 SHOWN = 6
 # two shades tell a firing from the next

@@ -10,7 +10,7 @@ from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.robust_result import SHARES, BuiltDesign, RobustResult
+from laufruhe.solvers.tolerances.result import SHARES, BuiltDesign, RobustResult
 
 WORST, DRAWN = (0, (4, 2)), (0, (1, 2))
 MOST_TOLERANCES = 8

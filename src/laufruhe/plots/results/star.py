@@ -14,8 +14,8 @@ from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import number
-from laufruhe.solvers.ranking import RankedStar
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.stars.ranking import RankedStar
 
 SHOWN = 3
 SAME = math.radians(1.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import figure
 from laufruhe.report.grid import Grid
-from laufruhe.solvers.assembly_result import AssemblyResult, Place
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.tolerances.assembly_result import AssemblyResult, Place
 
 
 def tables(result: Result) -> list[Grid]:

@@ -6,7 +6,7 @@ from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import figure, number, percent, price_of, with_unit
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.robust_result import CONFIDENCE, BuiltDesign, PricedTolerance, RobustResult
+from laufruhe.solvers.tolerances.result import CONFIDENCE, BuiltDesign, PricedTolerance, RobustResult
 
 
 def tables(result: Result) -> list[Grid]:

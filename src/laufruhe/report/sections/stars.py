@@ -8,8 +8,8 @@ from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.present.measures import objective_unit, ranking_of
 from laufruhe.present.numbers import DASH, number, percent, trimmed
 from laufruhe.report.grid import Grid
-from laufruhe.solvers.ranking import PhasingResult, RankedStar
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.stars.ranking import PhasingResult, RankedStar
 from laufruhe.units import readable
 
 ORDERS_SHOWN = 6

@@ -30,7 +30,7 @@ from laufruhe.problem.measure import MEAN_MOUNT_FORCE
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import AddedDrive, Drawing, Error, PistonDrive, Tolerances
 from laufruhe.problem.tolerance import Tolerance as Cause
-from laufruhe.prove.worst_case import worst_case
+from laufruhe.prove.tolerances.worst_case import worst_case
 from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes

@@ -1,0 +1,1 @@
+"""What no leads, sizes, flywheels and crankshafts in a box do better than."""

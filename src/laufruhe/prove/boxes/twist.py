@@ -1,0 +1,318 @@
+"""A lower bound of root mean squares of the crankshaft's twist over boxes of its discs, shafts and absorbers (V13).
+
+The inertia of all that turns, and how evenly it does, go one way with every disc (V14): a corner bounds them.
+
+The dynamic stiffness of an order is affine in inertia, stiffness and damping; of a diameter its stiffness is the
+coordinate. About the centre of a box, with A_i what half its side i changes,
+
+    q = q0 - Q q0 + (1 + Q)^-1 Q^2 q0,    Q = sum_i s_i D^-1 A_i,    q0 = D^-1 T,    -1 <= s_i <= 1,
+
+so that the twist is known to the first order, and the rest is no larger than
+sum_ij |D^-1 A_i D^-1 A_j q0| / (1 - rho), rho = sum_i |D^-1 A_i| < 1. Orders where it is not count as nothing: a
+root of squares is no larger without them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import Flywheel, Torsion
+from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.physics.reduced_inertia import turning_inertia
+from laufruhe.physics.torsion import dynamic_stiffness, inertias, natural_modes, receptances, throw_torques
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.boxes.twist_coordinates import TwistCoordinates
+from laufruhe.prove.mounts.box_numbers import SLACK
+
+# orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
+LEAST_SHARE = 1e-10
+MOST_CORNERS = 16
+_SAME = 1e-9
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """Orders of one operating point, and what excites the discs in them.
+
+    Attributes
+    ----------
+    highest
+        Multiple of the lowest order that excites them, left out or not.
+    torques
+        Shape (orders, discs and rings).
+    mean
+        Of order zero, shape (discs,).
+    middle, sides
+        Dynamic stiffness in the middle of the bounds, and what one of each coordinate adds, shapes (orders, n, n) and
+        (coordinates, orders, n, n).
+    """
+
+    loads: PointLoads
+    highest: int
+    orders: Array
+    torques: ComplexArray
+    mean: Array
+    middle: ComplexArray
+    sides: ComplexArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Twist:
+    """Twist of the sections on a box: in its centre, by its sides, and what that leaves out.
+
+    Attributes
+    ----------
+    value, slopes, rest
+        Shapes (orders, sections), (coordinates, orders, sections) and (orders, sections).
+    pull
+        How much of the twist each side changes at most, shape (coordinates,).
+    """
+
+    value: ComplexArray
+    slopes: ComplexArray
+    rest: Array
+    pull: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Under:
+    """value + slopes . s - rest is nowhere above a root mean square (E38)."""
+
+    value: float
+    slopes: Array
+    rest: float
+
+    @property
+    def least(self) -> float:
+        """On the box; nothing where the rest is not known."""
+        found = self.value - self.rest - float(np.abs(self.slopes).sum())
+        return max(found, 0.0) if math.isfinite(found) else 0.0
+
+
+class _OfInertia:
+    """The inertia of all that turns, or a degree of irregularity that falls with it (T9, V14)."""
+
+    def __init__(self, measure: Measure, evaluation: Evaluation) -> None:
+        if measure.channel.of_wheel is None:
+            raise TypeError(f"{measure.name} is not of the flywheel")
+        self._number, self._rises = measure.channel.of_wheel(measure, evaluation), measure.channel.rises
+        self._engine, self._fidelity = evaluation.engine, evaluation.fidelity
+
+    def least(self, chains: Sequence[Torsion]) -> float:
+        """On a box, of the chains of its lower corner, centre and upper corner."""
+        inertia = turning_inertia(replace(self._engine, torsion=chains[0 if self._rises else -1]), self._fidelity)
+        return 0.0 if inertia is None else self._number(Flywheel(inertia))
+
+
+class TwistBoxes:
+    """Bounds of boxes of what is open of the crankshaft.
+
+    Parameters
+    ----------
+    problem
+        With nothing but numbers of the crankshaft open.
+    evaluation
+        Of the design as given.
+    """
+
+    what = "boxes of discs and shafts"
+    at_once = 1
+
+    def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
+        self.problem, self.coordinates = problem, TwistCoordinates(problem)
+        rest = [t for t in problem.objective if not (t.measure.is_twist or _turns(t.measure))]
+        self._constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
+        self._terms = [(t.weight, t.measure) for t in problem.objective if _is_square(t.measure)]
+        self._limits = [(limit.maximum, limit.measure) for limit in problem.limits if _is_square(limit.measure)]
+        self._numbers = [limit for limit in problem.limits if limit.measure.channel.of_modes]
+        self._turning = [(t.weight, _OfInertia(t.measure, evaluation)) for t in problem.objective if _turns(t.measure)]
+        self._uneven = [(x.maximum, _OfInertia(x.measure, evaluation)) for x in problem.limits if _turns(x.measure)]
+        self._samples = evaluation.samples
+        self._lines = [self._lines_at(loads) for loads in evaluation.loads]
+
+    @property
+    def is_sampled_fully(self) -> bool:
+        """Whether sums of squares over orders are those over samples, as what is bounded supposes."""
+        highest = max((lines.highest for lines in self._lines), default=0)
+        return highest <= self._samples // 2
+
+    @property
+    def has_terms(self) -> bool:
+        """Whether anything minimised is bounded."""
+        return bool(self._terms or self._turning)
+
+    @property
+    def knows_all(self) -> bool:
+        """Whether all that is minimised is bounded from near by."""
+        return all(_is_square(term.measure) or _turns(term.measure) for term in self.problem.objective)
+
+    def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            found = [self._bound(low, high) for low, high in zip(lower, upper, strict=True)]
+        return np.array([value for value, _ in found]), np.array([side for _, side in found], dtype=np.intp)
+
+    def _bound(self, lower: Array, upper: Array) -> tuple[float, int]:
+        all_of = np.maximum(self.coordinates.upper - self.coordinates.lower, 1e-300)
+        wide = (upper - lower) / all_of
+        if any(self._breaks(limit, lower, upper) for limit in self._numbers):
+            return math.inf, int(np.argmax(wide))
+        centre, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+        chains = [self.coordinates.chain(x) for x in (lower, centre, upper)]
+        if any(of.least(chains) > most * (1.0 + SLACK) for most, of in self._uneven):
+            return math.inf, int(np.argmax(wide))
+        twists = [self._twist(lines, chains[1], centre, half) for lines in self._lines]
+        if any(self._under(q, chains, twists).least > most * (1.0 + SLACK) for most, q in self._limits):
+            return math.inf, int(np.argmax(wide))
+        found = [(weight, self._under(measure, chains, twists)) for weight, measure in self._terms]
+        slopes = sum((weight * under.slopes for weight, under in found), np.zeros(len(lower)))
+        whole = sum(weight * (under.value - under.rest) for weight, under in found)
+        least = whole - float(np.abs(slopes).sum())
+        least = max(least, 0.0) if math.isfinite(least) else 0.0
+        pull = np.max([np.nan_to_num(twist.pull, nan=1.0, posinf=1.0) for twist in twists], axis=0)
+        turning = sum(weight * of.least(chains) for weight, of in self._turning)
+        if not self._terms:
+            # each goes one way with every inertia, and nothing else moves it
+            pull = wide
+        return self._constant + turning + least, int(np.argmax(pull + _SAME * wide))
+
+    def _lines_at(self, loads: PointLoads) -> _Lines:
+        """Orders that count anywhere in the bounds, by a look at their middle and corners."""
+        own, speed = self.coordinates, loads.point.speed
+        torques = throw_torques(self.problem.engine, loads.point, loads.fidelity)
+        middle = 0.5 * (own.lower + own.upper)
+        corners = itertools.islice(itertools.product(*zip(own.lower, own.upper, strict=True)), MOST_CORNERS)
+        kept = np.zeros(len(torques.orders), dtype=bool)
+        for x in (middle, *map(np.array, corners)):
+            try:
+                flexible = receptances(own.chain(x), torques.orders, speed)
+            except ModelError:
+                # on a resonance all orders count
+                kept[:] = True
+                continue
+            size = (np.abs(np.einsum("hsd,hd->hs", flexible, torques.coefficients)) ** 2).sum(axis=1)
+            kept |= size > LEAST_SHARE * size.sum()
+        kept[0] = False
+        orders = torques.orders[kept]
+        chain = own.chain(middle)
+        drives = np.zeros((len(orders), len(chain.discs) + len(chain.absorbers)), dtype=complex)
+        drives[:, : len(chain.discs)] = torques.coefficients[kept]
+        at = dynamic_stiffness(chain, orders, speed)
+        sides = []
+        for k in range(len(middle)):
+            # affine, so that the whole width tells the slope without a rounding
+            ends = [np.where(np.arange(len(middle)) == k, end, middle) for end in (own.lower, own.upper)]
+            low, high = (dynamic_stiffness(own.chain(x), orders, speed) for x in ends)
+            sides.append((high - low) / (own.upper[k] - own.lower[k]))
+        highest = len(torques.coefficients) - 1
+        return _Lines(loads, highest, orders, drives, torques.coefficients[0].real, at, np.array(sides))
+
+    def _twist(self, lines: _Lines, chain: Torsion, centre: Array, half: Array) -> _Twist:
+        """By the series above, in coordinates in which the inertia of the centre is one."""
+        root, count = np.sqrt(inertias(chain)), len(chain.sections)
+        scale = np.outer(root, root)
+        middle = 0.5 * (self.coordinates.lower + self.coordinates.upper)
+        dynamic = lines.middle + np.tensordot(centre - middle, lines.sides, axes=(0, 0))
+        try:
+            inverse = np.linalg.inv(dynamic / scale)
+        except np.linalg.LinAlgError:
+            inverse = np.full_like(dynamic, np.inf)
+        moved = inverse @ (half[:, None, None, None] * lines.sides / scale)
+        still = np.einsum("lab,lb->la", inverse, lines.torques / root)
+        first = -np.einsum("ilab,lb->ila", moved, still)
+        second = np.linalg.norm(np.einsum("ilab,jlb->ijla", moved, first), axis=-1).sum(axis=(0, 1))
+        sizes = np.linalg.norm(moved, axis=(2, 3))
+        rho = sizes.sum(axis=0)
+        rest = np.where(rho < 1.0, second / (1.0 - np.where(rho < 1.0, rho, 0.0)), np.inf)
+        angles, slopes = still / root, first / root
+        apart = np.sqrt(1.0 / root[:count] ** 2 + 1.0 / root[1 : count + 1] ** 2)
+        return _Twist(
+            angles[:, :count] - angles[:, 1 : count + 1],
+            slopes[:, :, :count] - slopes[:, :, 1 : count + 1],
+            np.where(np.isfinite(rest), rest, np.inf)[:, None] * apart,
+            sizes.max(axis=1, initial=0.0),
+        )
+
+    def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[_Twist]) -> _Under:
+        """A linear function under a root mean square over orders, sections and operating points."""
+        names = [section.name for section in chains[1].sections]
+        places = measure.load.places(self.problem.engine)
+        chosen = [names.index(places[k]) for k in measure.places(places)]
+        square, slopes, rest = 0.0, np.zeros(len(self.coordinates.lower)), 0.0
+        shares = measure.shares([lines.loads.point for lines in self._lines])
+        for share, lines, twist in zip(shares, self._lines, twists, strict=True):
+            if share == 0.0:
+                continue
+            rows = [self._alternating(measure, chains, lines, twist)]
+            if bool(measure.counted(np.zeros(1))[0]):
+                rows.append(self._mean(measure, chains, lines))
+            for weight, (value, by_side, left) in zip((0.5, 1.0), rows, strict=False):
+                weight *= share / len(chosen)
+                value, by_side, left = value[..., chosen], by_side[..., chosen], left[..., chosen]
+                known = np.isfinite(left)
+                value, left = np.where(known, value, 0.0), np.where(known, left, 0.0)
+                by_side = np.where(known, by_side, 0.0)
+                square += weight * float(np.sum(np.abs(value) ** 2))
+                slopes += weight * np.sum((value.conj() * by_side).real.reshape(len(slopes), -1), axis=1)
+                rest += weight * float(np.sum(left**2))
+        size = math.sqrt(square)
+        return _Under(size, slopes / (size or 1.0), math.sqrt(rest) + _ROUNDING * size)
+
+    def _alternating(
+        self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, twist: _Twist
+    ) -> tuple[ComplexArray, ComplexArray, Array]:
+        """Value, slopes and rest of what a measure makes of the twist, in every order that counts."""
+        speed, counted = lines.loads.point.speed, measure.counted(lines.orders)
+        low, here, high = (measure.load.factors(chain, lines.orders[counted], speed) for chain in chains)
+        # each factor is of its own stiffness, and bends one way: so much the secant may be off
+        turn, bend = 0.5 * (high - low), np.abs(here - 0.5 * (high + low))
+        value, by_side, left = twist.value[counted], twist.slopes[:, counted], twist.rest[counted]
+        moved = np.abs(by_side).sum(axis=0) + left
+        slopes = here * by_side + self.coordinates.owners[:, None, :] * (turn * value)
+        rest = np.abs(turn) * moved + bend * (np.abs(value) + moved) + np.abs(here) * left
+        return here * value, slopes, np.where(np.isnan(rest), np.inf, rest)
+
+    def _mean(
+        self, measure: Measure, chains: Sequence[Torsion], lines: _Lines
+    ) -> tuple[ComplexArray, ComplexArray, Array]:
+        """The same of order zero, each section of its own stiffness alone."""
+        zero, speed = np.zeros(1), lines.loads.point.speed
+        low, here, high = (
+            (receptances(chain, zero, speed)[0] @ lines.mean) * measure.load.factors(chain, zero, speed)[0]
+            for chain in chains
+        )
+        return here, self.coordinates.owners * (0.5 * (high - low)), np.abs(here - 0.5 * (high + low))
+
+    def _breaks(self, limit: Limit, lower: Array, upper: Array) -> bool:
+        """Whether natural frequencies break a limit all over a box: they rise with stiffness and fall with inertia."""
+        ends = self.coordinates.ends(lower, upper)
+        if ends is None:
+            return False
+        for loads in (lines.loads for lines in self._lines if limit.measure.counts_point(lines.loads.point)):
+            low, high = (natural_modes(chain, loads.point.speed).frequencies for chain in ends)
+            if low[-1] > limit.maximum * (1.0 + SLACK) or high[0] < limit.minimum * (1.0 - SLACK):
+                return True
+            if limit.outside is not None:
+                a, b = limit.outside[0] * (1.0 + SLACK), limit.outside[1] * (1.0 - SLACK)
+                if np.any((low > a) & (high < b)):
+                    return True
+        return False
+
+
+def _turns(measure: Measure) -> bool:
+    return measure.channel.of_inertia
+
+
+def _is_square(measure: Measure) -> bool:
+    return measure.is_twist and measure.norm.is_euclidean

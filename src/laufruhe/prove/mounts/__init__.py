@@ -1,0 +1,1 @@
+"""What no mounts in a box of stiffness do better than."""

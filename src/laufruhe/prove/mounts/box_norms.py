@@ -1,0 +1,113 @@
+"""Norms of mount forces and travel over boxes of stiffness, bounded from below by linear functions (E38)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.measure import Measure
+from laufruhe.prove.mounts.box_response import Answer, BoxModel, Expansion, Lines
+
+
+@dataclass(frozen=True, eq=False)
+class Under:
+    """value + slopes . s - rest is nowhere above a quantity, s from -1 to 1 in each (E38)."""
+
+    value: Array
+    slopes: Array
+    rest: Array
+
+
+def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Under:
+    """A linear function under a norm of forces or travel, for every box (E38)."""
+    rows, factors = counted_rows(model, quantity)
+    answer = model.answer(lines, at, quantity.channel, rows, factors)
+    share, weights = quantity.shares(model.problem.points), line_weights(model, quantity, lines)
+    if quantity.norm.is_euclidean:
+        return root_under(answer, weights)
+    points = [p for p in model.counted(quantity.points) if np.any(lines.points == p)]
+    found = [_sampled(model, quantity, answer, lines, p) for p in points]
+    if not found:
+        nothing = np.zeros(len(at.centres))
+        return Under(nothing, np.zeros_like(at.centres), nothing)
+    if not quantity.norm.sums_lengths:
+        best = np.argmax([each.value for each in found], axis=0)
+        pick = np.arange(len(best))
+        value, slopes, rest = (np.array([getattr(e, part) for e in found]) for part in ("value", "slopes", "rest"))
+        return Under(value[best, pick], slopes[best, pick], rest[best, pick])
+    value, slopes = (
+        sum(share[p] * getattr(each, part) for p, each in zip(points, found, strict=True))
+        for part in ("value", "slopes")
+    )
+    rest = np.sqrt(np.einsum("k,bk->b", weights, answer.rest**2))
+    return Under(np.asarray(value), np.asarray(slopes), rest)
+
+
+def counted_rows(model: BoxModel, quantity: Measure) -> tuple[NDArray[np.intp], Array]:
+    """Rows of the mounts that count, and the factors on them."""
+    chosen = quantity.places([mount.name for mount in model.problem.engine.mounts])
+    rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
+    return rows, np.tile(np.array(quantity.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
+
+
+def line_weights(model: BoxModel, quantity: Measure, lines: Lines) -> Array:
+    """What the square of every order counts in a mean over the cycle, the mounts and the operating points."""
+    chosen = quantity.places([mount.name for mount in model.problem.engine.mounts])
+    share = quantity.shares(model.problem.points)
+    return np.asarray(share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen))
+
+
+def _sampled(model: BoxModel, quantity: Measure, answer: Answer, lines: Lines, p: int) -> Under:
+    """Mean, maximum or peak to peak over the samples of one period at one operating point."""
+    own = np.flatnonzero(lines.points == p)
+    value, slopes, rest = answer.value[:, own], answer.slopes[:, own], answer.rest[:, own]
+    turns = _turns(model, lines, p, own)
+    boxes, samples, mounts = len(value), len(turns), value.shape[-1] // 3
+    rows = np.einsum("tk,bkr->btr", turns, value).real.reshape(boxes, samples, mounts, 3)
+    box = np.arange(boxes)
+    if quantity.norm.sums_lengths:
+        size = np.linalg.norm(rows, axis=-1)
+        along = rows / np.where(size > 0.0, size, 1.0)[..., None]
+        share = 1.0 / (samples * mounts)
+        duals = np.einsum("tk,btr->bkr", turns, along.reshape(boxes, samples, -1))
+        slope = share * np.einsum("bkr,bknr->bn", duals, slopes).real
+        return Under(share * size.sum(axis=(1, 2)), slope, rest[:, 0])
+    # a signal reaches as far as its longest row; of a peak to peak as its row farthest from another
+    first, times = np.zeros((boxes, mounts, 3)), 1.0
+    if not quantity.norm.of_row_lengths:
+        start = np.linalg.norm(rows - rows.mean(axis=1, keepdims=True), axis=-1).argmax(axis=1)
+        first = rows[box[:, None], start, np.arange(mounts)]
+        times = 2.0
+    apart = np.linalg.norm(rows - first[:, None], axis=-1)
+    t, mount = np.divmod(apart.reshape(boxes, -1).argmax(axis=1), mounts)
+    length = apart[box, t, mount]
+    along = (rows[box, t, mount] - first[box, mount]) / np.where(length > 0.0, length, 1.0)[:, None]
+    there = slopes.reshape(*slopes.shape[:3], mounts, 3)[box, :, :, mount]
+    waves = turns[t] if times == 1.0 else turns[t] - turns[start[box, mount]]
+    slope = np.einsum("bk,bkna,ba->bn", waves, there, along).real
+    return Under(length, slope, times * rest.sum(axis=1))
+
+
+def _turns(model: BoxModel, lines: Lines, p: int, own: NDArray[np.intp]) -> NDArray[np.complex128]:
+    """A phase a sample and order, shape (samples, lines); orders beyond half the samples fold."""
+    step = model.evaluation.loads[p].wrench.base / model.problem.engine.cycle.base_order
+    places = lines.places[own] * int(step)
+    samples = model.evaluation.samples
+    apart = int(np.gcd.reduce(places)) or 1
+    apart = apart if samples % apart == 0 else 1
+    places, samples = places // apart, samples // apart
+    return np.asarray(np.exp(2j * math.pi / samples * (np.outer(np.arange(samples), places) % samples)))
+
+
+def root_under(answer: Answer, weights: Array) -> Under:
+    """Under the root of a weighted sum of squares; orders whose series need not end count as nothing."""
+    known = np.isfinite(answer.rest)
+    value = np.where(known[..., None], answer.value, 0.0)
+    size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
+    slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), answer.slopes).real
+    rest = np.sqrt(np.einsum("k,bk->b", weights, np.where(known, answer.rest, 0.0) ** 2))
+    return Under(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest)

@@ -1,0 +1,149 @@
+"""Numbers of a block on its mounts over boxes of stiffness: what they are not under, and not over (E39)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.physics.modes import weight_wrench
+from laufruhe.physics.mount_numbers import total_stiffness
+from laufruhe.physics.static_cases import case_wrench, stops_of
+from laufruhe.problem import channels
+from laufruhe.problem.channels import Channel, counted_cases, motion_indices
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.prove.mounts.box_norms import counted_rows
+from laufruhe.prove.mounts.box_response import BoxModel, Lines
+
+SLACK = 1e-6
+"""Designs count as allowed when they break a limit by less."""
+# parts of other modes from which these count together
+NEAR = 0.25
+
+
+def sag(model: BoxModel, x: Array) -> Array:
+    """At many designs, shape (boxes,); infinite where a mode is free (E9)."""
+    weight = weight_wrench(model.mounting(model.lower).block)
+    matrices, pull = model.stiffness(x), model.root @ weight
+    held = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
+    settled = np.linalg.solve(np.where(held[:, None, None], matrices, np.eye(6)), pull)
+    return np.where(held, settled @ pull / -weight[2], math.inf)
+
+
+def axis_residual(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
+    """Least over boxes, shape (boxes,): convex in x, so that its tangent at the middle is under it (E19, E46)."""
+    assert asked.channel.of_axis is not None
+    axis = asked.channel.of_axis(model.mounting(model.lower).block, asked.frequency)
+    found = np.zeros(len(lower))
+    slopes = axis.left @ model.stiffness_slopes @ axis.right
+    for k, matrix in enumerate(model.stiffness(0.5 * (lower + upper))):
+        rows = axis.rows(matrix)
+        y, taken = axis.under(rows / (float(np.linalg.norm(rows)) or 1.0))
+        least = float(y @ axis.answer(matrix)) - taken - np.abs(slopes @ y) @ (0.5 * (upper[k] - lower[k]))
+        found[k] = max(float(least), 0.0)
+    return found
+
+
+def most_shares(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
+    """What the shares of motions in a mode of their own are not over in boxes, shape (motions, boxes) (E7, E39)."""
+    squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
+    half = 0.5 * (upper - lower)
+    change = half @ np.linalg.norm(model.stiffness_slopes, ord=2, axis=(1, 2))
+    bent = np.einsum("bn,bnj->bj", half, np.linalg.norm(model.stiffness_slopes @ modes[:, None], axis=2))
+    apart = np.abs(squares[:, :, None] - squares[:, None, :]) - change[:, None, None]
+    parts = np.where(apart > 0.0, np.minimum(bent[:, None] / np.where(apart > 0.0, apart, 1.0), 1.0), 1.0)
+    parts = np.where(np.eye(6) > 0.0, 1.0, parts)
+    found = []
+    for motion in motion_indices(asked):
+        shape, momentum = model.root[:, motion], np.linalg.inv(model.root)[motion]
+        found.append((_most_along(shape, modes, parts) * _most_along(momentum, modes, parts)).max(axis=1))
+    return np.array(found)
+
+
+def _most_along(vector: Array, modes: Array, parts: Array) -> Array:
+    """What |vector' v| of no mode of a box is over, v having at most these parts of the modes at its middle."""
+    along = np.abs(vector @ modes)[:, None]
+    near = parts > NEAR
+    together = np.sqrt(np.sum(np.where(near, along, 0.0) ** 2, axis=2))
+    together += np.sum(np.where(near, 0.0, along * parts), axis=2)
+    return np.asarray(np.minimum(together, np.sum(along * parts, axis=2)))
+
+
+def held_loads(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
+    """Least of the largest travel or force under load cases over boxes, shape (boxes,) (E37, E55).
+
+    Nothing is known where bump stops bend the stiffness.
+    """
+    mounting = model.mounting(model.lower)
+    if np.any(stops_of(mounting).stiffness):
+        return np.zeros(len(lower))
+    loads = [model.root @ case_wrench(mounting.block, case) for case in counted_cases(asked, model.problem.engine)]
+    still, none = np.zeros(len(loads)), np.zeros(len(loads), dtype=np.intp)
+    lines = Lines(none, none, still, still, np.array(loads, dtype=complex))
+    rows, factors = counted_rows(model, asked)
+    answer = model.answer(lines, model.expanded(lines, lower, upper), _AS_LOADS[asked.channel], rows, factors)
+    value, slopes = (part.real.reshape(*part.shape[:-1], -1, 3) for part in (answer.value, answer.slopes))
+    size = np.linalg.norm(value, axis=-1)
+    along = value / np.where(size > 0.0, size, 1.0)[..., None]
+    bent = np.abs(np.einsum("bknpa,bkpa->bkpn", slopes, along)).sum(axis=-1)
+    # next to a free mode an expansion does not end
+    least = np.where(np.isfinite(answer.rest)[..., None], size - bent - answer.rest[..., None], 0.0)
+    return np.asarray(np.maximum(least.max(axis=(1, 2)), 0.0))
+
+
+_AS_LOADS: Mapping[Channel, Channel] = {
+    channels.STATIC_TRAVEL: channels.MOUNT_TRAVEL,
+    channels.STATIC_FORCE: channels.MOUNT_FORCE,
+}
+
+
+def shortfall(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
+    """Least over boxes, shape (boxes,) (E47)."""
+    return np.asarray(np.maximum(asked.wanted - most_shares(model, asked, lower, upper), 0.0).sum(axis=0))
+
+
+def stiffness_in_all(model: BoxModel, x: Array) -> Array:
+    """Sum over mounts and axes at many designs, shape (boxes,) [N/m]."""
+    decisions = model.problem.mount_decisions
+    gains = np.array([sum(drive.gain for drive in decision.mount_drives) for decision in decisions])
+    lowest = model.problem.design([float(v) for v in model.lower], decisions)
+    return np.asarray(total_stiffness(lowest.mounts) + (x - model.lower) @ gains)
+
+
+def _frequencies(model: BoxModel, x: Array) -> Array:
+    """Natural frequencies at designs, shape (boxes, 6) [Hz]."""
+    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(model.stiffness(x)), 0.0)) / math.tau)
+
+
+Ranges: TypeAlias = Callable[[BoxModel, Measure, Array, Array], tuple[Array | float, Array | float]]
+RANGES: Mapping[Channel, Ranges] = {
+    channels.SAG: lambda model, _, lower, upper: (sag(model, upper), sag(model, lower)),
+    channels.TOTAL_STIFFNESS: lambda model, _, lower, upper: (
+        stiffness_in_all(model, lower), stiffness_in_all(model, upper)
+    ),
+    channels.TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
+    channels.RAW_TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
+    channels.DECOUPLING: lambda *at: (-math.inf, most_shares(*at).min(axis=0)),
+    channels.STATIC_TRAVEL: lambda *at: (held_loads(*at), math.inf),
+    channels.STATIC_FORCE: lambda *at: (held_loads(*at), math.inf),
+    channels.DECOUPLING_SHORTFALL: lambda *at: (shortfall(*at), math.inf),
+    channels.FREQUENCIES: lambda model, _, lower, upper: (
+        _frequencies(model, lower)[:, -1], _frequencies(model, upper)[:, 0]
+    ),
+}  # fmt: skip
+"""Of a number of the mounts on boxes, what it is not under and what it is not over: more stiffness lowers sag
+and raises every frequency (E39). Of several numbers the last is not under the one, the first not over the other."""
+
+
+def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:
+    """Whether a limit is broken all over a box (E39)."""
+    least, most = RANGES[limit.measure.channel](model, limit.measure, lower, upper)
+    out = np.zeros(len(lower), dtype=bool) | (least > limit.maximum * (1.0 + SLACK))
+    out |= most < limit.minimum * (1.0 - SLACK)
+    if limit.outside is not None:
+        a, b = limit.outside[0] * (1.0 + SLACK), limit.outside[1] * (1.0 - SLACK)
+        out |= np.any((_frequencies(model, lower) > a) & (_frequencies(model, upper) < b), axis=1)
+    return np.asarray(out)

@@ -1,0 +1,231 @@
+"""A lower bound of mount forces, travel and transmissibility by dividing the bounds of stiffness into boxes (E38-E40).
+
+On a box every quantity has a linear function under it that differs from it by the square of the box's size. Boxes
+whose least value is not under the design found, or on which a limit cannot be kept, are dropped, the others halved:
+the least value on what is left bounds the objective of every design allowed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.norms import NORMS
+from laufruhe.numerics.spectrum import orders_equal
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Measure
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided, divide
+from laufruhe.prove.mounts.box_norms import Under, root_under, under
+from laufruhe.prove.mounts.box_numbers import RANGES, SLACK, breaks
+from laufruhe.prove.mounts.box_response import BoxModel, Expansion, Lines
+
+# open numbers that are divided without being asked for, and what all boxes may cost together
+MOST_OPEN = 4
+WORK = 4e6
+MOST_BOXES = 20_000
+# numbers held at once
+HELD = 3e6
+HALVINGS = 45
+# of the gap that counts as proven, what small orders may take of it
+LEFT_OUT = 0.05
+
+
+def divides(problem: Problem) -> bool:
+    """Whether stiffness alone is open, and more of it is never less of a mount's own."""
+    stiffness = all(d.is_stiffness and all(drive.gain > 0.0 for drive in d.mount_drives) for d in problem.decisions)
+    return bool(problem.decisions) and stiffness
+
+
+def divided_bound(problem: Problem, value: float, room: float) -> Divided:
+    """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
+
+    Parameters
+    ----------
+    problem
+        That `divides`.
+    value
+        Objective of the best design known; infinite where none is, and then the bound tells whether there is one.
+    room
+        Difference that counts as none [SI].
+    """
+    search = StiffnessBoxes(problem, LEFT_OUT * room)
+    most = search.most_boxes
+    if not most or not search.is_sampled_fully:
+        return Divided(0.0, 0)
+    return divide(search, search.model.lower, search.model.upper, value, room, most)
+
+
+class StiffnessBoxes:
+    """Bounds of boxes.
+
+    Attributes
+    ----------
+    constant
+        Of the objective: loads of the block and masses are the same on all mounts.
+    """
+
+    what = "boxes of stiffness"
+
+    def __init__(self, problem: Problem, left_out: float) -> None:
+        self.problem = problem
+        evaluation = evaluate_start(problem)
+        self.model = BoxModel(problem, evaluation)
+        terms = [term for term in problem.load_terms if term.measure.on_mounts]
+        rest = [term for term in problem.load_terms if not term.measure.on_mounts]
+        self.constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
+        share = left_out / max(sum(term.weight for term in terms), 1e-300)
+        self._terms = [(term.weight, term.measure, *_felt(self.model, term.measure, share)) for term in terms]
+        self._limits = [
+            (limit.maximum * (1.0 + SLACK), limit.measure, *_felt(self.model, limit.measure, SLACK * limit.maximum))
+            for limit in problem.limits
+            if limit.measure.on_mounts
+        ]
+
+    @property
+    def is_sampled_fully(self) -> bool:
+        """Whether sums of squares over orders are those over samples, as the rests suppose."""
+        return all(self.model.samples_fully(lines) for _, _, lines, _ in (*self._terms, *self._limits))
+
+    @property
+    def _cost(self) -> int:
+        """Of one box, in numbers."""
+        mounts = len(self.problem.engine.mounts)
+        lines = sum(len(lines.omegas) for _, _, lines, _ in (*self._terms, *self._limits))
+        ratios = [term.measure for term in self.problem.mount_terms]
+        lines += sum(2 * len(self._ratio_lines(q).omegas) for q in ratios if _is_ratio(q))
+        return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2)
+
+    @property
+    def at_once(self) -> int:
+        """Boxes of one round."""
+        return int(np.clip(HELD / (3.0 * self._cost), 2, 64))
+
+    @property
+    def most_boxes(self) -> int:
+        """As many as asked for, or as a few seconds allow."""
+        asked = self.problem.search.boxes
+        if asked is not None:
+            return asked
+        if len(self.problem.mount_decisions) > MOST_OPEN:
+            return 0
+        return int(min(WORK / self._cost, MOST_BOXES))
+
+    def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            return self._bounds(lower, upper)
+
+    def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
+        total, slopes, pull = np.zeros(len(lower)), np.zeros_like(lower), np.zeros_like(lower)
+        for weight, quantity, lines, left_out in self._terms:
+            at = self.model.expanded(lines, lower, upper)
+            least = under(self.model, quantity, lines, at)
+            total += weight * (least.value - least.rest - left_out)
+            slopes += weight * least.slopes
+            pull = np.maximum(pull, _pull(at))
+        found = self.constant + _known(total - np.abs(slopes).sum(axis=1))
+        for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
+            if _is_ratio(asked):
+                ratio, pulled = self._ratio(asked, lower, upper)
+                found, pull = np.asarray(found + weight * ratio), np.maximum(pull, pulled)
+            else:
+                found = np.asarray(found + weight * RANGES[asked.channel](self.model, asked, lower, upper)[0])
+        found = np.where(self._cannot(lower, upper), np.inf, found)
+        return found, np.argmax(np.nan_to_num(pull) + 1e-12 * (upper - lower) / upper.max(), axis=1)
+
+    def _cannot(self, lower: Array, upper: Array) -> Mask:
+        """Boxes on which a limit is broken everywhere."""
+        out = np.zeros(len(lower), dtype=bool)
+        for maximum, quantity, lines, left_out in self._limits:
+            at = self.model.expanded(lines, lower, upper)
+            least = under(self.model, quantity, lines, at)
+            out |= _known(least.value - least.rest - left_out - np.abs(least.slopes).sum(axis=1)) > maximum
+        for limit in self.problem.mount_limits:
+            if _is_ratio(limit.measure):
+                out |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
+            else:
+                out |= breaks(self.model, limit, lower, upper)
+        return out
+
+    # transmissibility
+
+    def _ratio_lines(self, quantity: Measure) -> Lines:
+        counted = Measure(channels.MOUNT_FORCE, NORMS["rms"], points=quantity.points, orders=quantity.orders)
+        lines = self.model.lines(counted)
+        return lines.kept(lines.omegas > 0.0)
+
+    def _ratio(self, quantity: Measure, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Least transmissibility on every box (E40)."""
+        lines = self._ratio_lines(quantity)
+        rows = np.arange(3 * len(self.problem.engine.mounts), dtype=np.intp)
+        at, still = (self.model.expanded(each, lower, upper) for each in (lines, lines.still()))
+        over, firm = (
+            self.model.answer(each, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
+            for each, expansion in ((lines, at), (lines.still(), still))
+        )
+        best = np.zeros(len(lower))
+        for group in _groups(quantity, lines):
+            weights = group.astype(float)
+            top, bottom = root_under(over, weights), root_under(firm, weights)
+            bent = np.einsum("k,bk->b", weights, np.linalg.norm(firm.slopes, axis=-1).sum(axis=-1) ** 2)
+            known = np.all(np.isfinite(firm.rest[:, group]), axis=1) & (bottom.value > 0.0)
+            bend = bent / (2.0 * np.where(known, bottom.value, 1.0))
+            least = _least_ratio(top, Under(bottom.value, bottom.slopes, bottom.rest + bend))
+            best = np.maximum(best, np.where(known, least, 0.0))
+        return best, _pull(at)
+
+
+def _is_ratio(quantity: Measure) -> bool:
+    return quantity.channel is channels.TRANSMISSIBILITY
+
+
+def _groups(quantity: Measure, lines: Lines) -> list[Mask]:
+    """Lines that make one ratio: of each operating point every order named, or all together."""
+    out = []
+    for p in np.unique(lines.points):
+        own = lines.points == p
+        orders: Sequence[float | None] = (None,) if quantity.orders is None else quantity.orders
+        out += [own if order is None else own & orders_equal(lines.orders, order) for order in orders]
+    return [group for group in out if group.any()]
+
+
+def _least_ratio(top: Under, bottom: Under) -> Array:
+    """Largest t with top - t bottom >= 0 all over the box, top from below and bottom from above (E40)."""
+    low = np.zeros(len(top.value))
+    high = top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
+    for _ in range(HALVINGS):
+        t = 0.5 * (low + high)
+        left = top.value - top.rest - t * (bottom.value + bottom.rest)
+        holds = left - np.abs(top.slopes - t[:, None] * bottom.slopes).sum(axis=1) >= 0.0
+        low, high = np.where(holds, t, low), np.where(holds, high, t)
+    return low
+
+
+def _felt(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, float]:
+    """Lines without those that together do less than a budget anywhere, and what they do (E41)."""
+    lines = model.lines(quantity)
+    factor = max(quantity.direction_weights or (1.0,))
+    felt = factor * model.felt_at_most(lines, quantity.channel)
+    order = np.argsort(felt, kind="stable")
+    # the sum is over any root of squares, so it serves every norm
+    together = np.cumsum(felt[order])
+    kept = np.ones(len(felt), dtype=bool)
+    out = order[together <= budget]
+    kept[out] = False
+    # a peak to peak is twice a largest length at most
+    return lines.kept(kept), (1.0 if quantity.norm.of_row_lengths else 2.0) * float(felt[out].sum())
+
+
+def _pull(at: Expansion) -> Array:
+    """By how much each side of every box keeps the expansion from ending, shape (boxes, n)."""
+    return np.asarray(np.nan_to_num(at.pull, nan=1.0, posinf=1.0).max(axis=1, initial=0.0))
+
+
+def _known(bound: Array) -> Array:
+    """Zero where an expansion does not end: no norm goes under it."""
+    return np.maximum(np.where(np.isfinite(bound), bound, 0.0), 0.0)

@@ -1,0 +1,174 @@
+"""Least squares of mount forces or travel on a box of mounts, by a semidefinite relaxation (E43-E45, E52-E54).
+
+Of every order a moment matrix M stands for (1, v)(1, v)' (E42), and must keep the conditions of E43. Its first rows, of
+(1, u) with u the unbalances, are those of all orders. What is minimised is a sum of heads, each over the caps
+
+    S - F(M) nowhere indefinite,    F(M) = sum R M R'                                    (E54)
+
+where S is the head times the identity, or blocks whose traces add up to the head: the square of a longest vector, or of
+a sum of lengths. A solver proposes multipliers; the bound is what follows from them by linear algebra (E44).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.prove.springs.conditions import Held
+
+# shifts that make a matrix convex, in parts of its largest eigenvalue
+_SHIFTS = np.concatenate([[0.0], 10.0 ** np.arange(-14.0, 0.1, 0.25)])
+_FLAT = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class Cap:
+    """S over F(M) (E54).
+
+    Attributes
+    ----------
+    head
+        Its number.
+    rows
+        Number of an order, and R of every part of the sum, shape (parts, k, d).
+    blocks
+        Sizes of the blocks of S; none where S is the head times the identity.
+    """
+
+    head: int
+    rows: tuple[tuple[int, Array], ...]
+    blocks: tuple[int, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """k."""
+        return int(self.rows[0][1].shape[1])
+
+    @property
+    def parts(self) -> list[slice]:
+        """Where the blocks stand."""
+        return [slice(int(a), int(b)) for a, b in pairwise(np.cumsum((0, *self.blocks)))]
+
+    def share(self, price: Array) -> float:
+        """What a multiplier takes of the price of its head."""
+        if not self.blocks:
+            return float(np.trace(price))
+        return max(float(np.linalg.eigvalsh(price[part, part])[-1]) for part in self.parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """A sum of functions linear in moments that is not over a number: order and matrix, shape (d, d)."""
+
+    matrices: tuple[tuple[int, Array], ...]
+    most: float
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """What is minimised, and under what.
+
+    Attributes
+    ----------
+    sizes
+        d of every order.
+    reaches
+        What |v|^2 of every order is not over.
+    numbers, columns
+        How many s there are, and columns of unbalances.
+    prices
+        Of the heads.
+    sets
+        Matrices C with <C, (1, u)(1, u)'> not over zero for unbalances allowed, shape (1 + columns, 1 + columns).
+    """
+
+    sizes: tuple[int, ...]
+    reaches: tuple[float, ...]
+    numbers: int
+    columns: int
+    prices: Array
+    caps: Sequence[Cap]
+    held: Sequence[Held]
+    budgets: Sequence[Budget] = ()
+    sets: Sequence[Array] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Of caps, conditions, budgets and sets, and of (1, u)(1, u)' being the same for all orders but the first."""
+
+    caps: Sequence[Array]
+    held: Sequence[Array]
+    budgets: Array
+    sets: Array
+    links: Sequence[Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Proposed:
+    """What a solver says: multipliers, s, the moments of every order, and what it takes the least value for."""
+
+    multipliers: Multipliers
+    middle: Array
+    moments: Sequence[Array]
+    least: float
+
+
+def follows(program: Program, found: Multipliers) -> float:
+    """What multipliers prove: the least value of the heads less all that they price (E44)."""
+    left, slopes, bound = [np.zeros((d, d)) for d in program.sizes], np.zeros(program.numbers), 0.0
+    for cap, price in zip(program.caps, _shared(program, found.caps), strict=True):
+        for order, rows in cap.rows:
+            left[order] += np.einsum("pad,ab,pbe->de", rows, price, rows, optimize=True)
+    for limit, multiplier in zip(program.held, found.held, strict=True):
+        price = _positive(multiplier)
+        bound -= float(np.sum(price * limit.constant))
+        slopes -= np.einsum("ab,nab->n", price, limit.slopes)
+        left[limit.order] -= np.einsum("ab,abij->ij", price, limit.moments)
+    for budget, factor in zip(program.budgets, np.maximum(found.budgets, 0.0), strict=True):
+        bound -= float(factor) * budget.most
+        for order, matrix in budget.matrices:
+            left[order] += factor * matrix
+    corner = slice(1 + program.columns)
+    for matrix, factor in zip(program.sets, np.maximum(found.sets, 0.0), strict=True):
+        left[0][corner, corner] += factor * matrix
+    for order, link in enumerate(found.links, 1):
+        both = 0.5 * (link + link.T)
+        left[order][corner, corner] += both
+        left[0][corner, corner] -= both
+    least = sum(_least(matrix, reach) for matrix, reach in zip(left, program.reaches, strict=True))
+    return bound - float(np.abs(slopes).sum()) + least
+
+
+def _shared(program: Program, multipliers: Sequence[Array]) -> list[Array]:
+    """Multipliers of the caps that take of the price of each head what it has."""
+    found = [_positive(multiplier) for multiplier in multipliers]
+    taken = np.zeros(len(program.prices))
+    for cap, price in zip(program.caps, found, strict=True):
+        taken[cap.head] += cap.share(price)
+    factors = np.where(taken > 0.0, program.prices / np.where(taken > 0.0, taken, 1.0), 0.0)
+    return [factors[cap.head] * price for cap, price in zip(program.caps, found, strict=True)]
+
+
+def _positive(matrix: Array) -> Array:
+    """The part of it that is nowhere negative."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
+
+
+def _least(matrix: Array, reach: float) -> float:
+    """Least of (1, v) matrix (1, v)' over |v|^2 at most `reach`: a shift that makes it convex takes its share off."""
+    whole = 0.5 * (matrix + matrix.T)
+    values, vectors = np.linalg.eigh(whole[1:, 1:])
+    along = (vectors.T @ whole[1:, 0]) ** 2
+    top, best = float(np.abs(values).max(initial=0.0)), -math.inf
+    for shift in _SHIFTS * top:
+        if values[0] + shift > _FLAT * top and (shift == 0.0 or reach < math.inf):
+            lost = shift * reach if shift else 0.0
+            best = max(best, float(whole[0, 0] - np.sum(along / (values + shift))) - lost)
+    return best if len(values) else float(whole[0, 0])

@@ -1,0 +1,154 @@
+"""What moments of an order have to keep, whatever the design of a box (E43, E52, E53).
+
+A matrix M stands for (1, v)(1, v)', v the products of E42 and the unbalances. Where a matrix P(s), linear in the shared
+numbers s, is nowhere indefinite, so is
+
+    [1 V]' P(s) [1 V],    V = [Re y, Im y]                                              (E43)
+
+and where P y is affine in v this is linear in s and M.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.prove.springs.lines import Line, product
+from laufruhe.prove.springs.open_mounts import OpenMounts
+from laufruhe.prove.springs.opened import Place, Spring
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A matrix that is linear in s and M, and must not be indefinite.
+
+    Attributes
+    ----------
+    order
+        Number of the order.
+    constant
+        What is in neither, shape (p, p).
+    slopes
+        By s, shape (numbers, p, p).
+    moments
+        What of M is in every entry, shape (p, p, d, d).
+    """
+
+    order: int
+    constant: Array
+    slopes: Array
+    moments: Array
+
+    @property
+    def size(self) -> int:
+        """Rows."""
+        return len(self.moments)
+
+
+def conditions(order: int, mounts: OpenMounts, line: Line) -> list[Held]:
+    """All that one order has to keep."""
+    found: list[Held] = []
+    for spring, (seen, added) in zip(mounts.springs, line.springs, strict=True):
+        found += _spring_sides(order, mounts.numbers, spring, seen, added)
+    for place, (seen, moved) in zip(mounts.places, line.places, strict=True):
+        found += _place_sides(order, mounts.numbers, place, seen, moved)
+    found += _limits_of_stiffness(order, mounts, line)
+    return found + _ranges(order, mounts, line)
+
+
+def _spring_sides(order: int, numbers: int, spring: Spring, seen: ComplexArray, added: ComplexArray) -> list[Held]:
+    """Every open stiffness between its bounds, and so is their product (E53)."""
+    slopes = spring.slopes(numbers) / spring.size
+    pressed = [(given @ seen + sign * added) / spring.size for given, sign in spring.sides]
+    found = [
+        held(order, given / spring.size, sign * slopes, seen, theirs)
+        for (given, sign), theirs in zip(spring.sides, pressed, strict=True)
+    ]
+    first, second = pressed
+    if len(seen) > 1:
+        return [*found, _between(order, numbers, product(first, second)[None, None])]
+    rows = [np.concatenate([each.real, each.imag]) for each in (first, second)]
+    across = np.einsum("ax,by->abxy", *rows)
+    across = across + across.transpose(1, 0, 2, 3)
+    return [*found, _between(order, numbers, 0.25 * (across + across.transpose(0, 1, 3, 2)))]
+
+
+def _between(order: int, numbers: int, moments: Array) -> Held:
+    """Moments alone, in their own size."""
+    count, size = len(moments), float(np.abs(moments).max()) or 1.0
+    return Held(order, np.zeros((count, count)), np.zeros((numbers, count, count)), moments / size)
+
+
+def held(order: int, given: Array, slopes: Array, seen: ComplexArray, pressed: ComplexArray) -> Held:
+    """E43 from y and P y as functions of (1, v), shapes (p, d), P = given + sum s_j slopes_j."""
+    p, d = seen.shape
+    size = float(np.abs(seen).max()) or 1.0
+    parts = [(f(seen) / size, f(pressed) / size) for f in (np.real, np.imag)]
+    moments = np.zeros((p + 2, p + 2, d, d))
+    for k, (own, turned) in enumerate(parts):
+        moments[:p, p + k, 0] += 0.5 * turned
+        moments[:p, p + k, :, 0] += 0.5 * turned
+        moments[p + k, :p] = moments[:p, p + k]
+        for other, (theirs, bent) in enumerate(parts):
+            twice = own.T @ bent + theirs.T @ turned
+            moments[p + k, p + other] = 0.25 * (twice + twice.T)
+    return Held(order, _bordered(given, 2), _bordered(slopes, 2), moments)
+
+
+def _place_sides(order: int, numbers: int, place: Place, seen: ComplexArray, moved: ComplexArray) -> list[Held]:
+    """1 + s and 1 - s, bordered by all turns and moments that s multiplies (E52)."""
+    found = []
+    size = np.abs(seen).max(axis=1, keepdims=True)
+    size = np.where(size > 0.0, size, 1.0)
+    own, theirs = ((rows / size) for rows in (seen, moved))
+    plain = np.concatenate([own.real, own.imag])
+    count, d = plain.shape
+    for sign in (1.0, -1.0):
+        pressed = plain + sign * np.concatenate([theirs.real, theirs.imag])
+        moments = np.zeros((1 + count, 1 + count, d, d))
+        moments[0, 1:, 0] += 0.5 * pressed
+        moments[0, 1:, :, 0] += 0.5 * pressed
+        moments[1:, 0] = moments[0, 1:]
+        across = np.einsum("ax,by->abxy", plain, pressed)
+        across = across + across.transpose(1, 0, 2, 3)
+        moments[1:, 1:] = 0.25 * (across + across.transpose(0, 1, 3, 2))
+        slopes = np.zeros((numbers, 1, 1))
+        slopes[place.number] = sign
+        found.append(Held(order, _bordered(np.eye(1), count), _bordered(slopes, count), moments))
+    rows = np.concatenate([theirs.real, theirs.imag])
+    squares = [np.einsum("ax,by->abxy", each, each) for each in (plain, rows)]
+    left = squares[0] - squares[1]
+    return [*found, _between(order, numbers, 0.5 * (left + left.transpose(0, 1, 3, 2)))]
+
+
+def _limits_of_stiffness(order: int, mounts: OpenMounts, line: Line) -> list[Held]:
+    """A - L and U - A; where places move, A is not linear in s, and what A does to the motion alone counts."""
+    found, unit = [], mounts.highest
+    for sign, matrices in ((1.0, mounts.floors), (-1.0, mounts.ceilings)):
+        for matrix in matrices:
+            pressed = sign * (line.carried - matrix @ line.motion) / unit
+            given, slopes = sign * (mounts.middle - matrix) / unit, sign * mounts.slopes / unit
+            whole = held(order, given, slopes, line.motion, pressed)
+            found.append(_cornerless(whole) if mounts.places else whole)
+    return found
+
+
+def _cornerless(whole: Held) -> Held:
+    """The last two rows and columns of it."""
+    last = slice(whole.size - 2, whole.size)
+    return Held(whole.order, whole.constant[last, last], whole.slopes[:, last, last], whole.moments[last, last])
+
+
+def _ranges(order: int, mounts: OpenMounts, line: Line) -> list[Held]:
+    """(A - a)(A - b) is nowhere indefinite where no eigenvalue is between, a - A times A - b where all are (E53)."""
+    unit, least = mounts.highest, max(mounts.lowest, 0.0)
+    pairs = [(line.carried - a * line.motion, line.carried - b * line.motion) for a, b in mounts.bands]
+    pairs.append((line.carried - least * line.motion, unit * line.motion - line.carried))
+    return [_between(order, mounts.numbers, product(first, second)[None, None]) for first, second in pairs]
+
+
+def _bordered(matrices: Array, count: int) -> Array:
+    """Rows and columns of zeros more."""
+    return np.pad(matrices, [(0, 0)] * (matrices.ndim - 2) + [(0, count)] * 2)

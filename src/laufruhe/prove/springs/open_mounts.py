@@ -1,0 +1,190 @@
+"""What of the mounts is open in a box, linear in numbers s from -1 to 1 that all orders share (E42, E52).
+
+An open stiffness along a fixed axis is one number. Where a mount may turn, its stiffness in the plane that turns is a
+matrix of three numbers, in space one of six, between the least and the largest of its own. A place that may move along
+an axis is one number more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.physics.dynamic_springs import DynamicSprings
+from laufruhe.physics.rigid_body import carried, point_motion
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, TURNED
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.mounts.transmitted import SLACK, limited_stiffness, number_ranges
+from laufruhe.prove.springs.opened import Opened, Place, Spring, own_axes
+
+# share of a square that is spent on the arms of mounts whose places are open
+STRETCH = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class OpenMounts:
+    """The springs of all mounts of a box, those that are joined in one place each by itself.
+
+    Attributes
+    ----------
+    root
+        From motion in coordinates in which the mass is one, transposed, shape (6, 6).
+    motions
+        G at the middle of the box in these coordinates, shape (springs, 3, 6).
+    middles, dampers
+        Stiffness at the middle and damping, shape (springs, 3, 3).
+    losses, lags
+        Loss factors, and viscous damping over stiffness [s], shape (springs,).
+    stands
+        Number of the mount that each belongs to, shape (springs,).
+    dynamic
+        Further springs whose stiffness depends on frequency.
+    keys
+        Of every number the decisions that it follows.
+    floors, ceilings
+        Matrices that the stiffness A is not under and not over (E31, E43), less what a limit may be broken by.
+    bands
+        Squares of angular frequencies that none stands between.
+    lowest, highest
+        Every eigenvalue of A is between these.
+    lossy, lagging, damping
+        What loss is not under, damping that follows stiffness per frequency, and viscous damping, shape (6, 6).
+    softest
+        Least stiffness of every spring in any direction, shape (springs,).
+    """
+
+    root: Array
+    motions: Array
+    middles: Array
+    dampers: Array
+    losses: Array
+    lags: Array
+    stands: NDArray[np.intp]
+    dynamic: DynamicSprings
+    springs: tuple[Spring, ...]
+    places: tuple[Place, ...]
+    keys: tuple[tuple[int, ...], ...]
+    floors: tuple[Array, ...]
+    ceilings: tuple[Array, ...]
+    bands: tuple[tuple[float, float], ...]
+    lowest: float
+    highest: float
+    lossy: Array
+    lagging: Array
+    damping: Array
+    softest: Array
+
+    @property
+    def numbers(self) -> int:
+        """How many s there are."""
+        return len(self.keys)
+
+    @property
+    def turns(self) -> Array:
+        """Turns of the block per motion, shape (3, 6)."""
+        return np.asarray(self.root.T[3:])
+
+    @property
+    def middle(self) -> Array:
+        """A where every s is zero, shape (6, 6)."""
+        return np.asarray(sum(carried(g, k) for g, k in zip(self.motions, self.middles, strict=True)) + self.at_rest)
+
+    @property
+    def at_rest(self) -> Array:
+        """What springs whose stiffness depends on frequency have of A, shape (6, 6)."""
+        rows = self.dynamic.rows @ self.root.T
+        return np.asarray(rows.T @ np.diag([law.static for law in self.dynamic.laws]) @ rows).reshape(6, 6)
+
+    def turning(self, omega: float) -> NDArray[np.complex128]:
+        """1 + i (eta + W lag) of every spring; 1 at rest."""
+        return np.asarray(1.0 + 1j * (self.losses * (omega > 0.0) + omega * self.lags), dtype=np.complex128)
+
+    def lost(self, omega: float) -> Array:
+        """What loss is not under, shape (6, 6)."""
+        return self.lossy + omega * self.lagging + omega * self.damping
+
+    @property
+    def mounts(self) -> int:
+        """How many there are."""
+        return int(self.stands.max()) + 1
+
+    @property
+    def slopes(self) -> Array:
+        """A by every s, places left out, shape (numbers, 6, 6)."""
+        out = np.zeros((self.numbers, 6, 6))
+        for spring in self.springs:
+            arms = spring.axes.T @ self.motions[spring.mount]
+            for j, matrix in spring.terms:
+                out[j] += carried(arms, matrix)
+        return out
+
+
+def is_lifted(problem: Problem) -> bool:
+    """Whether all that is open are unbalances, and stiffness, places and inclinations of mounts."""
+    mounts = problem.mount_decisions
+    others = [d for d in problem.decisions if d not in mounts and not (d.is_affine and d.rotor_drives)]
+    if not mounts or others:
+        return False
+    low, high = number_ranges(problem)
+    moved, turned = (np.any(low[:, part] < high[:, part], axis=1) for part in (POSITION, TURNED))
+    still = all(np.all(low[:, part] == high[:, part]) for part in (LOSS, DAMPING, LAG))
+    springs = every_spring(mounting_in(problem.engine).mounts)
+    damped = np.any(low[:, DAMPING] != 0.0, axis=1) | np.array([bool(spring.dynamic) for _, spring in springs])
+    # damping of a mount that turns or moves is not linear in these numbers
+    return still and not np.any(damped & (moved | turned)) and bool(np.all(low[:, STIFFNESS] >= 0.0))
+
+
+def open_mounts(problem: Problem, lower: Array, upper: Array) -> OpenMounts:
+    """The mounts of a problem that `is_lifted`, its open numbers between these."""
+    mounting, opened = mounting_in(problem.engine), Opened(problem, lower, upper)
+    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
+    count, centre = len(opened.low), np.array(mounting.block.centre_of_gravity)
+    motions = np.array([point_motion(NUMBERS, opened.middle(m)[POSITION] - centre) @ root.T for m in range(count)])
+    found = [opened.springs(m) for m in range(count)]
+    places = opened.places()
+    axes = [own_axes(opened.middle(m)[TURNED]) for m in range(count)]
+    dampers = [a.T @ np.diag(opened.low[m, DAMPING]) @ a for m, a in enumerate(axes)]
+    floors, ceilings, bands = limited_stiffness(problem, root)
+    floors = [(1.0 - 2.0 * SLACK) * floor for floor in floors]
+    ceilings = [(1.0 + SLACK) ** 2 * ceiling for ceiling in ceilings]
+    low, high, lossy, lagging = _least_and_most(opened, motions, places, root)
+    mounts = OpenMounts(
+        root, motions, np.array([total for total, _ in found]), np.array(dampers),
+        opened.low[:, LOSS], opened.low[:, LAG], np.array([k for k, _ in every_spring(mounting.mounts)], dtype=np.intp),
+        mounting.dynamic, tuple(s for _, own in found for s in own), places, opened.numbers.keys, tuple(floors),
+        tuple(ceilings), tuple(bands), 0.0, 0.0, lossy, lagging,
+        np.asarray(sum(carried(g, c) for g, c in zip(motions, dampers, strict=True))),
+        opened.low[:, STIFFNESS].min(axis=1),
+    )  # fmt: skip
+    return replace(
+        mounts,
+        lowest=max(float(np.linalg.eigvalsh(each)[0]) for each in (low + mounts.at_rest, *floors)),
+        highest=min(float(np.linalg.eigvalsh(each)[-1]) for each in (high + mounts.at_rest, *ceilings)),
+    )
+
+
+def _least_and_most(
+    opened: Opened, motions: Array, places: Sequence[Place], root: Array
+) -> tuple[Array, Array, Array, Array]:
+    """What stiffness is not under and not over, and what loss and damping that follow it are not under, (6, 6) each."""
+    low, high, lossy, lagging = (np.zeros((6, 6)) for _ in range(4))
+    for m, motion in enumerate(motions):
+        moved = sum(abs(reach) for place in places for k, reach in place.mounts if k == m)
+        least, most = opened.least_and_most(m)
+        high += (1.0 + STRETCH * (moved > 0.0)) * carried(motion, most)
+        if moved > 0.0:
+            size = float(np.linalg.norm(most, 2)) * moved**2
+            high += (1.0 + 1.0 / STRETCH) * size * (root[:, 3:] @ root[:, 3:].T)
+        else:
+            own = carried(motion, least)
+            low += own
+            lossy += float(opened.low[m, LOSS]) * own
+            lagging += float(opened.low[m, LAG]) * own
+    return low, high, lossy, lagging

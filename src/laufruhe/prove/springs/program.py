@@ -1,0 +1,206 @@
+"""The relaxation of E43-E45 and E52-E54 as Clarabel takes it: nothing depends on how good its multipliers are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.prove.quadratics import answered, column, triangle
+from laufruhe.prove.springs.bound import Cap, Multipliers, Program, Proposed
+from laufruhe.prove.springs.conditions import Held
+
+# what a solver leaves of a price of one for every square, so that what its multipliers leave over is convex
+ASIDE = 3e-7
+_SETTINGS = {
+    "verbose": False,
+    "equilibrate_enable": False,
+    "tol_gap_rel": 1e-5,
+    "tol_gap_abs": 1e-6,
+    "tol_feas": 1e-7,
+    "max_threads": 1,
+}
+
+
+def proposed(program: Program) -> Iterator[Proposed]:
+    """Multipliers of all conditions, s and moments, whatever the solver says of them; first and, where asked, again."""
+    stated = _Stated(program)
+    for scaled in (False, True):
+        yield stated.answer({**_SETTINGS, "equilibrate_enable": scaled})
+
+
+class _Stated:
+    """Variables: heads, blocks of the caps, s, the moments of every order."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.rows: list[Any] = []
+        self.right: list[Array] = []
+        self.cones: list[Any] = []
+        blocks = [_entries(size) for cap in program.caps for size in cap.blocks]
+        heads = len(program.prices)
+        self.blocks = np.cumsum([heads, *blocks])
+        self.first = int(self.blocks[-1])
+        self.ends = np.cumsum([self.first + program.numbers, *map(_entries, program.sizes)])
+        self._whole()
+        self._linked()
+        self._linear()
+        self._moments()
+        at = 0
+        for cap in program.caps:
+            self._cap(cap, at)
+            at += len(cap.blocks)
+        for limit in program.held:
+            self._held(limit)
+
+    def _add(self, block: Array, columns: Indices, right: Array, cone: Any) -> None:
+        """Rows with entries in these columns alone."""
+        from scipy.sparse import coo_array
+
+        row, place = np.nonzero(block)
+        shape = len(block), int(self.ends[-1])
+        self.rows.append(coo_array((block[row, place], (row, columns[place])), shape=shape))
+        self.right.append(np.asarray(right, dtype=float))
+        self.cones.append(cone)
+
+    def _whole(self) -> None:
+        """The first entry of every moment matrix is one."""
+        import clarabel
+
+        count = len(self.program.sizes)
+        self._add(np.eye(count), np.asarray(self.ends[:-1]), np.ones(count), clarabel.ZeroConeT(count))
+
+    def _linked(self) -> None:
+        """(1, u)(1, u)' is the same for all orders."""
+        import clarabel
+
+        corner, count = self._corner(0), _entries(1 + self.program.columns) - 1
+        for order in range(1, len(self.program.sizes) if count else 1):
+            both = np.concatenate([-np.eye(count), np.eye(count)], axis=1)
+            columns = np.concatenate([corner[1:], self._corner(order)[1:]])
+            self._add(both, columns, np.zeros(count), clarabel.ZeroConeT(count))
+
+    def _corner(self, order: int) -> Indices:
+        """Where the entries of (1, u)(1, u)' stand: columns come first in a triangle column by column."""
+        return np.asarray(self.ends[order] + np.arange(_entries(1 + self.program.columns)))
+
+    def _linear(self) -> None:
+        """s between -1 and 1; sets of unbalances, budgets, and traces that are not over their head."""
+        import clarabel
+
+        program, numbers = self.program, self.program.numbers
+        own = self.first + np.arange(numbers)
+        for sign in (1.0, -1.0):
+            self._add(sign * np.eye(numbers), own, np.ones(numbers), clarabel.NonnegativeConeT(numbers))
+        for matrix in program.sets:
+            self._add(column(matrix)[None], self._corner(0), np.zeros(1), clarabel.NonnegativeConeT(1))
+        for budget in program.budgets:
+            columns = np.concatenate([self._moment(order) for order, _ in budget.matrices])
+            block = np.concatenate([column(matrix) for _, matrix in budget.matrices])[None]
+            self._add(block, columns, np.array([budget.most]), clarabel.NonnegativeConeT(1))
+        at = 0
+        for cap in program.caps:
+            if cap.blocks:
+                span = np.arange(self.blocks[at], self.blocks[at + len(cap.blocks)])
+                traces = np.concatenate([_diagonal(size) for size in cap.blocks])
+                block, columns = np.append(traces, -1.0)[None], np.append(span, cap.head)
+                self._add(block, columns, np.zeros(1), clarabel.NonnegativeConeT(1))
+            at += len(cap.blocks)
+
+    def _moment(self, order: int) -> Indices:
+        return np.arange(self.ends[order], self.ends[order + 1])
+
+    def _moments(self) -> None:
+        """No moment matrix is indefinite."""
+        import clarabel
+
+        for order, size in enumerate(self.program.sizes):
+            columns = self._moment(order)
+            cone = clarabel.PSDTriangleConeT(size)
+            self._add(-np.eye(len(columns)), columns, np.zeros(len(columns)), cone)
+
+    def _cap(self, cap: Cap, at: int) -> None:
+        """S - F(M)."""
+        import clarabel
+
+        i, j, factor = triangle(cap.size)
+        columns, blocks = [], []
+        for order, rows in cap.rows:
+            pairs = np.einsum("pax,pay->axy", rows[:, i], rows[:, j])
+            blocks.append(column(0.5 * (pairs + pairs.transpose(0, 2, 1))) * factor[:, None])
+            columns.append(self._moment(order))
+        if cap.blocks:
+            look = {pair: k for k, pair in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
+            for k, part in enumerate(cap.parts):
+                rows_, columns_, own = triangle(cap.blocks[k])
+                block = np.zeros((len(i), len(own)))
+                for entry, (a, b) in enumerate(zip(rows_ + part.start, columns_ + part.start, strict=True)):
+                    block[look[int(a), int(b)], entry] = -1.0
+                blocks.append(block)
+                columns.append(np.arange(self.blocks[at + k], self.blocks[at + k + 1]))
+        else:
+            blocks.append(-column(np.eye(cap.size))[:, None])
+            columns.append(np.array([cap.head]))
+        whole = np.concatenate(blocks, axis=1)
+        self._add(whole, np.concatenate(columns), np.zeros(len(i)), clarabel.PSDTriangleConeT(cap.size))
+
+    def _held(self, limit: Held) -> None:
+        """E43."""
+        import clarabel
+
+        i, j, factor = triangle(limit.size)
+        own = -column(limit.moments[i, j]) * factor[:, None]
+        columns = np.concatenate([self.first + np.arange(self.program.numbers), self._moment(limit.order)])
+        block = np.concatenate([-column(limit.slopes).T.reshape(len(i), -1), own], axis=1)
+        self._add(block, columns, column(limit.constant), clarabel.PSDTriangleConeT(limit.size))
+
+    def answer(self, settings: Mapping[str, Any]) -> Proposed:
+        """As multipliers and moments."""
+        from scipy.sparse import csc_array, vstack
+
+        program, first = self.program, self.first
+        cost = np.zeros(int(self.ends[-1]))
+        cost[: len(program.prices)] = program.prices
+        for order, size in enumerate(program.sizes):
+            cost[self._moment(order)] = -ASIDE * _diagonal(size)
+        found = answered(cost, csc_array(vstack(self.rows)), np.concatenate(self.right), self.cones, settings)
+        z, x = np.nan_to_num(np.array(found.z)), np.nan_to_num(np.array(found.x))
+        parts = np.split(z, np.cumsum([len(right) for right in self.right])[:-1])
+        links = len(program.sizes) - 1 if program.columns else 0
+        corner = 1 + program.columns
+        linked = [_matrix(np.append(0.0, part), corner) for part in parts[1 : 1 + links]]
+        after = parts[3 + links :]
+        sets, after = after[: len(program.sets)], after[len(program.sets) :]
+        budgets, after = after[: len(program.budgets)], after[len(program.budgets) :]
+        last = after[len(after) - len(program.caps) - len(program.held) :]
+        caps = [_matrix(part, cap.size) for part, cap in zip(last, program.caps, strict=False)]
+        rest = last[len(program.caps) :]
+        held = [_matrix(part, limit.size) for part, limit in zip(rest, program.held, strict=True)]
+        multipliers = Multipliers(caps, held, _numbers(budgets), _numbers(sets), linked)
+        moments = [_matrix(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
+        return Proposed(multipliers, np.clip(x[first : first + program.numbers], -1.0, 1.0), moments, float(cost @ x))
+
+
+def _numbers(parts: Sequence[Array]) -> Array:
+    return np.concatenate([np.zeros(0), *parts])
+
+
+def _entries(size: int) -> int:
+    """Of a triangle."""
+    return size * (size + 1) // 2
+
+
+def _diagonal(size: int) -> Array:
+    """One where an entry of a triangle is on the diagonal."""
+    i, j, _ = triangle(size)
+    return np.where(i == j, 1.0, 0.0)
+
+
+def _matrix(entries: Array, size: int) -> Array:
+    """From a triangle column by column."""
+    i, j, factor = triangle(size)
+    matrix = np.zeros((size, size))
+    matrix[i, j] = matrix[j, i] = entries / factor
+    return matrix

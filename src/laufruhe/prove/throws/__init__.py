@@ -1,0 +1,1 @@
+"""What no stars and no throws do better than."""

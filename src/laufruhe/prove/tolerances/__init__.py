@@ -1,0 +1,1 @@
+"""The worst errors of a design."""

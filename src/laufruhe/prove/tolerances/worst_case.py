@@ -1,0 +1,144 @@
+"""The worst errors of a design, and a bound that no errors exceed (R4 to R7).
+
+The objective is convex in the errors, so its largest value stands at a corner of every interval and on the circle of
+every disc. Which one is found by branch and bound: an error is held at one end or the other, a circle is parted into
+arcs, and what is left free is bounded from above. Every bound comes from rows of the exact model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.prove.best_first import Division, Parts, Waiting
+from laufruhe.prove.tolerances.error_parts import ROUNDING, Block, Known, Terms, bounded
+
+MOST_NODES = 5000
+STARTS, CLIMBS = 12, 30
+"""Random errors that a climb starts from, and its steps."""
+
+
+@dataclass(frozen=True, eq=False)
+class WorstCase:
+    """The worst errors found, what they make, and what no errors exceed.
+
+    Attributes
+    ----------
+    errors
+        Shape (columns,).
+    value
+        At these errors.
+    bound
+        Of all errors allowed; never under the value.
+    nodes
+        Parts that the errors were divided into.
+    """
+
+    errors: Array
+    value: float
+    bound: float
+    nodes: int
+
+
+def value_at(terms: Terms, errors: Array) -> float:
+    """Weighted sum of the norms at these errors."""
+    return sum(weight * norm.value(errors) for weight, norm in terms)
+
+
+def worst_case(
+    terms: Terms, columns: Sequence[slice], tolerance: float, seed: int = 0, most: int = MOST_NODES
+) -> WorstCase:
+    """The largest weighted sum of norms N(V0 + E z) over intervals and discs.
+
+    Parameters
+    ----------
+    terms
+        Their decision vector is that of the errors.
+    columns
+        Of every error: one for an interval of -1 to 1, two for the unit disc.
+    tolerance
+        Relative distance of bound and value at which the search ends.
+    most
+        Parts that the errors are divided into.
+    """
+    count = columns[-1].stop if columns else 0
+    best = max((_climbed(terms, columns, z) for z in _starts(columns, count, seed)), key=lambda found: found[0])
+    if not count:
+        return WorstCase(np.zeros(0), best[0], best[0], 0)
+    search = _Errors(terms, tolerance, best)
+    whole = [Block(own, np.eye(own.stop - own.start)) for own in columns]
+    first = bounded(terms, np.zeros(count), whole, best[0], search.known)
+    search.better(_climbed(terms, columns, first.errors))
+    bound = search.divide((-first.bound, _Part(np.zeros(count), whole, first.split)), most)
+    value, errors = search.best
+    return WorstCase(errors, value, max(value, -bound), search.seen)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Errors of which some are held: a centre, blocks that are free, and the one of them to part next."""
+
+    centre: Array
+    blocks: list[Block]
+    split: int
+
+
+class _Errors(Division[_Part]):
+    """Parts of all errors; the largest bound is the least of what is sought here, its negative."""
+
+    what, of_objective = "boxes of errors", False
+
+    def __init__(self, terms: Terms, tolerance: float, best: tuple[float, Array]) -> None:
+        self._terms, self._tolerance, self.best = terms, tolerance, best
+        self.known: Known = [{} for _ in terms]
+
+    def better(self, found: tuple[float, Array]) -> None:
+        """The worse of the worst errors so far and others."""
+        self.best = max(self.best, found, key=lambda each: each[0])
+
+    def is_done(self, one: Waiting[_Part]) -> bool:
+        """Whether no errors are worse by the tolerance."""
+        return -one.bound <= self.best[0] * (1.0 + self._tolerance)
+
+    def parts(self, taken: Sequence[Waiting[_Part]]) -> Parts[_Part]:
+        """One block held at either end, or its circle parted."""
+        ((above, _, own),) = taken
+        rest = [block for k, block in enumerate(own.blocks) if k != own.split]
+        for middle, free in own.blocks[own.split].parts(own.centre):
+            blocks = rest if free is None else [*rest, free]
+            part = bounded(self._terms, middle, blocks, self.best[0] * (1.0 + self._tolerance), self.known)
+            self.better((value_at(self._terms, part.errors), part.errors))
+            # a part is never worse than the whole
+            bound = min(part.bound, -above)
+            is_left = blocks and bound > self.best[0] * (1.0 + ROUNDING)
+            yield (-bound, _Part(middle, blocks, part.split)) if is_left else None
+
+
+def _starts(columns: Sequence[slice], count: int, seed: int) -> Array:
+    """No errors, and random ones that are allowed: a point of the square may lie outside the disc in it."""
+    starts = np.random.default_rng(seed).uniform(-1.0, 1.0, (STARTS + 1, count))
+    starts[0] = 0.0
+    for disc in columns:
+        starts[:, disc] /= np.maximum(np.hypot.reduce(starts[:, disc], axis=1), 1.0)[:, None]
+    return starts
+
+
+def _climbed(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float, Array]:
+    """From some errors to ones that no step along their own slope betters: each step takes the farthest point."""
+    value = value_at(terms, errors)
+    for _ in range(CLIMBS):
+        slope = np.zeros(len(errors))
+        for weight, norm in terms:
+            slope += weight * np.einsum("kd,kdn->n", norm.subgradient(errors), norm.slope)
+        following = np.zeros(len(errors))
+        for own in columns:
+            size = float(np.hypot.reduce(slope[own]))
+            following[own] = slope[own] / size if size > 0.0 else np.eye(own.stop - own.start)[0]
+        found = value_at(terms, following)
+        if found <= value * (1.0 + ROUNDING):
+            return max((value, errors), (found, following), key=lambda each: each[0])
+        value, errors = found, following
+    return value, errors

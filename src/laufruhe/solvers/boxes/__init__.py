@@ -1,0 +1,1 @@
+"""What is not convex, divided into boxes: places, leads, flywheel, crankshaft, sizes."""

@@ -1,0 +1,216 @@
+"""Places of unbalances, and the unbalances with them: boxes of places, each bounded by its program (P8)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice, product
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Limit
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns
+from laufruhe.solvers.boxes.place_boxes import Relaxation
+from laufruhe.solvers.boxes.search import divided
+from laufruhe.solvers.conclusion import Shown, concluded, none_within
+from laufruhe.solvers.cones.unbalances import solve_unbalances
+from laufruhe.solvers.result import Result, Status
+
+MOST_BOXES = 300
+# [m]
+EXACT = 1e-6
+# [m], by which a limit on a distance may be missed, and by which it is kept where places are moved for it
+REACH, INSIDE = 1e-9, 1e-7
+# of the part of a side that is cut away
+HALVINGS = 10
+# of a box, from which allowed places are sought
+MOST_CORNERS = 16
+# of a side, that a cut keeps from its ends
+EDGE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """Places between bounds, shape (places,) each, what bounds the objective there, and where it looks best.
+
+    Attributes
+    ----------
+    spread
+        By how much what was left out pulls each place apart [m]; next to nothing where it made no difference.
+    """
+
+    lower: Array
+    upper: Array
+    bound: float
+    middle: Array
+    spread: Array
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether it left nothing out: no part of it has more than a bound as near as its program came."""
+        return bool(self.spread.max() <= EXACT)
+
+
+def solve_places(problem: Problem) -> Result:
+    """Places and unbalances, proven as far as dividing the boxes of places goes.
+
+    Parameters
+    ----------
+    problem
+        Whose decisions are unbalances and places.
+    """
+    started = time.perf_counter()
+    search, initial = _Search(problem), evaluate(problem)
+    best, bound, boxes = _divided(search, nothing_of(problem))
+    timing = {"solve": time.perf_counter() - started}
+    if best is None:
+        return none_within(problem, initial, search.conflict, timing)
+    own, design, certificate = best.result, best.design, best.result.certificate if best.result else None
+    shown = Shown(
+        bound=min(bound, design.value),
+        reach=Reach.WHOLE,
+        kkt_residual=certificate.kkt_residual if certificate is not None else 0.0,
+        method=f"second-order cones over {boxes} box{'es' * (boxes > 1)} of places",
+        prices=own.prices if own is not None else {},
+    )
+    return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
+
+
+def _divided(search: _Search, nothing: float) -> tuple[HeldDesign | None, float, int]:
+    """Divide the boxes until their least bound meets the best design, or as often as is worth it.
+
+    Returns
+    -------
+    That design, None where no place allows one; what bounds the boxes that are left; and how many there were.
+    """
+    problem = search.problem
+    most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
+    root = search.box(*search.bounds)
+    if root is None:
+        return None, np.inf, 1
+    first = search.at(root.middle)
+    best, bound, seen = divided(search, root, first, nothing, problem.tolerance, most, "boxes of places")
+    return None if np.isinf(bound) and best.design.rank[0] else best, bound, seen
+
+
+class _Search(HeldDesigns):
+    """Boxes of the places of a problem."""
+
+    is_shared = True
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem)
+        self.relaxation = Relaxation(problem.changed(limits=problem.load_limits), SHARE)
+        self._envelope = [limit for limit in problem.limits if limit.measure.channel.is_placing]
+        self.places = self.relaxation.places
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Of all places."""
+        return np.array([p.lower for p in self.places]), np.array([p.upper for p in self.places])
+
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | None, HeldDesign | None]]:
+        """Halves of a box, each with the best design at its middle if it may be better than a value."""
+        for half in self._halves(box):
+            yield half, None if half is None or half.bound >= value else self.at(half.middle)
+
+    def _halves(self, box: _Box) -> Iterator[_Box | None]:
+        """A box cut where what was left out pulls most."""
+        width, whole = box.upper - box.lower, self.bounds[1] - self.bounds[0]
+        pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole
+        side = int(np.argmax(pulled))
+        keep = EDGE * width[side]
+        cut = float(np.clip(box.middle[side], box.lower[side] + keep, box.upper[side] - keep))
+        here = np.arange(len(width)) == side
+        yield self.box(box.lower, np.where(here, cut, box.upper), box.bound)
+        yield self.box(np.where(here, cut, box.lower), box.upper, box.bound)
+
+    def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | None:
+        """The bound of a box, and where its program puts the places; None where no design is allowed."""
+        beyond = self._beyond(lower, upper)
+        if beyond:
+            self.told(beyond)
+            return None
+        lower, upper = self._shrunk(lower, upper)
+        relaxed = self.relaxation.program(lower, upper)
+        result = solve_unbalances(relaxed)
+        if result.status is Status.INFEASIBLE:
+            self.told(result.conflict)
+            return None
+        bound = result.certificate.lower_bound if result.certificate is not None else 0.0
+        middle, spread = self.relaxation.placing(relaxed, result, lower, upper)
+        allowed = self._pushed(middle, lower, upper)
+        # what the program does not know of moves the places too
+        moved = upper - lower if allowed is None else np.abs(allowed - middle)
+        return _Box(lower, upper, max(bound, floor), middle if allowed is None else allowed, np.maximum(spread, moved))
+
+    def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
+        """Least and largest of each distance that is limited, with its places in a box."""
+        ends = [self.problem.design([float(x) for x in end], self.places) for end in (lower, upper)]
+        for limit in self._envelope:
+            for least, most in limit.measure.channel.span(limit.measure, *ends):
+                yield limit, least, most
+
+    def _beyond(self, lower: Array, upper: Array) -> tuple[str, ...]:
+        """A limit on distances that is broken all over a box; none where there is no such."""
+        for limit, least, most in self._spans(lower, upper):
+            if least > limit.maximum + REACH or most < limit.minimum - REACH:
+                return (limit.name,)
+        return ()
+
+    def _shrunk(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """A box without slices at its sides in which a limit on distances is broken everywhere."""
+        lower, upper = lower.copy(), upper.copy()
+        for side, at_top in product(range(len(lower)) if self._envelope else (), (True, False)):
+            low, high, width = 0.0, 1.0, upper[side] - lower[side]
+            for _ in range(HALVINGS):
+                share = 0.5 * (low + high)
+                first, last = lower.copy(), upper.copy()
+                if at_top:
+                    first[side] = upper[side] - share * width
+                else:
+                    last[side] = lower[side] + share * width
+                low, high = (share, high) if self._beyond(first, last) else (low, share)
+            if at_top:
+                upper[side] -= low * width
+            else:
+                lower[side] += low * width
+        return lower, upper
+
+    def _pushed(self, middle: Array, lower: Array, upper: Array) -> Array | None:
+        """Places in a box that keep the limits on distances, near its middle; None where none are found."""
+
+        def room(places: Array) -> Array:
+            spans = self._spans(places, places)
+            sides = [(limit.maximum - at, at - limit.minimum) for limit, at, _ in spans]
+            return np.asarray(np.minimum(np.array(sides).ravel(), 1.0))
+
+        if not self._envelope or room(middle).min() >= -REACH:
+            return middle
+        from scipy.optimize import NonlinearConstraint, minimize
+
+        kept = NonlinearConstraint(room, INSIDE, np.inf)
+        width, sides = np.where(upper > lower, upper - lower, 1.0), list(zip(lower, upper, strict=True))
+
+        def away(places: Array) -> float:
+            return float(np.square((places - middle) / width).sum())
+
+        corners = [np.array(corner) for corner in islice(product(*sides), MOST_CORNERS)]
+        found = []
+        for start in (middle, *corners):
+            pushed = minimize(away, start, method="SLSQP", bounds=sides, constraints=[kept])
+            found += [at for at in (np.clip(pushed.x, lower, upper), start) if room(at).min() >= -REACH]
+        return min(found, key=away, default=None)
+
+    def at(self, places: Array) -> HeldDesign:
+        """The best design with its places given."""
+        where: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
+        engine = self.problem.design(list(where.values()), self.places)
+        return self.best_with(replace(self.problem, engine=engine, decisions=self.problem.unbalances), where)

@@ -1,0 +1,56 @@
+"""Deciding discs, shafts and absorbers of the crankshaft: local programs from many starts, and boxes (V13)."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided, divide
+from laufruhe.prove.boxes.twist import TwistBoxes
+from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.conclusion import KEPT, concluded, none_within
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, searched, shown
+
+# open numbers that are divided, and boxes that this may take
+MOST_OPEN, MOST_BOXES = 3, 3000
+
+
+def solve_torsion(problem: Problem) -> Result:
+    """The best discs, shafts and absorbers found, with what boxes prove; or the limits that none keeps.
+
+    Root mean squares, inertia and irregularity are decided to a proven optimum of up to three numbers. What else
+    is asked has a bound by these in it alone.
+    """
+    started = time.perf_counter()
+    initial = evaluate(problem)
+    program = LocalProgram.of(problem)
+    best = searched(program, [program.shares(problem.start), *looks(problem)], problem.search.starts)
+    boxes = TwistBoxes(problem, initial)
+    most = _most_boxes(problem) if boxes.coordinates.is_exact and boxes.is_sampled_fully else 0
+
+    def bounded(value: float, room: float) -> Divided:
+        if not most or (value < math.inf and not boxes.has_terms):
+            return Divided(0.0, 0)
+        own = boxes.coordinates
+        divided = divide(boxes, own.lower, own.upper, value, room, most)
+        return replace(divided, places=tuple(own.decisions(x) for x in divided.places))
+
+    found = proven(program, best, bounded)
+    if found.excludes_all:
+        names = tuple(limit.name for limit in problem.limits)
+        return none_within(problem, initial, names, {"solve": time.perf_counter() - started})
+    method = f"local programs; lower bound on {found.divided.boxes} boxes of discs and shafts"
+    is_near = boxes.coordinates.is_exact and boxes.knows_all and found.design.excess <= KEPT
+    bound = found.bound if boxes.coordinates.is_exact else 0.0
+    proof = shown(program, found.design, bound, Reach.NEAR if is_near else Reach.ASIDE, method)
+    return concluded(found.design, initial, proof, {"solve": time.perf_counter() - started})
+
+
+def _most_boxes(problem: Problem) -> int:
+    if problem.search.boxes is not None:
+        return problem.search.boxes
+    return MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0

@@ -1,0 +1,1 @@
+"""Unbalances decided by second-order cone programs."""

@@ -1,0 +1,1 @@
+"""Mounts of the block, and unbalances and throws with them."""

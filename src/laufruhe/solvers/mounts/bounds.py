@@ -1,0 +1,73 @@
+"""What boxes prove of designs that a search of mounts has found (E37-E45, E52-E54)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from laufruhe.numerics.budget import in_time, passed
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.prove.best_first import Divided
+from laufruhe.prove.certificate import Reach, certified, room_of
+from laufruhe.prove.mounts.subdivision import divided_bound, divides
+from laufruhe.prove.springs.search import spring_bound
+from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.mounts.search import MountSearch
+from laufruhe.solvers.mounts.starts import unbalances_of
+from laufruhe.solvers.result import Result
+
+MOST_DIVISIONS = 3
+
+
+def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
+    """A bound by boxes of mounts; where stiffness alone is open, searches from where they are least as well.
+
+    Parameters
+    ----------
+    among
+        Whether the problem is one of several; those in which more than stiffness is open are then left to
+        `bounded_under`.
+    """
+    divided = Divided(0.0, 0)
+    if search.moves is not None or (among and not divides(problem)):
+        return divided
+    for _ in in_time(range(MOST_DIVISIONS)):
+        found = search.chosen
+        met = found is not None and found.design.excess <= KEPT
+        value = found.design.value if found is not None and met else math.inf
+        room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
+        divided = _by_boxes(problem, value, room, found.design.values if found is not None else ())
+        if not divided.places or passed() or not divides(problem) or not search.again(divided.places):
+            break
+    return divided
+
+
+def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:
+    """By the forces of springs, a few boxes of which close many stiffnesses; by expansions what these leave open."""
+    few = spring_bound(problem, value, room, near)
+    if not divides(problem) or (few.boxes and few.bound >= value - room):
+        return few
+    many = divided_bound(problem, value, room)
+    return Divided(max(few.bound, many.bound), few.boxes + many.boxes, many.places or few.places)
+
+
+def bounded_under(result: Result, value: float) -> Result:
+    """A result with what boxes prove of its mounts, designs worse than a value known from elsewhere left out."""
+    problem, certificate = result.problem, result.certificate
+    if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
+        return result
+    mounts = {decision.name: decision.value for decision in result.decisions}
+    own = iter(unbalances_of(problem, result))
+    near = [next(own) if d.is_affine else mounts[d.name] for d in problem.decisions]
+    nothing = nothing_of(problem, result.final.engine)
+    found = spring_bound(problem, value, room_of(value, problem.tolerance, nothing), near)
+    if found.bound <= certificate.lower_bound:
+        return result
+    text = f"{certificate.method}; bounds of mounts looked at in {found.boxes} box{'es' if found.boxes > 1 else ''}"
+    told = certified(
+        result.objective.value, found.bound, nothing, problem.tolerance, Reach.NEAR, certificate.kkt_residual, text
+    )
+    return replace(result, certificate=told)

@@ -1,0 +1,154 @@
+"""Convex programs of mount stiffness for Clarabel: matrix inequalities and matrix fractions."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.mount_numbers import AxisResidual
+from laufruhe.prove.mounts.convex_functions import (
+    Compliance,
+    ConvexDuals,
+    ConvexFunction,
+    ConvexProgram,
+    Eigenvalue,
+    Linear,
+    Residual,
+    excludes,
+)
+from laufruhe.solvers.cones.conic import ATTEMPTS
+
+# duals of a matrix inequality prove no more than what they are good to
+SHARP = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
+
+
+def solve_cones(program: ConvexProgram) -> tuple[Array, ConvexDuals] | None:
+    """Stiffnesses and duals that Clarabel proposes; None where duals prove that the limits cannot be met together.
+
+    Where it stops without an answer it is asked again with other settings, and then how near the limits
+    can be met: that has an answer always, which is a design or the proof that there is none. The middle of
+    the box is all that is left to propose where the solver loses its numbers there too.
+    """
+    stated = _Stated(program)
+    if stated.solve():
+        return stated.x, stated.duals
+    nearest = _Stated(replace(program, terms=()), relaxed=True)
+    if not nearest.solve():
+        return 0.5 * (program.lower + program.upper), ConvexDuals.none(program)
+    return None if excludes(program, nearest.x, nearest.duals) else (nearest.x, ConvexDuals.none(program))
+
+
+class _Stated:
+    """A program in cvxpy, everything of size one.
+
+    Parameters
+    ----------
+    relaxed
+        Whether the limits may be missed by a share that is to be least.
+    """
+
+    def __init__(self, program: ConvexProgram, relaxed: bool = False) -> None:
+        self.program, self._relaxed = program, relaxed
+        lower, upper = program.lower, program.upper
+        scale = np.maximum(np.abs(lower), np.abs(upper))
+        self.scale = np.where(scale > 0.0, scale, 1.0)
+        middle = 0.5 * (lower + upper)
+        self.unit = float(np.trace(program.matrices.at(middle))) / 6.0 or 1.0
+        self.y = cp.Variable(len(lower))
+        slopes = (program.matrices.slopes * self.scale[:, None, None] / self.unit).reshape(len(lower), 36)
+        matrix = cp.reshape(slopes.T @ self.y, (6, 6), order="C") + program.matrices.base / self.unit
+        self.matrix = 0.5 * (matrix + matrix.T)
+        size = max((abs(term.value(middle)) for _, term in program.terms), default=1.0)
+        self.size = size if np.isfinite(size) and size > 0.0 else 1.0
+        self.held: list[Any] = [self.y >= lower / self.scale, self.y <= upper / self.scale]
+        tops, self._cones = [], []
+        for weight, term in program.terms:
+            top, cone = self._over(term)
+            tops.append(weight * top / self.size)
+            self._cones.append(cone)
+        missed = cp.Variable(nonneg=True) if relaxed else 0.0
+        self._limits = [self._limited(each.function, each.maximum, missed) for each in program.limits]
+        self._least = cp.Problem(cp.Minimize(sum(tops) + missed if tops or relaxed else 0), self.held)
+
+    def solve(self) -> bool:
+        """Whether the solver stands by its answer."""
+        for settings in (SHARP, *ATTEMPTS):
+            with warnings.catch_warnings():
+                # an inaccurate answer is judged by its certificate, not by a warning
+                warnings.simplefilter("ignore")
+                with suppress(cp.error.SolverError):
+                    self._least.solve(solver=cp.CLARABEL, **settings)
+            if self._least.status == cp.OPTIMAL:
+                return True
+        return False
+
+    @property
+    def x(self) -> Array:
+        """Stiffnesses, within their bounds."""
+        return np.asarray(np.clip(np.asarray(self.y.value) * self.scale, self.program.lower, self.program.upper))
+
+    @property
+    def duals(self) -> ConvexDuals:
+        """Of the solution, in the units of the program."""
+        found = [_dual(constraint, factor, self.size) for constraint, factor in self._limits]
+        vectors = tuple(_vector(cone) for cone in self._cones)
+        return ConvexDuals(vectors, tuple(price for price, _ in found), tuple(dual for _, dual in found))
+
+    def _over(self, function: ConvexFunction) -> tuple[Any, Any]:
+        """An expression that is the function at the optimum, and the cone whose dual proves it."""
+        if isinstance(function, Linear):
+            return function.constant + (function.gradient * self.scale) @ self.y, None
+        if isinstance(function, Compliance):
+            return (function.factor / self.unit) * cp.matrix_frac(function.load, self.matrix), None
+        if isinstance(function, Residual):
+            return self._residual(function.axis)
+        raise TypeError(f"{type(function).__name__} is limited, not minimised")
+
+    def _residual(self, axis: AxisResidual) -> tuple[Any, Any]:
+        """The length of its rows, counted in what the mounts answer at the middle; the square may be open."""
+        answer = axis.answer(self.program.matrices.at(0.5 * (self.program.lower + self.program.upper)))
+        unit = float(np.linalg.norm(answer)) or 1.0
+        one = unit / float(np.linalg.norm(axis.mass))
+        top, square = cp.Variable(), cp.Variable()
+        self.held.append(square >= axis.least / one)
+        if axis.most < np.inf:
+            self.held.append(square <= axis.most / one)
+        rows = (self.unit / unit) * (axis.left @ self.matrix @ axis.right) - square * (one / unit) * axis.mass
+        cone = cp.SOC(top, rows)
+        self.held.append(cone)
+        return unit * top, cone
+
+    def _limited(self, function: ConvexFunction, maximum: float, missed: Any) -> tuple[Any, float]:
+        """The constraint, and what its dual is to be multiplied by."""
+        whole = abs(maximum) or 1.0
+        if isinstance(function, Eigenvalue):
+            room = (maximum + missed * whole) / self.unit
+            constraint, factor = room * np.eye(6) - function.sign * self.matrix >> 0, 1.0 / self.unit
+        else:
+            constraint, factor = self._over(function)[0] / whole <= maximum / whole + missed, 1.0 / whole
+        self.held.append(constraint)
+        return constraint, factor
+
+
+def _dual(constraint: Any, factor: float, size: float) -> tuple[float, Array | None]:
+    """Price of a constraint in its own unit, and its dual matrix where it has one."""
+    if constraint.dual_value is None:
+        return 0.0, None
+    array = np.asarray(constraint.dual_value, dtype=float)
+    if array.ndim < 2:
+        return max(float(array), 0.0) * factor * size, None
+    array = 0.5 * (array + array.T)
+    return float(np.maximum(np.linalg.eigvalsh(array), 0.0).sum()) * factor * size, array
+
+
+def _vector(cone: Any) -> Array | None:
+    if cone is None or cone.dual_value is None:
+        return None
+    top, rows = (np.asarray(part, dtype=float).reshape(-1) for part in cone.dual_value)
+    return -rows / max(float(top[0]), 1e-300)

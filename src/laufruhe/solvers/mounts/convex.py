@@ -1,0 +1,176 @@
+"""Mount stiffness to a proven optimum, where all that is asked is convex in it (E16-E19)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.modes import weight_wrench
+from laufruhe.physics.mount_numbers import mass_root
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import STIFFNESS, Decision
+from laufruhe.problem.measure import Limit, Measure, Side
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Reach
+from laufruhe.prove.mounts.convex_functions import (
+    Compliance,
+    ConvexDuals,
+    ConvexFunction,
+    ConvexLimit,
+    ConvexProgram,
+    Eigenvalue,
+    Linear,
+    Matrices,
+    Residual,
+    dual_bound,
+)
+from laufruhe.solvers.conclusion import Shown, better, concluded, given_design, judged, none_within
+from laufruhe.solvers.conflicts import smallest_conflict
+from laufruhe.solvers.result import Result
+
+CONVEX = (channels.SAG, channels.TORQUE_ROLL, channels.RAW_TORQUE_ROLL, channels.TOTAL_STIFFNESS)
+
+
+def is_convex(problem: Problem) -> bool:
+    """Whether stiffness alone is open, and all that is asked is convex in it."""
+    if problem.load_terms or problem.load_limits or not problem.objective:
+        return False
+    if not all(decision.is_stiffness for decision in problem.decisions):
+        return False
+    asked = all(term.measure.channel in CONVEX for term in problem.objective)
+    return asked and all(_convex_sides(limit) for limit in problem.limits)
+
+
+def _convex_sides(limit: Limit) -> bool:
+    channel = limit.measure.channel
+    if channel is channels.FREQUENCIES:
+        return limit.outside is None
+    if channel is channels.TOTAL_STIFFNESS:
+        return True
+    return channel in CONVEX and limit.minimum == -math.inf
+
+
+def convex_program(problem: Problem) -> ConvexProgram:
+    """The functions of a problem that `is_convex`."""
+    decisions = problem.decisions
+    lower, upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+    start = np.array([d.start_number for d in decisions])
+    given = mounting_in(problem.design(start.tolist()))
+    root = mass_root(given.block)
+    slopes = np.array([root @ _slope(given, decision) @ root.T for decision in decisions]).reshape(-1, 6, 6)
+    base = root @ given.stiffness @ root.T - np.tensordot(start, slopes, axes=1)
+    matrices = Matrices(base, slopes)
+    terms = tuple((term.weight, _function(term.measure, matrices, given, problem)) for term in problem.objective)
+    limits = [part for k, limit in enumerate(problem.limits) for part in _limits(limit, k, matrices, given, problem)]
+    return ConvexProgram(matrices, lower, upper, terms, tuple(limits))
+
+
+def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
+    """dK of one decision: exact, for K is linear in it (E3)."""
+    total, springs = np.zeros((6, 6)), every_spring(mounting.mounts)
+    for drive in decision.mount_drives:
+        place, spring = springs[drive.mount]
+        row = np.array(spring.orientation)[drive.number] @ mounting.motions[place]
+        total += drive.gain * np.outer(row, row)
+    return total
+
+
+def _function(quantity: Measure, matrices: Matrices, mounting: ElasticMounting, problem: Problem) -> ConvexFunction:
+    if quantity.channel is channels.SAG:
+        weight = weight_wrench(mounting.block)
+        return Compliance(matrices, mass_root(mounting.block) @ weight, 1.0 / -weight[2])
+    if quantity.channel.of_axis is not None:
+        return Residual(matrices, quantity.channel.of_axis(mounting.block, quantity.frequency))
+    gradient = np.array([sum(drive.gain for drive in d.mount_drives) for d in problem.decisions])
+    given = sum(sum(row[STIFFNESS]) for row in problem.mount_numbers)
+    return Linear(given - float(gradient @ [d.start_number for d in problem.decisions]), gradient)
+
+
+def _limits(limit: Limit, k: int, matrices: Matrices, mounting: ElasticMounting, problem: Problem) -> list[ConvexLimit]:
+    found = []
+    if limit.measure.channel is channels.FREQUENCIES:
+        if limit.maximum < math.inf:
+            found.append(ConvexLimit(Eigenvalue(matrices, 1.0), (math.tau * limit.maximum) ** 2, k))
+        if limit.minimum > -math.inf:
+            found.append(ConvexLimit(Eigenvalue(matrices, -1.0), -((math.tau * limit.minimum) ** 2), k, "at least"))
+        return found
+    function = _function(limit.measure, matrices, mounting, problem)
+    if limit.maximum < math.inf:
+        found.append(ConvexLimit(function, limit.maximum, k))
+    if limit.minimum > -math.inf and isinstance(function, Linear):
+        found.append(ConvexLimit(Linear(-function.constant, -function.gradient), -limit.minimum, k, "at least"))
+    return found
+
+
+def solve_convex_mounts(problem: Problem) -> Result:
+    """Global optimum of a problem that `is_convex`, with a certificate from the exact model."""
+    from laufruhe.solvers.mounts.cones import solve_cones
+
+    started = time.perf_counter()
+    program = convex_program(problem)
+    initial = evaluate_start(problem)
+    modelled = time.perf_counter()
+    found = solve_cones(program)
+    solved = time.perf_counter()
+    timing = {"model": modelled - started, "solve": solved - modelled}
+    if found is None:
+        return none_within(problem, initial, _conflict(program, problem), timing)
+    x, duals = found
+    bound, gradient = dual_bound(program, x, duals)
+    shown = Shown(
+        bound=bound,
+        reach=Reach.WHOLE,
+        kkt_residual=_residual(program, x, duals, gradient),
+        method="linear matrix inequalities, dual bound over the box of stiffnesses",
+        prices=_prices(problem, program, duals),
+        slopes={decision.name: gradient[k : k + 1] for k, decision in enumerate(problem.decisions)},
+    )
+    design = better(judged(problem, [float(v) for v in x]), given_design(problem, initial))
+    return concluded(design, initial, shown, {**timing, "evaluate": time.perf_counter() - solved})
+
+
+def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dict[Side, float]:
+    """Fall of the objective per unit by which each side of a limit is relaxed, in the limit's own unit."""
+    prices: dict[Side, float] = {}
+    for limit, price in zip(program.limits, duals.prices, strict=True):
+        source = problem.limits[limit.source]
+        slope = 1.0
+        if source.measure.channel is channels.FREQUENCIES:
+            # the limit is on the square of 2 pi f
+            slope = 2.0 * math.tau * math.sqrt(abs(limit.maximum))
+        prices[source, limit.side] = price * slope
+    return prices
+
+
+def _residual(program: ConvexProgram, x: Array, duals: ConvexDuals, gradient: Array) -> float:
+    """Largest violation of stationarity, feasibility and complementarity, each over its own scale."""
+    width = np.where(program.upper > program.lower, program.upper - program.lower, 1.0)
+    whole = abs(program.objective(x)) or 1.0
+    moved = np.clip(x - gradient * width**2 / whole, program.lower, program.upper)
+    # how much the objective's linear model could still fall inside the box
+    still = float(np.abs(gradient * (moved - x)).max(initial=0.0)) / whole
+    violations = [still]
+    for limit, price in zip(program.limits, duals.prices, strict=True):
+        room = limit.maximum - limit.function.value(x)
+        violations += [max(-room, 0.0) / (abs(limit.maximum) or 1.0), abs(price * room) / whole]
+    return max(violations)
+
+
+def _conflict(program: ConvexProgram, problem: Problem) -> tuple[str, ...]:
+    """Limits that no stiffness within the bounds meets together."""
+    from laufruhe.solvers.mounts.cones import solve_cones
+
+    def excluded(kept: Sequence[Limit]) -> bool:
+        limits = tuple(limit for limit in program.limits if problem.limits[limit.source] in kept)
+        return solve_cones(replace(program, terms=(), limits=limits)) is None
+
+    return smallest_conflict(problem.limits, excluded)

@@ -1,0 +1,248 @@
+"""Mounts, and unbalances with them, from many starts; the best judged by the exact model."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem import channels
+from laufruhe.problem.decision import domains_of
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided
+from laufruhe.prove.certificate import Reach, gap_of
+from laufruhe.prove.mounts.subdivision import divided_bound
+from laufruhe.prove.mounts.transmitted import transmitted_bound
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, none_within
+from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
+from laufruhe.solvers.mounts.bounds import divided_by
+from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
+from laufruhe.solvers.mounts.search import Found, MountSearch, judged_at
+from laufruhe.solvers.mounts.starts import columns_of, unbalances_of
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
+from laufruhe.solvers.smooth.program import SmoothProgram
+
+WORTH_SAYING = 1.01
+
+
+def solve_mounts(problem: Problem, workers: int | None = None, among: bool = False) -> Result:
+    """Convex where all that is asked is, else from many starts in `workers` processes; `among` others or alone."""
+    return solve_convex_mounts(problem) if is_convex(problem) else solve_joint(problem, workers, among)
+
+
+def solve_joint(problem: Problem, workers: int | None = None, among: bool = False) -> Result:
+    """The best local optimum that many starts find (E20-E24).
+
+    Parameters
+    ----------
+    problem
+        On elastic mounts; `search.starts` points are started from.
+    workers
+        Processes; as many as processors when left out.
+    among
+        Whether it is one of several, whose bounds come once the best of all is known.
+
+    Raises
+    ------
+    SolverError
+        If a process of the solver dies.
+    """
+    return _solved(problem, workers, None, None, among)[0]
+
+
+def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tuple[Result, Candidate]:
+    """As `solve_joint`, with throws that may leave the star of the problem; and where they were moved to (E36).
+
+    Parameters
+    ----------
+    problem
+        Of the star.
+    moves
+        What may move.
+    even
+        Result of the star itself, to start from first.
+    """
+    first = None
+    if even is not None and even.decisions:
+        found = {decision.name: decision.value for decision in even.decisions}
+        domains = domains_of(problem.unbalances)
+        mounts = [found[decision.name] for decision in problem.mount_decisions]
+        first = mounts, columns_of(domains, unbalances_of(problem, even))
+    # throws that move are in no bound
+    result, turns = _solved(problem, None, moves, first, True)
+    return result, moves.candidate(turns)
+
+
+def _solved(
+    problem: Problem,
+    workers: int | None,
+    moves: ThrowMoves | None,
+    first: tuple[list[float], Array] | None,
+    among: bool,
+) -> tuple[Result, Array]:
+    """Result, and deviations of the throws."""
+    started = time.perf_counter()
+    initial = evaluate_start(problem)
+    search = MountSearch(problem, initial, workers, moves, first)
+    modelled = time.perf_counter()
+    search.run()
+    divided = divided_by(problem, search, among)
+    timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
+    found = search.chosen
+    if found is None or found.design.excess > KEPT:
+        return _none(problem, search, initial, divided, timing), search.turns
+    proven = _rebalanced(found.design)
+    design = found.design if proven is None or proven[0].value >= found.design.value else proven[0]
+    return _result(search, initial, replace(found, design=design), proven, divided, timing), search.turns
+
+
+def _mounts(design: Design) -> list[float]:
+    pairs = zip(design.problem.decisions, design.values, strict=True)
+    return [value.real for decision, value in pairs if not decision.is_affine]
+
+
+def _rebalanced(design: Design) -> tuple[Design, float] | None:
+    """Unbalances decided anew on the mounts found, with proof; None where that is not convex."""
+    problem = design.problem
+    if not problem.unbalances or not problem.load_terms or problem.mount_terms:
+        return None
+    if any(limit.measure.unit == "" for limit in problem.mount_limits):
+        # transmissibility depends on what excites
+        return None
+    held = problem.design(_mounts(design), problem.mount_decisions)
+    result = solve_unbalances(replace(problem, engine=held).balance)
+    if result.certificate is None or result.status is not Status.OPTIMAL:
+        return None
+    values = unbalances_of(problem, result)
+    given, own = iter(_mounts(design)), iter(values)
+    again = judged_at(problem, [next(own) if d.is_affine else next(given) for d in problem.decisions])
+    return None if again is None or again.excess > KEPT else (again, result.certificate.gap)
+
+
+def _convex_part(problem: Problem) -> Problem | None:
+    """The problem without all that is not convex in the stiffnesses; None where more than these is open."""
+    decisions = problem.mount_decisions
+    if not decisions or not all(decision.is_stiffness for decision in decisions):
+        return None
+    terms = tuple(term for term in problem.mount_terms if term.measure.channel in CONVEX)
+    alone = replace(problem, objective=terms or (Term(Measure(channels.TOTAL_STIFFNESS)),), decisions=decisions)
+    limits = tuple(limit for limit in problem.mount_limits if is_convex(replace(alone, limits=(limit,))))
+    return replace(alone, limits=limits)
+
+
+def _proven_conflict(problem: Problem) -> tuple[str, ...]:
+    """Limits that cannot be met together, where what mounts do not touch or what is convex in them proves it."""
+    conflict = beyond_mounts(problem)
+    if conflict:
+        return conflict
+    convex = _convex_part(problem)
+    return () if convex is None else solve_convex_mounts(convex).conflict
+
+
+def _bound(problem: Problem) -> float:
+    """What no design goes under: each kind of terms alone, for none is under zero.
+
+    Mount forces by what is transmitted at least (E34), numbers of the mounts by what of them is convex (E16-E19),
+    loads of the block and masses by the unbalances alone, whatever the mounts (P4).
+    """
+    found, parts = transmitted_bound(problem), []
+    block = tuple(term for term in problem.load_terms if not term.measure.on_mounts)
+    if block:
+        limits = tuple(limit for limit in problem.load_limits if not limit.measure.on_mounts)
+        alone = replace(off_resonance(problem).balance, objective=block, limits=limits)
+        if alone.decisions:
+            parts.append(solve_unbalances(alone))
+        else:
+            found += objective_value(alone, evaluate(alone))
+    convex = _convex_part(problem)
+    if convex is not None and set(convex.objective) <= set(problem.objective):
+        parts.append(solve_convex_mounts(convex))
+    return found + sum(part.certificate.lower_bound for part in parts if part.certificate is not None)
+
+
+def _result(
+    search: MountSearch,
+    initial: Evaluation,
+    found: Found,
+    proven: tuple[Design, float] | None,
+    divided: Divided,
+    timing: dict[str, float],
+) -> Result:
+    problem, design, optimum = search.problem, found.design, found.optimum
+    nothing = nothing_of(problem, design.evaluation.engine)
+    bound = divided.bound
+    # throws that move are not in the bound
+    if search.moves is None and gap_of(design.value, bound, nothing) > problem.tolerance:
+        bound = max(bound, _bound(problem))
+    shown = Shown(
+        bound=bound,
+        reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
+        kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
+        method=_method(search.optima, max(design.value, nothing), proven, divided),
+        prices=found.joint.prices(optimum) if optimum is not None else {},
+    )
+    return concluded(design, initial, shown, timing)
+
+
+def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, float] | None, divided: Divided) -> str:
+    starts, usable = (sum(o.starts for o in some) for some in (optima, [o for o in optima if o.usable]))
+    apart = distinct(optima, scale)
+    text = f"IPOPT from {starts} start{'s' if starts > 1 else ''}, {usable} of which ended at "
+    text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
+    if len(apart) > 1 and apart[-1].value > WORTH_SAYING * apart[0].value > 0.0:
+        text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
+    if proven is not None:
+        text += f"; balance on these mounts proven within {proven[1]:.0e}"
+    if divided.boxes:
+        text += f"; bounds of mounts looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
+    return text
+
+
+def _none(
+    problem: Problem, search: MountSearch, initial: Evaluation, divided: Divided, timing: dict[str, float]
+) -> Result:
+    """No start ended at a design within the limits: a proof where the convex limits, or all boxes, tell of none."""
+    conflict = _proven_conflict(problem)
+    if not conflict and divided.bound == math.inf:
+        conflict = _ruled_out(problem)
+    result = none_within(problem, initial, conflict, timing)
+    if conflict:
+        return result
+    nearest = min(search.optima, key=lambda o: o.violation)
+    names = _broken(search.joint, nearest)
+    message = (
+        f"no design found: from {sum(o.starts for o in search.optima)} starts none meets {names or 'the limits'} "
+        f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
+    )
+    return replace(result, status=Status.FAILED, message=message)
+
+
+def _ruled_out(problem: Problem) -> tuple[str, ...]:
+    """Limits that no box keeps together, each needed for that."""
+    kept = problem.limits
+    for limit in problem.limits:
+        fewer = tuple(other for other in kept if other is not limit)
+        if fewer and divided_bound(replace(problem, limits=fewer), math.inf, math.inf).bound == math.inf:
+            kept = fewer
+    return tuple(limit.name for limit in kept)
+
+
+def _broken(joint: SmoothProgram, optimum: LocalOptimum) -> str:
+    program = joint.program
+    g = optimum.constraints
+    if len(g) != len(program.constraint_names):
+        return ""
+    miss = np.maximum(program.constraint_lower - g, g - program.constraint_upper)
+    names = [program.constraint_names[k] for k in np.flatnonzero(miss > 1e-6)]
+    return " and ".join(f"'{name}'" for name in dict.fromkeys(names) if name != "modes")

@@ -1,0 +1,253 @@
+"""A search for mounts, and unbalances and throws with them: from many starts, every end judged by the exact model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.budget import passed, rounds
+from laufruhe.numerics.progress import tell
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.solvers.conclusion import FEASIBLE, Design, given_design, judged
+from laufruhe.solvers.mounts.starts import start_points
+from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, is_explored
+from laufruhe.solvers.smooth.nonlinear import solve_nonlinear
+from laufruhe.solvers.smooth.program import SmoothProgram
+
+SLACK = 1e-5
+# share by which two designs are worth the same
+SAME = 1e-6
+MOST_MARGINS = 3
+# excess over a limit that is more than a peak between the samples
+NEAR = 0.05
+ITERATIONS = 150
+MOST_AROUND = 3
+# share of the size that a search counted in from which it is done again in a smaller one, and how often
+SMALL = 1e-2
+MOST_SIZES = 3
+SPREAD = 0.4
+# of the throws that a search starts from, about their star [rad]
+NUDGE = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A design, and the end of the search that it stands at; none where it was only looked at.
+
+    Attributes
+    ----------
+    joint
+        The program that the end is of.
+    """
+
+    design: Design
+    joint: SmoothProgram
+    optimum: LocalOptimum | None = None
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """By what breaks limits least, then by what is least."""
+        return max(self.design.excess, SLACK), self.design.value
+
+
+class MountSearch:
+    """What was found so far.
+
+    Parameters
+    ----------
+    problem
+        With one star and one firing order.
+    initial
+        The design as given, which is looked at as well.
+    workers
+        Processes; as many as processors when left out.
+    moves
+        Throws that may leave the star of the problem.
+    first
+        Mounts and columns to start from before all others.
+
+    Attributes
+    ----------
+    best
+        None where no end of the search has loads.
+    optima
+        Where all starts ended.
+    """
+
+    def __init__(
+        self, problem: Problem, initial: Evaluation, workers: int | None = None, moves: ThrowMoves | None = None,
+        first: tuple[list[float], Array] | None = None,
+    ) -> None:  # fmt: skip
+        self.problem, self.moves, self._workers = problem, moves, workers
+        tell("starts of the mounts")
+        self._points, self._size = start_points(problem)
+        self._points = self._points if first is None else [first, *self._points[1:]]
+        tell("smooth program of all that is open")
+        self.joint = SmoothProgram(problem, self._size, moves=moves)
+        self._given = given_design(problem, initial) if moves is None else None
+        self.best: Found | None = None
+        self._near: list[Found] = []
+        self.optima: tuple[LocalOptimum, ...] = ()
+
+    def run(self) -> None:
+        """From all starts, and again in a smaller size where that of the starts hid what was found."""
+        nothing = nothing_of(self.problem)
+        self._search(self._points)
+        for _ in rounds(MOST_SIZES):
+            if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= nothing:
+                break
+            # a search ends at a share of the size that it counts in
+            self._size = max(self.best.design.value, nothing)
+            self.joint = SmoothProgram(self.problem, self._size, moves=self.moves)
+            self._search([_point(self.best), *self._points[1:]])
+        self._tighten()
+
+    def again(self, places: Sequence[Array]) -> bool:
+        """From other mounts, with the unbalances found; whether a better design came of it.
+
+        The mounts themselves are judged too, where nothing else is open: a search may leave a good start.
+        """
+        before = self.best
+        columns = self._points[0][1] if before is None or before.optimum is None else _point(before)[1]
+        for place in places:
+            alone = None if self.problem.unbalances else judged_at(self.problem, place.tolist())
+            # what passes a limit by a rounding is no better for it
+            if alone is not None and alone.excess <= 0.0:
+                self._keep(Found(alone, self.joint))
+        starts = [self.joint.start(place.tolist(), columns) for place in places]
+        self._take(solve_nonlinear(self.joint.program, starts, self._workers, ITERATIONS))
+        self._tighten()
+        return self.best is not None and (before is None or self.best.rank < before.rank)
+
+    @property
+    def chosen(self) -> Found | None:
+        """The best of all, the design as given included; it has the prices of an end that is worth the same."""
+        best, given = self.best, self._given
+        if given is None or (best is not None and best.rank <= Found(given, self.joint).rank):
+            return best
+        same = best is not None and best.rank[1] <= given.value * (1.0 + SAME) and best.design.excess <= SLACK
+        return Found(given, self.joint, best.optimum if best is not None and same else None)
+
+    @property
+    def turns(self) -> Array:
+        """Deviations of the throws of the best design."""
+        optimum = self.best.optimum if self.best is not None else None
+        return self.joint.turns(np.zeros(self.joint.program.x.numel()) if optimum is None else optimum.x)
+
+    def _search(self, points: Sequence[tuple[list[float], Array]]) -> None:
+        """From the points, and from others drawn around the best ends."""
+        problem, joint = self.problem, self.joint
+        generator = np.random.default_rng(problem.search.seed)
+        starts = [
+            joint.start(mounts, columns, self._nudged(generator, k)) for k, (mounts, columns) in enumerate(points)
+        ]
+        optima = solve_nonlinear(joint.program, starts, self._workers, ITERATIONS, enough=self._is_explored)
+        around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
+        if around and len(points) > 1 and not self._is_explored(optima) and not passed():
+            decisions = problem.mount_decisions
+            low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+            again = []
+            for k in range(max(len(points) // 2, 1)):
+                x = around[k % len(around)].x
+                found, columns = _decided(joint, x)
+                mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
+                again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
+            more = solve_nonlinear(joint.program, again, self._workers, ITERATIONS)
+            optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
+        self._take(optima)
+
+    def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
+        return is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12))
+
+    def _take(self, optima: Sequence[LocalOptimum]) -> None:
+        """Judge where starts ended; whatever the solver says of an end, the exact model tells."""
+        self.optima += tuple(optima)
+        for k, optimum in enumerate(optima):
+            kept = self.best is not None and self.best.design.excess <= SLACK
+            tell("ends judged", k, len(optima), self.best.design.value if self.best is not None and kept else np.inf)
+            design = self._judged(optimum, self.joint)
+            if design is not None:
+                found = Found(design, self.joint, optimum)
+                self._keep(found)
+                if FEASIBLE < design.excess <= NEAR:
+                    self._near.append(found)
+
+    def _keep(self, found: Found) -> None:
+        if self.best is None or found.rank < self.best.rank:
+            self.best = found
+
+    def _judged(self, optimum: LocalOptimum, joint: SmoothProgram) -> Design | None:
+        if not np.all(np.isfinite(optimum.x)):
+            return None
+        mounts, unbalances = (iter(part) for part in joint.split(optimum.x))
+        try:
+            problem = joint.designed(optimum.x)
+        except ModelError:
+            # throws where a search was left may not fire in their order
+            return None
+        values: list[Value] = [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions]
+        return judged_at(problem, values)
+
+    def _nudged(self, generator: np.random.Generator, k: int) -> Array:
+        """Throws to start from: on their star first, then beside it, for its own mirror image may be a saddle."""
+        if self.moves is None or k == 0:
+            return self.joint.turns(np.zeros(self.joint.program.x.numel()))
+        nudge = NUDGE * generator.normal(size=self.moves.size)
+        return np.clip(nudge, self.moves.lower, self.moves.upper)
+
+    def _tighten(self) -> None:
+        """Again with limits a little tighter, from ends that promise more: a peak between the samples breaks them."""
+        worth = sorted(self._near, key=lambda found: found.design.value)
+        self._near = []
+        for near in [found for k, found in enumerate(worth) if k == 0 or _is_other(found, worth[k - 1])][:MOST_AROUND]:
+            best = self.best
+            if best is None or best.design.excess > FEASIBLE or near.design.value < best.design.value:
+                self._tightened(near)
+
+    def _tightened(self, near: Found) -> None:
+        margin = 0.0
+        for _ in rounds(MOST_MARGINS):
+            if near.optimum is None or not FEASIBLE < near.design.excess <= NEAR:
+                break
+            margin += 1.001 * near.design.excess
+            joint = SmoothProgram(self.problem, self._size, margin, self.moves)
+            ends = solve_nonlinear(joint.program, [near.optimum.x], workers=1)
+            design = self._judged(ends[0], joint) if ends else None
+            if design is None:
+                break
+            near = Found(design, joint, ends[0])
+            self._keep(near)
+
+
+def _is_other(found: Found, other: Found) -> bool:
+    """Whether two ends are worth different amounts."""
+    return abs(found.design.value - other.design.value) > 1e-3 * abs(other.design.value)
+
+
+def _decided(joint: SmoothProgram, x: Array) -> tuple[Array, Array]:
+    """Mounts and columns of the unbalances."""
+    mounts, _ = joint.split(x)
+    return np.array(mounts), x[len(mounts) : len(mounts) + joint.columns]
+
+
+def _point(found: Found) -> tuple[list[float], Array]:
+    """Mounts and columns that an end of a search stands at."""
+    assert found.optimum is not None
+    mounts, columns = _decided(found.joint, found.optimum.x)
+    return mounts.tolist(), columns
+
+
+def judged_at(problem: Problem, values: Sequence[Value]) -> Design | None:
+    """A design by the exact model; none on a resonance that nothing damps."""
+    try:
+        return judged(problem, values)
+    except ModelError:
+        return None

@@ -1,0 +1,268 @@
+"""Stars decided together with mounts and balance (E35).
+
+Even stars are finitely many. On the mounts as given each one's balance is a cone
+program, whose dual rows bound every other star (S14): that ranks them. The best of the
+ranking then have mounts and balance decided together, each as a problem of its own. The
+ranking chooses what is looked at and proves nothing of the joint problem, so the result
+says how many stars were left out. Where firing may be uneven, throws then leave the
+best of these stars, as further variables of the same smooth program (E36).
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from functools import partial
+from typing import TypeAlias
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.norms import RMS
+from laufruhe.numerics.progress import tell, within
+from laufruhe.numerics.workers import in_turn
+from laufruhe.problem import channels
+from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.phasing import Candidate, Method
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
+from laufruhe.solvers.conclusion import no_star, with_star
+from laufruhe.solvers.mounts.bounds import bounded_under
+from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.answers import MOST_LISTED
+from laufruhe.solvers.stars.cuts import search_designs
+from laufruhe.solvers.stars.design import StarDesign
+from laufruhe.solvers.stars.families import Family, families_of
+from laufruhe.solvers.stars.ranking import RankedStar, ranked_star, ranking_result, told_orders
+from laufruhe.solvers.throws.starts import firing_intervals, none_fires, starts_of
+
+MOST_SEARCHED = 3
+FEWER_STARTS = 4
+SHORTEST_SEARCH = 4
+
+
+Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
+"""A star with a set of shafts, and its steps where it fires evenly."""
+
+
+def _rank(design: StarDesign) -> tuple[bool, float]:
+    """Designs within their limits first, the least objective first."""
+    met = design.result.status in (Status.OPTIMAL, Status.FEASIBLE)
+    return not met, design.value
+
+
+def _least(found: list[StarDesign]) -> float:
+    """Objective of the best design that keeps the limits; infinite where there is none."""
+    return min((value for broken, value in map(_rank, found) if not broken), default=math.inf)
+
+
+def solve_star_mounts(problem: Problem) -> Result:
+    """The best of the stars, each with mounts and balance decided together (E35).
+
+    Parameters
+    ----------
+    problem
+        On elastic mounts, with throws, firing order or optional shafts open.
+
+    Raises
+    ------
+    ModelError
+        If there are too many stars to list.
+    SolverError
+        If a solver stops without an answer.
+    """
+    phasing = problem.phasing
+    if phasing is None:
+        raise ValueError("nothing of the phasing is open")
+    started = time.perf_counter()
+    ranking, count = _stars(problem, phasing)
+    stars = [(replace(star, firing_order=order.order), steps) for star, steps in ranking
+             for order in told_orders(problem, phasing, star, steps)]  # fmt: skip
+    designs = count - len(ranking) + len(stars)
+    ranked = time.perf_counter()
+    found = _solved_shortly(problem, phasing, stars)
+    found = _bounded(_solved_fully(problem, found), phasing, designs)
+    if phasing.continuous:
+        found = sorted([*found, *_moved(problem, phasing, found)], key=_rank)
+    timing = {"rank": ranked - started, "solve": time.perf_counter() - ranked}
+    return replace(_result(problem, phasing, found, designs), timing=timing)
+
+
+def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
+    """Stars by their rank on the mounts as given, as many as are to be ranked; and how many there are."""
+    if phasing.throws is not None:
+        star = Candidate(phasing.throws, None, *phasing.least_geometry)
+        sets = phasing.shafts.allowed
+        return [(replace(star, left_out=phasing.without(built)), None) for built in sets], len(sets)
+    if phasing.throw_bounds is not None:
+        return [], 0
+    families, _ = families_of(phasing)
+    if sum(family.size for family in families) > MOST_LISTED:
+        raise ModelError(f"more than {MOST_LISTED} stars are open together with mounts; fix the firing order")
+    on_given = replace(phasing, realise=lambda candidate: _on_given_mounts(phasing.realise(candidate)))
+    many = phasing.method is Method.ENUMERATION
+    scored: list[tuple[float, Star]] = []
+    designs = 0
+    for family in families:
+        own, count = _ranked(problem, on_given, family, 10**9 if many else phasing.best)
+        scored, designs = scored + own, designs + count
+    scored.sort(key=lambda pair: pair[0])
+    return [star for _, star in scored][: designs if many else phasing.best], designs
+
+
+def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> tuple[list[tuple[float, Star]], int]:
+    """Stars of one geometry with their least objective on the mounts as given (S15)."""
+    model = family.model(phasing)
+    given = model.problem
+    found = search_designs(
+        model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, nothing_of(given)
+    )
+    stars: list[tuple[float, Star]] = [
+        (s.value, (family.candidate(phasing, s.star, phasing.without(s.built)), s.star)) for s in found.solved
+    ]
+    return stars, found.designs
+
+
+def _on_given_mounts(problem: Problem) -> Problem:
+    """What ranks stars: the objective, or else the RMS mount force, under the limits on masses alone."""
+    terms = problem.load_terms or (Term(Measure(channels.MOUNT_FORCE, RMS)),)
+    masses = tuple(limit for limit in problem.limits if limit.measure.is_mass)
+    return replace(problem.balance, objective=terms, limits=masses)
+
+
+def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts: int) -> Problem:
+    """The joint problem of one star, nothing of its phasing open any more."""
+    own = phasing.realise(candidate)
+    search = replace(problem.search, starts=starts)
+    return replace(own, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=search)
+
+
+def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> list[StarDesign]:
+    """Every star and firing order with a quarter of the starts, the best first."""
+    starts = problem.search.starts
+    few = starts if len(stars) == 1 else min(starts, max(SHORTEST_SEARCH, starts // FEWER_STARTS))
+    problems = [_problem_of(problem, phasing, candidate, few) for candidate, _ in stars]
+    # stars side by side, and the starts of each in one process
+    work = partial(solve_mounts, workers=1 if len(stars) > 1 else None, among=True)
+    with limited(phasing.time_limit):
+        results = in_turn(work, problems, "stars on their mounts")
+    found = [StarDesign(star, result, steps) for (star, steps), result in zip(stars, results, strict=False)]
+    return sorted(found, key=_rank)
+
+
+def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]:
+    """The best few again with all starts; the better of both answers is kept."""
+    out = list(found)
+    starts = problem.search.starts
+    for k, each in enumerate(() if passed() else found[:MOST_SEARCHED]):
+        own = each.result.problem
+        # what is proven to be no better than the best needs no more starts
+        if own.search.starts >= starts or each.bound >= found[0].value * (1.0 - problem.tolerance):
+            continue
+        whole = min(len(found), MOST_SEARCHED)
+        tell("best stars once more", k, whole, value=_least(out))
+        more = replace(own, search=replace(own.search, starts=starts))
+        with within(f"best star {k + 1} of {whole}"):
+            again = replace(each, result=solve_mounts(more, among=True))
+        out[k] = min(again, each, key=_rank)
+    return sorted(out, key=_rank)
+
+
+def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[StarDesign]:
+    """With what is proven of every star's mounts, designs worse than the best of all stars left out (E54)."""
+    least = _least(found)
+    if len(found) < designs or phasing.continuous or not 0.0 < least < math.inf:
+        return found
+    pieces = [(k, each.result) for k, each in enumerate(found)]
+    out = list(found)
+    for k, result in in_turn(partial(_bounded_one, value=least), pieces, "bounds of stars on their mounts"):
+        out[k] = replace(out[k], result=result)
+    return out
+
+
+def _bounded_one(piece: tuple[int, Result], value: float) -> tuple[int, Result]:
+    """Of a star, and which it is."""
+    number, result = piece
+    return number, bounded_under(result, value)
+
+
+def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[StarDesign]:
+    """Designs whose throws have left the best stars, or the middle of their own bounds (E36)."""
+    starts: list[tuple[Candidate, Result | None]] = [
+        (each.candidate, each.result) for each in found[:MOST_SEARCHED] if not _rank(each)[0]
+    ]
+    starts = starts or [(start, None) for start in starts_of(phasing, None)[:MOST_SEARCHED]]
+    out: list[StarDesign] = []
+    for k, (candidate, even) in enumerate(() if found and passed() else starts):
+        tell("throws that leave their star", k, len(starts), value=_least([*found, *out]))
+        own = _problem_of(problem, phasing, candidate, problem.search.starts)
+        moves = ThrowMoves(phasing, phasing.layout_of(candidate), candidate, phasing.intervals)
+        result, moved = solve_moved(own, moves, even)
+        if result.objective is not None and not phasing.intervals.holds(firing_intervals(phasing, moved)):
+            continue
+        out.append(StarDesign(moved, result, moved=True))
+    return out
+
+
+def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs: int) -> Result:
+    given = evaluate(problem)
+    if not found:
+        why, proven = none_fires(phasing)
+        return no_star(problem, why, Status.INFEASIBLE if proven else Status.FAILED)
+    best = found[0]
+    if _rank(best)[0]:
+        return _none(problem, found, given, designs)
+    whole = len(found) == designs and not phasing.continuous
+    ranking = [_entry(phasing, each, whole and each is best) for each in found if not _rank(each)[0]]
+    details = ranking_result(phasing, best.candidate, ranking, designs, len(found), _method(found, designs))
+    certificate = _certificate(
+        found, whole, details.method, nothing_of(problem, best.result.final.engine), problem.tolerance
+    )
+    return with_star(problem, phasing, best.result, best.candidate, certificate, details)
+
+
+def _certificate(
+    found: list[StarDesign], whole: bool, method: str, nothing: float, tolerance: float
+) -> Certificate | None:  # fmt: skip
+    """By the least of the bounds of all stars; by zero where some were left out."""
+    own = [each.result.certificate for each in found]
+    best = own[0]
+    if best is None:
+        return None
+    bounds = [c.lower_bound for c in own if c is not None]
+    bound = min(bounds) if whole and len(bounds) == len(own) else 0.0
+    text = f"{method}; of the best: {best.method}"
+    return certified(found[0].value, bound, nothing, tolerance, Reach.NEAR, best.kkt_residual, text)
+
+
+def _method(found: list[StarDesign], designs: int) -> str:
+    moved = sum(each.moved for each in found)
+    even = len(found) - moved
+    text = f"mounts and balance decided for each of {even} star(s)" if even else "mounts, balance and throws decided"
+    if even and designs > even:
+        text += f", the best of {designs} on the mounts as given"
+    return f"{text}; throws moved from {moved} start(s)" if moved else text
+
+
+def _entry(phasing: Phasing, found: StarDesign, proven: bool) -> RankedStar:
+    certificate = found.result.certificate
+    bound = certificate.lower_bound if certificate is not None else 0.0
+    proven = proven and certificate is not None and certificate.kind is Proof.GLOBAL
+    only = phasing if found.steps else replace(phasing, firing_order=found.candidate.firing_order)
+    return ranked_star(only, found.candidate, found.steps, found.value, bound, proven)
+
+
+def _none(problem: Problem, found: list[StarDesign], given: Evaluation, designs: int) -> Result:
+    """No star led to a design: infeasible only if that is proven of every star there is."""
+    proven = len(found) == designs and all(f.result.status is Status.INFEASIBLE for f in found)
+    first = found[0].result
+    status = Status.INFEASIBLE if proven else Status.FAILED
+    message = f"{first.message} (best of {len(found)} of {designs} star(s))"
+    return replace(
+        first, problem=problem, status=status, objective=None, certificate=None, initial=given, final=given,
+        message=message, conflict=first.conflict if proven else (),
+    )  # fmt: skip

@@ -1,0 +1,130 @@
+"""Where a search of mounts starts: points spread over all bounds, those that promise most first."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.budget import in_time, left, limited
+from laufruhe.problem.decision import Domain, domains_of
+from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
+from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.solvers.cones.unbalances import solve_unbalances
+from laufruhe.solvers.result import Result
+
+# starts at most for each open number, and candidates for each start: so many cost about as much as its search
+STARTS = 4
+POOL = 16
+# of unbalances to start from
+ROUGHLY = 1e-2
+# share of the time that is left for looking at points to start from
+LOOKING = 0.25
+POOL_SAMPLES, POOL_ORDERS = 72, 18
+
+
+def spread_starts(lower: Array, upper: Array, count: int, seed: int = 0) -> Array:
+    """Starts that divide the range of every variable evenly (a Latin hypercube), shape (count, n)."""
+    generator = np.random.default_rng(seed)
+    cells = np.array([generator.permutation(count) for _ in lower]).T.reshape(count, len(lower))
+    return lower + (cells + generator.random(cells.shape)) / count * (upper - lower)
+
+
+def _balanced(problem: Problem) -> list[complex] | None:
+    """Unbalances that are best on the mounts as given, where that is convex."""
+    if not problem.unbalances or not problem.load_terms:
+        return None
+    result = solve_unbalances(replace(off_resonance(problem).balance, tolerance=max(problem.tolerance, ROUGHLY)))
+    return unbalances_of(problem, result) if result.decisions else None
+
+
+def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], float]:
+    """Mounts and columns of unbalances that a search starts from, and a size of the objective.
+
+    The design as given, then points spread over all bounds: stiffness by ratio,
+    unbalances in their sets. The size is the least of all that were looked at, so that no
+    start on a flank of a resonance hides what is small beside it; never zero.
+    """
+    domains, balanced, search = domains_of(problem.unbalances), _balanced(problem), problem.search
+    decisions = problem.mount_decisions
+    starts = min(search.starts, STARTS * (len(decisions) + sum(domain.width for domain in domains)))
+    ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
+    low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+    given = np.array([d.start_number for d in decisions])
+    low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
+    wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
+    spread = spread_starts(
+        np.concatenate([low_log, -wide]),
+        np.concatenate([high_log, wide]),
+        POOL * (starts + 1),
+        search.seed,
+    )
+    best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
+    initial = evaluate_start(problem)
+    # on a resonance a search has nowhere to go
+    found = [] if initial.resonance else [(given.tolist(), best)]
+    spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
+    spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
+    with limited(LOOKING * left()):
+        rows, size = _promising(problem, initial, spread, len(low), starts - len(found))
+    for k, row in enumerate(rows):
+        mounts = row[: len(low)]
+        own = row[len(low) :].copy()
+        for domain in domains:
+            own[domain.columns] = domain.project(own)
+        found.append((mounts.tolist(), own if k % 2 else best))
+    return found, size
+
+
+def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, wanted: int) -> tuple[Array, float]:
+    """Points of the pool that break limits least and are worth most; a third taken as they come.
+
+    With them the least objective of the pool and of the design as given.
+    """
+    # higher orders hardly move a block, and take most of the time
+    loads = tuple(replace(each, wrench=each.wrench.series.kept(POOL_ORDERS)) for each in initial.loads)
+    given = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
+    # unbalances are still to be decided, and may keep a limit on loads
+    limits = problem.mount_limits if problem.unbalances else problem.limits
+    misses, values = np.full(len(pool), np.inf), np.full(len(pool), np.inf)
+    for k, row in in_time(enumerate(pool)):
+        try:
+            design = remounted(given, problem.design(row[:count].tolist(), problem.mount_decisions))
+        except ModelError:
+            continue
+        misses[k] = sum(max(design.standing(limit).excess, 0.0) for limit in limits)
+        values[k] = objective_value(problem, design)
+    known = values[np.isfinite(values)]
+    middle = float(np.median(known)) if len(known) else 0.0
+    best = np.argsort(misses + values / (middle or 1.0), kind="stable")
+    chosen = list(best[: wanted - wanted // 3])
+    chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
+    given_value = math.inf if initial.resonance else objective_value(problem, initial)
+    least = min((float(v) for v in (*known, given_value) if 0.0 < v < math.inf), default=1.0)
+    return pool[chosen], least
+
+
+def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
+    """Decision vector of complex unbalances, each brought into its set."""
+    out = np.zeros(sum(domain.width for domain in domains))
+    for domain, value in zip(domains, values, strict=True):
+        out[domain.columns] = domain.columns_of(value)
+        out[domain.columns] = domain.project(out)
+    return out
+
+
+def unbalances_of(problem: Problem, result: Result) -> list[complex]:
+    """Complex decisions from the sizes and angles of a result."""
+    found = {decision.name: decision.value for decision in result.decisions}
+    values = []
+    for decision in problem.unbalances:
+        angle = found.get(decision.name.rsplit(".", 1)[0] + ".angle", decision.set.angles[0])
+        values.append(cmath.rect(found[decision.name], angle))
+    return values

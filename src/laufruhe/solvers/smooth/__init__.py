@@ -1,0 +1,1 @@
+"""Smooth nonlinear programs and the local searches that use them."""

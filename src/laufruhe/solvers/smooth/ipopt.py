@@ -1,0 +1,187 @@
+"""IPOPT from given points, its ends judged by derivatives taken anew (N2)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.budget import in_time, left, passed
+from laufruhe.numerics.progress import tell, telling
+from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
+
+# seconds that a start has where time is over
+SHORTEST = 0.5
+# programs that are kept built
+_BUILT = 4
+_QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False, "calc_lam_p": False}
+_OPTIONS = {
+    "print_level": 0,
+    "sb": "yes",
+    "tol": 1e-10,
+    "acceptable_tol": 1e-7,
+    "mu_strategy": "adaptive",
+    "bound_relax_factor": 1e-10,
+}
+
+_ENDINGS = {
+    "Solve_Succeeded": Ending.CONVERGED,
+    "Feasible_Point_Found": Ending.CONVERGED,
+    "Solved_To_Acceptable_Level": Ending.ACCEPTABLE,
+    "Search_Direction_Becomes_Too_Small": Ending.ACCEPTABLE,
+    "Infeasible_Problem_Detected": Ending.INFEASIBLE,
+    "Restoration_Failed": Ending.INFEASIBLE,
+    "Maximum_Iterations_Exceeded": Ending.UNFINISHED,
+    "User_Requested_Stop": Ending.UNFINISHED,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A program in a form that another process can read."""
+
+    oracle: str
+    lower: Array
+    upper: Array
+    constraint_lower: Array
+    constraint_upper: Array
+    scales: Array
+    objective_scale: float
+    constraint_scales: Array
+    stages: tuple[tuple[float, ...], ...]
+    max_iterations: int
+    max_seconds: float
+    expand: bool
+
+
+def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
+    """Optima from some points of a program, with their numbers."""
+    task, points = share
+    if not points:
+        return []
+    tell("derivatives of the smooth program")
+    built = _built(task.oracle, task.expand, task.max_iterations)
+    return [_from_start(task, built, k, point) for k, point in in_time(telling("starts", points))]
+
+
+class _Clock(ca.Callback):
+    """Asked by IPOPT after every iteration whether time is over; a limit of its own would be built into the program."""
+
+    def __init__(self, sizes: dict[str, int]) -> None:
+        ca.Callback.__init__(self)
+        self._sizes, self._until = sizes, math.inf
+        self.construct("clock", {})
+
+    def start(self, seconds: float) -> None:
+        """So much time from now on."""
+        self._until = time.monotonic() + seconds
+
+    def get_n_in(self) -> int:
+        """As many as IPOPT tells."""
+        return int(ca.nlpsol_n_out())
+
+    def get_n_out(self) -> int:
+        """One number: not zero ends the search."""
+        return 1
+
+    def get_sparsity_in(self, k: int) -> Any:
+        """Shape of what IPOPT tells."""
+        return ca.Sparsity.dense(self._sizes[ca.nlpsol_out(k)], 1)
+
+    def eval(self, _: Any) -> list[float]:
+        """Whether time is over."""
+        return [float(time.monotonic() > self._until)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Program:
+    """The solver of a program, its clock, and the derivatives of the judge's own making."""
+
+    solver: Any
+    clock: _Clock
+    slopes: Any
+
+
+@lru_cache(maxsize=_BUILT)
+def _built(oracle: str, expand: bool, max_iterations: int) -> _Program:
+    """A program that can be solved: to build it costs as much as some starts."""
+    function = ca.Function.deserialize(oracle)
+    if expand:
+        function = function.expand()
+    n, m = function.size1_in("x"), function.size1_out("g")
+    clock = _Clock({"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": function.size1_in("p")})
+    options: dict[str, Any] = {**_QUIET, "ipopt": {**_OPTIONS, "max_iter": max_iterations}, "iteration_callback": clock}
+    slopes = function.factory("slopes", ["x", "p"], ["f", "g", "grad:f:x", "jac:g:x"])
+    return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, slopes)
+
+
+def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptimum:
+    began = time.perf_counter()
+    y, iterations, ending = point / task.scales, 0, Ending.FAILED
+    sides = {"lbx": task.lower, "ubx": task.upper, "lbg": task.constraint_lower, "ubg": task.constraint_upper}
+    m = b = np.zeros(0)
+    for number, stage in enumerate(task.stages):
+        if number and passed():
+            ending = Ending.UNFINISHED
+            break
+        built.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
+        found = built.solver(x0=y, p=list(stage), **sides)
+        stats = built.solver.stats()
+        iterations += int(stats["iter_count"])
+        ending = _ENDINGS.get(stats["return_status"], Ending.FAILED)
+        y = np.clip(_flat(found["x"]), task.lower, task.upper)
+        m, b = _flat(found["lam_g"]), _flat(found["lam_x"])
+        if ending in (Ending.FAILED, Ending.INFEASIBLE):
+            break
+    f, g, gradient, jacobian = built.slopes(y, list(task.stages[-1]))
+    with np.errstate(invalid="ignore"):
+        # of a point without numbers nothing is a number, and that is all that is asked of it
+        residual, violation = _judged(task, y, _flat(g), _flat(gradient), np.asarray(jacobian, dtype=float), m, b)
+    if not np.isfinite(residual) or not np.isfinite(float(f)):
+        ending, residual, violation = Ending.FAILED, np.inf, np.inf
+    return LocalOptimum(
+        x=y * task.scales,
+        value=float(f) * task.objective_scale,
+        constraints=_flat(g) * task.constraint_scales,
+        multipliers=m * task.objective_scale / task.constraint_scales,
+        kkt_residual=residual,
+        violation=violation,
+        iterations=iterations,
+        seconds=time.perf_counter() - began,
+        ending=ending,
+        start=k,
+    )
+
+
+def _flat(value: Any) -> Array:
+    return np.array(value, dtype=float).reshape(-1)
+
+
+def _judged(
+    task: Task, y: Array, g: Array, gradient: Array, jacobian: Array, m: Array, b: Array
+) -> tuple[float, float]:
+    """KKT residual and violation of the limits (N2), everything of size one."""
+    balance = gradient + jacobian.T @ m + b
+    reach = max(1.0, float((np.abs(gradient) + np.abs(jacobian).T @ np.abs(m) + np.abs(b)).max(initial=0.0)))
+    violation = max(_outside(g, task.constraint_lower, task.constraint_upper), _outside(y, task.lower, task.upper))
+    slack = max(_slack(m, g, task.constraint_lower, task.constraint_upper), _slack(b, y, task.lower, task.upper))
+    return max(float(np.abs(balance).max(initial=0.0)) / reach, violation, slack / reach), violation
+
+
+def _outside(value: Array, lower: Array, upper: Array) -> float:
+    return float(np.maximum(lower - value, value - upper).max(initial=0.0))
+
+
+def _slack(multiplier: Array, value: Array, lower: Array, upper: Array) -> float:
+    """Largest multiplier times distance from the side that it speaks of."""
+    size = np.abs(multiplier)
+    distance = np.abs(np.where(multiplier > 0.0, upper - value, value - lower))
+    # a side at infinity can carry nothing: its multiplier itself is the violation
+    return float((size * np.where(np.isfinite(distance), distance, 1.0)).max(initial=0.0))

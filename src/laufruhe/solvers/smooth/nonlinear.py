@@ -1,0 +1,245 @@
+"""Smooth nonlinear programs with exact derivatives: CasADi and IPOPT from many starts (N1-N4).
+
+What is solved, in units that make every variable and function of size one:
+
+    least f(x, p)  with  l <= x <= u,  gl <= g(x, p) <= gu                              (N1)
+
+IPOPT proposes points and multipliers. They are judged here, by derivatives taken anew:
+with multipliers m of g and b of the bounds, positive where an upper side holds,
+
+    grad f + J' m + b = 0,   m and b zero where no side is reached                       (N2)
+
+and the largest violation of these and of the limits, each over its own scale, is the
+KKT residual of a `LocalOptimum`. A length |v| has no gradient at v = 0, where a balanced
+engine lies, so it is replaced by
+
+    |v|_e = sqrt(|v|^2 + e^2) - e,    |v| - e <= |v|_e <= |v|                             (N3)
+
+with e a parameter p that falls from stage to stage (N4), each stage started at the
+optimum of the one before: smooth, convex where |v| is, exactly zero at zero, and never more
+than the last e from the truth.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
+
+import casadi as ca
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.budget import passed
+from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, each, executor_for
+from laufruhe.solvers.smooth.ipopt import Task, run
+from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
+
+Enough: TypeAlias = Callable[[Sequence[LocalOptimum]], bool]
+Several: TypeAlias = Callable[[tuple[Task, Sequence[tuple[int, Array]]]], list[LocalOptimum]]
+
+WORTH_EXPANDING = 3
+# starts of one round
+ROUND = 6
+# share of the value, or of this share of its scale, and of every variable's scale, within which two ends are the same
+SAME_END, LEAST_SCALE, SAME_PLACE = 1e-7, 1e-3, 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearProgram:
+    """A smooth program in CasADi symbols (N1).
+
+    Attributes
+    ----------
+    x
+        Column of variables, SX or MX, shape (n,).
+    objective
+        Scalar expression.
+    lower, upper
+        Bounds of the variables, shape (n,).
+    names
+        Of the variables.
+    constraints
+        Column of expressions, shape (m,).
+    constraint_lower, constraint_upper
+        Sides of the constraints, shape (m,); infinite where there is none.
+    constraint_names
+        As a report prints them.
+    scales
+        Typical sizes of the variables; the width of their bounds when left out.
+    objective_scale, constraint_scales
+        Typical sizes of objective and constraints.
+    parameters, stages
+        Symbols and their values, one row a stage (N4).
+    expand
+        Whether the expressions may be written out as scalars where several starts share
+        the cost: three times as fast to evaluate, and slower to set up.
+    """
+
+    x: Any
+    objective: Any
+    lower: Array
+    upper: Array
+    names: tuple[str, ...] = ()
+    constraints: Any = None
+    constraint_lower: Array = field(default_factory=lambda: np.zeros(0))
+    constraint_upper: Array = field(default_factory=lambda: np.zeros(0))
+    constraint_names: tuple[str, ...] = ()
+    scales: Array | None = None
+    objective_scale: float = 1.0
+    constraint_scales: Array | None = None
+    parameters: Any = None
+    stages: tuple[tuple[float, ...], ...] = ((),)
+    expand: bool = False
+
+    def __post_init__(self) -> None:
+        n, m = self.x.numel(), 0 if self.constraints is None else self.constraints.numel()
+        if len(self.lower) != n or len(self.upper) != n:
+            raise ValueError(f"{n} variables need as many bounds")
+        if len(self.constraint_lower) != m or len(self.constraint_upper) != m:
+            raise ValueError(f"{m} constraints need as many sides")
+        if np.any(self.lower > self.upper) or np.any(self.constraint_lower > self.constraint_upper):
+            raise ValueError("a lower side lies above its upper one")
+
+    @property
+    def variable_scales(self) -> Array:
+        """Typical sizes of the variables, none of them zero."""
+        if self.scales is not None:
+            return self.scales
+        width = self.upper - self.lower
+        return np.where(np.isfinite(width) & (width > 0.0), width, 1.0)
+
+
+def solve_nonlinear(
+    program: NonlinearProgram,
+    starts: Sequence[Array] | Array,
+    workers: int | None = None,
+    max_iterations: int = 500,
+    max_seconds: float = 60.0,
+    enough: Enough | None = None,
+) -> tuple[LocalOptimum, ...]:
+    """Local optima that the starts lead to, the best usable one first.
+
+    A search of many starts, which `enough` may end, takes all through the first stage; of those that end there at one
+    point, one goes on. Else each goes through all stages: from one point a solver may come to several optima.
+
+    Parameters
+    ----------
+    program
+        What is to be least, and under what.
+    starts
+        Points, each of shape (n,); those outside the bounds are brought in.
+    workers
+        Workers at most; as many as processors when left out, and none where the work is over sooner.
+    max_iterations, max_seconds
+        Of every start and stage.
+    enough
+        Whether the ends of the first stage so far tell all; all starts are tried when left out.
+
+    Raises
+    ------
+    SolverError
+        Where workers die again and again.
+    """
+    points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
+    task = _task(program, max_iterations, max_seconds, len(points) >= WORTH_EXPANDING)
+    with ExitStack() as stack:
+        if enough is None:
+            optima = _first_ends(task, points, workers, None, stack)[0]
+        else:
+            first = replace(task, stages=task.stages[:1])
+            found, several = _first_ends(first, points, workers, enough, stack)
+            optima = _polished(task, _grouped(found, task), several)
+    return tuple(sorted(optima, key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
+
+
+def _first_ends(
+    task: Task, points: Sequence[tuple[int, Array]], workers: int | None, enough: Enough | None, stack: ExitStack
+) -> tuple[list[LocalOptimum], Several]:
+    """Where starts end, and who looked for that."""
+    # one start tells whether the others are worth processes of their own
+    began = time.perf_counter()
+    found, rest = run((task, points[:1])), points[1:]
+    count = min(len(rest), workers if workers is not None else count_of())
+    spent = sum(o.seconds for o in found)
+    pays = spent * len(rest) > WORTH_PROCESSES + (time.perf_counter() - began - spent)
+    several: Several = _Shared(stack, count) if count > 1 and pays else run
+    while rest and not passed() and not (enough is not None and enough(_grouped(found, task))):
+        some, rest = (rest[:ROUND], rest[ROUND:]) if enough is not None else (rest, [])
+        found += several((task, some))
+    return found, several
+
+
+class _Shared:
+    """Workers that share starts: to set the program up costs as much as a start, so each has its own share of all."""
+
+    def __init__(self, stack: ExitStack, count: int) -> None:
+        self._count, self._executor = count, stack.enter_context(executor_for(count))
+
+    def __call__(self, share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
+        """As `run`."""
+        task, points = share
+        shares = [(task, points[k :: self._count]) for k in range(min(self._count, len(points)))]
+        with closing(each(run, shares, self._executor, patient=True)) as answers:
+            return sorted((optimum for _, some in answers for optimum in some), key=lambda o: o.start)
+
+
+def _grouped(found: Sequence[LocalOptimum], task: Task) -> list[LocalOptimum]:
+    """One of those that end at one point, which tells how many they are; every one that ends at none."""
+    groups: list[LocalOptimum] = []
+    for end in sorted((o for o in found if o.usable), key=lambda o: (o.value, o.start)):
+        number = next((k for k, known in enumerate(groups) if _is_same(end, known, task)), None)
+        if number is None:
+            groups.append(end)
+        else:
+            known = groups[number]
+            groups[number] = replace(known, start=min(known.start, end.start), starts=known.starts + end.starts)
+    return [*groups, *(o for o in found if not o.usable)]
+
+
+def _is_same(end: LocalOptimum, known: LocalOptimum, task: Task) -> bool:
+    near = SAME_END * max(abs(known.value), LEAST_SCALE * task.objective_scale)
+    return end.value - known.value <= near and bool(np.all(np.abs(end.x - known.x) <= SAME_PLACE * task.scales))
+
+
+def _polished(task: Task, groups: Sequence[LocalOptimum], several: Several) -> list[LocalOptimum]:
+    """Through the other stages; where time is over, an end stays where it is."""
+    if len(task.stages) < 2:
+        return list(groups)
+    if passed():
+        return [replace(end, ending=Ending.UNFINISHED) if end.usable else end for end in groups]
+    least = min((end.value for end in groups if end.usable), default=math.inf)
+    # what is not there yet and worse than what is goes no further
+    left = [end for end in groups if end.ending not in (Ending.FAILED, Ending.INFEASIBLE)
+            and (end.usable or end.value < least)]  # fmt: skip
+    later = {o.start: o for o in several((replace(task, stages=task.stages[1:]), [(o.start, o.x) for o in left]))}
+    found = []
+    for end in groups:
+        own = later.get(end.start)
+        if own is None:
+            found.append(replace(end, ending=Ending.UNFINISHED) if end.usable else end)
+        else:
+            spent = (end.iterations + own.iterations, end.seconds + own.seconds)
+            found.append(replace(own, starts=end.starts, iterations=spent[0], seconds=spent[1]))
+    return found
+
+
+def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, many: bool) -> Task:
+    symbol = type(program.x)
+    scales = program.variable_scales
+    constraints = symbol(0, 1) if program.constraints is None else program.constraints
+    heights = np.ones(constraints.numel()) if program.constraint_scales is None else program.constraint_scales
+    parameters = symbol(0, 1) if program.parameters is None else program.parameters
+    y = symbol.sym("y", program.x.numel())
+    f, g = ca.substitute(
+        [program.objective / program.objective_scale, constraints / ca.DM(heights)], [program.x], [y * ca.DM(scales)]
+    )
+    oracle = ca.Function("oracle", {"x": y, "p": parameters, "f": f, "g": g}, ["x", "p"], ["f", "g"])
+    return Task(
+        oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower / heights,
+        program.constraint_upper / heights, scales, program.objective_scale, heights, program.stages,
+        max_iterations, max_seconds, program.expand and many,
+    )  # fmt: skip

@@ -1,0 +1,323 @@
+"""Mounts, unbalances and throws together as one smooth program (E20-E24, S20).
+
+Variables are the open numbers of the mounts, the columns of the unbalances, deviations of
+the throws from a star, and where modes are asked for the modes themselves, held to be
+modes by
+
+    V' V = 1,    V' A V = diag(l)                                                       (E21)
+
+so that a natural frequency or a share of energy is an explicit, smooth expression. A
+largest value is a variable that no sample exceeds (E22); a mean of lengths is softened
+(N3); a band without natural frequencies is (l - a)(l - b) >= 0 (E23).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.affine import AffineModel
+from laufruhe.load_models.mount_loads import FixedThrows, Loads, MovedThrows
+from laufruhe.load_models.mount_rows import PointResponse, sampled_rows, transmitted
+from laufruhe.load_models.mount_symbols import elimination, response, symbolic_mounts
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.load_models.uneven_model import UnevenModel, rides_of
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.numerics.norms import Grid, softened_lengths
+from laufruhe.physics.modes import weight_wrench
+from laufruhe.physics.mount_numbers import AxisResidual, mass_root
+from laufruhe.physics.rigid_body import moved_wrench
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import domains_of
+from laufruhe.problem.measure import Limit, Measure, Side
+from laufruhe.problem.mount_resonance import off_resonance
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.smooth.cases import StaticCases
+from laufruhe.solvers.smooth.gathered import Gathered
+from laufruhe.solvers.smooth.local_optimum import LocalOptimum
+from laufruhe.solvers.smooth.modes import ModeVariables
+from laufruhe.solvers.smooth.nonlinear import NonlinearProgram
+
+SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
+# bounds of a stiffness that are further apart leave a start no place between them
+WIDE = 100.0
+# orders that a complaint names
+MOST_NAMED = 6
+SIDES = ("at least", "at most")
+# a typical deviation of a throw [rad]
+TURN = 0.1
+
+
+class SmoothProgram:
+    """The program of a problem, and the way between its variables and the problem's decisions.
+
+    Parameters
+    ----------
+    problem
+        With one star and one firing order.
+    unit
+        Size of the objective.
+    margin
+        Share by which limits on loads are tightened, for they are kept at few samples.
+    moves
+        Throws that may leave the star of the problem; none when left out.
+    slack
+        Share by which all limits are tightened.
+    softest
+        Share of the objective that norms are softened by in the last stage (N4).
+    """
+
+    def __init__(
+        self, problem: Problem, unit: float, margin: float = 0.0, moves: ThrowMoves | None = None,
+        slack: float = 0.0, softest: float = SOFTEST,
+    ) -> None:  # fmt: skip
+        self.problem, self._margin, self._slack, self.moves = problem, margin, slack, moves
+        self._softest = softest
+        self.domains = domains_of(problem.unbalances)
+        self._decisions = problem.mount_decisions
+        self._count = len(self._decisions)
+        self.columns = sum(domain.width for domain in self.domains)
+        self._by_ratio = np.array([d.is_stiffness and d.upper > WIDE * d.lower > 0.0 for d in self._decisions], bool)
+        self._v, self._u = ca.MX.sym("mounts", self._count), ca.MX.sym("unbalances", self.columns)
+        numbers = [ca.exp(self._v[k]) if wide else self._v[k] for k, wide in enumerate(self._by_ratio)]
+        self._d = ca.vertcat(*numbers) if numbers else self._v
+        self._t = ca.MX.sym("throws", 0 if moves is None else moves.size)
+        self._loads = self._loads_of(moves)
+        self._e = ca.MX.sym("softness")
+        self._held = Gathered()
+        self._modes = ModeVariables(problem, self._held)
+        self.unit = unit
+        self._points: list[PointResponse] = []
+        if problem.asks_mounts:
+            self._mounting = mounting_in(problem.engine)
+            self._root = mass_root(self._mounting.block)
+            self._mounts = symbolic_mounts(problem, self._mounting.block, self._d)
+            self._cases = StaticCases(self._mounts, self._mounting, self._root, self._held)
+            self._points = self._responses()
+            self._modes.hold(self._mounts.stiffness, self._root, self._mounting)
+        self.program = self._built()
+
+    def _loads_of(self, moves: ThrowMoves | None) -> Loads:
+        if moves is None:
+            # loads and unbalances alone are taken from it, whatever the mounts
+            return FixedThrows(self.problem, AffineModel(off_resonance(self.problem)), self._u)
+        model = UnevenModel(self.problem, moves.layout, rides_of(moves.phasing, moves.start))
+        return MovedThrows(self.problem, moves, model, self._t, self._u)
+
+    def _built(self) -> NonlinearProgram:
+        least = ca.MX(0.0)
+        for term in self.problem.objective:
+            least += term.weight * self._least(term.measure)
+        for limit in self.problem.limits:
+            self._limit(limit)
+        self._hold_unbalances()
+        if self.moves is not None:
+            rows, names = self.moves.firing(self._t)
+            for row, name in zip(rows, names, strict=True):
+                self._held.add(row, self.moves.intervals.least, self.moves.intervals.most, name)
+        tops = ca.vertcat(*(top for top, _ in self._held.heads)) if self._held.heads else ca.MX(0, 1)
+        lower, upper = self._bounds()
+        constraints = ca.vertcat(*self._held.expressions) if self._held.expressions else None
+        return NonlinearProgram(
+            ca.vertcat(self._v, self._u, self._t, self._modes.symbols, tops),
+            least,
+            lower,
+            upper,
+            names=tuple(decision.name for decision in self._decisions),
+            constraints=constraints,
+            constraint_lower=np.array(self._held.lower),
+            constraint_upper=np.array(self._held.upper),
+            constraint_names=tuple(self._held.names),
+            scales=self._scales(lower, upper),
+            objective_scale=self.unit,
+            parameters=self._e,
+            stages=tuple((share,) for share in (*SOFTNESS, self._softest)),
+            expand=True,
+        )
+
+    def _bounds(self) -> tuple[Array, Array]:
+        low = self._inner([d.lower for d in self._decisions]).tolist()
+        high = self._inner([d.upper for d in self._decisions]).tolist()
+        for domain in self.domains:
+            most = domain.set.upper
+            low += [domain.set.lower] if domain.width == 1 else [-most, -most]
+            high += [most] * domain.width
+        if self.moves is not None:
+            low += self.moves.lower.tolist()
+            high += self.moves.upper.tolist()
+        modes = self._modes.symbols.numel()
+        free = np.full(modes + len(self._held.floors), np.inf)
+        below = -free
+        below[modes:] = self._held.floors
+        return np.concatenate([low, below]), np.concatenate([high, free])
+
+    def _scales(self, lower: Array, upper: Array) -> Array:
+        width = upper - lower
+        scales = np.where(np.isfinite(width) & (width > 0.0), width, 1.0)
+        scales[self._turned] = TURN
+        return scales
+
+    @property
+    def _turned(self) -> slice:
+        first = self._count + self.columns
+        return slice(first, first + self._t.numel())
+
+    # loads
+
+    def _responses(self) -> list[PointResponse]:
+        """Response to the orders that matter (E4)."""
+        moved = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
+        return [
+            PointResponse(point.name, point.weight, w.period, w.orders,
+                   response(self._mounts, w.orders * point.speed, w.real, w.imaginary))
+            for point, w in zip(self.problem.points, self._loads.wrenches(moved), strict=True)
+        ]  # fmt: skip
+
+    def _rows(self, measure: Measure) -> tuple[Any, Grid]:
+        if measure.on_mounts and self._points:
+            names = [mount.name for mount in self.problem.engine.mounts]
+            return sampled_rows(self._points, names, measure)
+        return self._loads.rows(measure)
+
+    def _least(self, measure: Measure) -> Any:
+        """A measure to be minimised, softened by a share of the objective (N3)."""
+        if measure.is_mounting:
+            return self._mount_number(measure)
+        rows, grid = self._rows(measure)
+        return measure.norm.least(self._held.named(measure.name), grid, rows, self.unit, self._e)
+
+    def _limit(self, limit: Limit) -> None:
+        measure = limit.measure
+        if measure.is_mounting:
+            self._limit_mounts(limit)
+            return
+        tight = 1.0 - self._slack - self._margin
+        rows, grid = self._rows(measure)
+        unit = limit.maximum * tight or self.unit
+        held = self._held.named(limit.name)
+        value, most, slope = measure.norm.limited(held, grid, rows / unit, limit.maximum * tight / unit, self._softest)
+        self._held.add(value, -np.inf, most, limit.name, most=((limit, "at most"), slope / unit))
+
+    def _hold_unbalances(self) -> None:
+        """Discs and sectors of the unbalances (P4)."""
+        for domain in self.domains:
+            if domain.width == 1:
+                continue
+            own = self._u[domain.columns]
+            self._held.add(ca.sumsqr(own) / domain.scale**2, -np.inf, 1.0, domain.decision.name)
+            for sign, (x, y) in zip((1.0, -1.0), domain.set.edges, strict=False):
+                self._held.add(sign * (x * own[1] - y * own[0]) / domain.scale, 0.0, np.inf, domain.decision.name)
+
+    # mounts and modes
+
+    def _mount_number(self, quantity: Measure) -> Any:
+        """A number of mounts and modes, where it is one expression."""
+        mounts = self._mounts
+        if quantity.channel is channels.SAG:
+            weight = weight_wrench(self._mounting.block)
+            load = ca.DM(self._root @ weight)
+            settled, _ = elimination()(mounts.stiffness, ca.MX(6, 6), load, ca.DM.zeros(6))
+            return ca.dot(load, settled) / -weight[2]
+        if quantity.channel.of_axis is not None:
+            return self._residual(quantity.channel.of_axis(self._mounting.block, quantity.frequency))
+        if quantity.channel.of_cases is not None:
+            return self._cases.largest(quantity, self.problem.engine)
+        if quantity.channel is channels.DECOUPLING_SHORTFALL:
+            return self._modes.shortfall(quantity)
+        if quantity.channel is channels.TOTAL_STIFFNESS:
+            numbers = self.problem.numbers([self._d[k] for k in range(self._count)], self._decisions)
+            rows = numbers.mounts or [list(mount.stiffness) for mount in self._mounting.mounts]
+            return sum((k for row in rows for k in row[:3]), ca.MX(0.0))
+        pairs = transmitted(self._points, quantity)
+        if not pairs:
+            felt = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
+            there = ", ".join(f"{order:g}" for order in felt[:MOST_NAMED]) or "none"
+            raise ModelError(f"{quantity.name} is zero for every design; name an order that it has: {there}")
+        ratios = [ca.sqrt(force / firm) for force, firm in pairs]
+        top = self._held.named(quantity.name).head(ca.mmax(ca.vertcat(*ratios)))
+        for force, firm in pairs:
+            self._held.add(force / firm - top * top, -np.inf, 0.0, quantity.name)
+        return top
+
+    def _residual(self, axis: AxisResidual) -> Any:
+        """Of turning about the torque-roll axis, in what the mounts as given answer to it; the best square is known."""
+        given = axis.answer(self._root @ self._mounting.stiffness @ self._root.T)
+        unit = float(np.linalg.norm(given)) or 1.0
+        answer, mass = ca.DM(axis.left) @ self._mounts.stiffness @ ca.DM(axis.right), ca.DM(axis.mass)
+        best = ca.fmax(ca.dot(mass, answer) / ca.dot(mass, mass), axis.least)
+        rows = answer - (ca.fmin(best, axis.most) if axis.most < math.inf else best) * mass
+        return unit * softened_lengths(rows.T / unit, self._e)
+
+    def _limit_mounts(self, limit: Limit) -> None:
+        quantity = limit.measure
+        if self._modes.limit(limit):
+            return
+        if quantity.channel is channels.TRANSMISSIBILITY:
+            most = limit.maximum
+            for force, firm in transmitted(self._points, quantity):
+                self._held.add(ca.sqrt(force / firm), -np.inf, most, limit.name, most=((limit, "at most"), 1.0))
+        else:
+            unit = (limit.maximum if limit.maximum < math.inf else limit.minimum) or 1.0
+            low, high = limit.minimum / unit, limit.maximum / unit
+            slopes = (((limit, side), 1.0 / unit) for side in SIDES)
+            self._held.add(self._mount_number(quantity) / unit, low, high, limit.name, *slopes)
+
+    # between variables and decisions
+
+    def prices(self, optimum: LocalOptimum) -> dict[Side, float]:
+        """Fall of the objective per unit by which each side of a limit is relaxed."""
+        found: dict[Side, float] = defaultdict(float)
+        for (least, most), m in zip(self._held.slopes, optimum.multipliers, strict=True):
+            for held, own in ((least, max(-m, 0.0)), (most, max(m, 0.0))):
+                if held is not None:
+                    found[held[0]] += float(held[1] * own)
+        first, symbols = self._turned.stop, self._modes.symbols.numel()
+        return found | self._modes.prices(optimum.x[first : first + symbols], optimum.multipliers)
+
+    def _inner(self, mounts: Sequence[float]) -> Array:
+        """Decisions about mounts as the program has them: by ratio where bounds lie far apart."""
+        values = np.asarray(mounts, dtype=float)
+        return np.where(self._by_ratio, np.log(np.where(self._by_ratio, values, 1.0)), values)
+
+    def split(self, x: Array) -> tuple[list[float], list[complex]]:
+        """Decisions about mounts and about unbalances."""
+        inner = x[: self._count]
+        outer = np.where(self._by_ratio, np.exp(np.where(self._by_ratio, inner, 0.0)), inner)
+        mounts = [float(np.clip(v, d.lower, d.upper)) for v, d in zip(outer, self._decisions, strict=True)]
+        columns = x[self._count : self._count + self.columns].copy()
+        for domain in self.domains:
+            columns[domain.columns] = domain.project(columns)
+        return mounts, [domain.complex_value(columns) for domain in self.domains]
+
+    def turns(self, x: Array) -> Array:
+        """Deviations of the throws from their star [rad]."""
+        return np.asarray(x[self._turned])
+
+    def designed(self, x: Array) -> Problem:
+        """The problem with its throws where they were moved to."""
+        if self.moves is None:
+            return self.problem
+        given = self.problem
+        own = self.moves.phasing.realise(self.moves.candidate(self.turns(x)))
+        return replace(own, phasing=None, tolerance=given.tolerance, fidelity=given.fidelity, search=given.search)
+
+    def start(self, mounts: Sequence[float], columns: Array, turns: Array | None = None) -> Array:
+        """Variables at given decisions: modes and largest values follow from them."""
+        turns = np.zeros(self._t.numel()) if turns is None else turns
+        parts: list[Array] = [self._inner(mounts), columns, turns]
+        if self._modes.asked:
+            parts += self._modes.start(mounting_in(self.problem.design(list(mounts), self._decisions)))
+        if self._held.heads:
+            given = [self._v, self._u, self._t]
+            values = ca.Function("tops", given, [ca.vertcat(*(value for _, value in self._held.heads))])
+            parts.append(1.05 * np.asarray(values(self._inner(mounts), columns, turns), dtype=float).reshape(-1))
+        return np.concatenate(parts)

@@ -1,0 +1,1 @@
+"""Stars, firing orders and shafts, with everything else at its own optimum."""

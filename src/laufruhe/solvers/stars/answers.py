@@ -1,0 +1,211 @@
+"""Which solver decides the discrete part, and what it proved (S18)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
+from laufruhe.load_models.pair_tables import PairObjective
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.phasing import Candidate, Method
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import gap_of
+from laufruhe.solvers.stars.cuts import CutsFound, search_designs
+from laufruhe.solvers.stars.families import Family, FiringFamily
+from laufruhe.solvers.stars.firing_search import MOST_SLOTS, enumerate_orders
+from laufruhe.solvers.stars.program import owners_of, solve_design
+from laufruhe.solvers.stars.ranking import RankedStar, ranked_star
+from laufruhe.solvers.stars.search import StarsFound, enumerate_stars, search_stars
+
+MOST_LISTED = 1_000_000
+# looking at every star is as quick as a search up to here
+FEW_STARS = 60_000
+PROGRAM_SAMPLES = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Decided:
+    """A design that a search returned, before it is evaluated anew."""
+
+    family: Family
+    steps: tuple[int, ...]
+    built: tuple[int, ...]
+    candidate: Candidate
+    value: float
+    bound: float
+    proven: bool
+
+    def ranked(self, phasing: Phasing) -> RankedStar:
+        """Its entry of a ranking."""
+        told = self.family.told(phasing, self.candidate)
+        return ranked_star(told, self.candidate, self.steps, self.value, self.bound, self.proven)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Designs, best first, and what no design goes under."""
+
+    designs: tuple[Decided, ...]
+    bound: float
+    complete: bool
+    looked_at: int
+    method: str
+    infeasible: int = 0
+
+
+def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """The best designs of all even stars, by whatever suits objective and size (S18)."""
+    if any(isinstance(family, FiringFamily) for family in families):
+        return _by_orders(problem, phasing, families)
+    simple = [(family, own) for family in families if (own := _amplitudes(phasing, family)) is not None]
+    if len(simple) < len(families) or any(family.fixed for family in families):
+        return _by_designs(problem, phasing, families)
+    if phasing.method is Method.PROGRAM:
+        return _by_program(problem, phasing, families)
+    answers = []
+    for family, own in simple:
+        space = replace(family.space, mirror=True, reflect=True)
+        few = phasing.method is Method.AUTO and space.size <= FEW_STARS
+        if few or phasing.method is Method.ENUMERATION:
+            found = enumerate_stars(space, own, phasing.best)
+            answers.append(_stars_answer(phasing, family, found, "every star looked at"))
+        else:
+            found = search_stars(space, own, phasing.best, phasing.time_limit)
+            answers.append(_stars_answer(phasing, family, found, "branch and bound over partial stars"))
+    return _joined(answers, phasing.best)
+
+
+def _by_orders(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """Firing orders one by one where root mean squares alone are asked, else by cone programs."""
+    (family,) = families
+    own = [measure for measure in problem.measures if not measure.channel.is_number]
+    squares = all(measure.is_load and measure.norm.is_euclidean for measure in own)
+    if not squares or problem.decisions or phasing.shafts.optional or family.fixed or phasing.method is Method.PROGRAM:
+        return _by_designs(problem, phasing, families)
+    if phasing.cylinders > MOST_SLOTS:
+        raise ModelError(f"firing orders of more than {MOST_SLOTS} cylinders are too many to examine; give throws")
+    model = family.model(phasing)
+    objective = PairObjective.of(model.at(model.samples))
+    found = enumerate_orders(objective, phasing.cylinders, phasing.best, phasing.time_limit)
+    answer = _stars_answer(phasing, family, found, "every firing order looked at, pair by pair of throws")
+    return replace(answer, infeasible=0 if answer.designs else found.nodes)
+
+
+def _amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
+    """The objective of a family by order alone, where it is of that kind (S3)."""
+    first = phasing.realise(family.candidate(phasing, family.first))
+    return amplitude_objective(first, phasing, family.layout)
+
+
+def _decided(
+    phasing: Phasing, family: Family, steps: tuple[int, ...], built: tuple[int, ...], value: float, bound: float,
+    proven: bool,
+) -> Decided:  # fmt: skip
+    candidate = family.candidate(phasing, steps, phasing.without(built))
+    return Decided(family, steps, built, candidate, value, bound, proven)
+
+
+def _stars_answer(phasing: Phasing, family: Family, found: StarsFound, method: str) -> Answer:
+    designs = tuple(
+        _decided(phasing, family, tuple(int(p) for p in star), (), float(value), float(value), found.complete)
+        for star, value in zip(found.stars, found.values, strict=True)
+    )
+    return Answer(designs, found.lower_bound, found.complete, found.nodes, method)
+
+
+def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """Everything else is decided by cone programs: cuts where the stars can be listed, else the program."""
+    if phasing.method is Method.PROGRAM or sum(family.size for family in families) > MOST_LISTED:
+        return _by_program(problem, phasing, families)
+    nothing = nothing_of(problem)
+    count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
+    answers = []
+    for family in families:
+        model = family.model(phasing)
+        found = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, nothing)
+        designs = tuple(
+            _decided(
+                phasing,
+                family,
+                s.star,
+                s.built,
+                s.value,
+                s.bound,
+                s.value <= found.beyond * (1.0 + problem.tolerance),
+            )
+            for s in found.solved
+        )
+        method = f"cone programs of {len(found.solved)} of {found.designs} designs, dual cuts for the others"
+        # what is proven of the best does not need the whole ranking
+        closed = found.complete or _is_closed(found, problem.tolerance, nothing)
+        answers.append(Answer(designs, found.lower_bound, closed, len(found.solved), method, found.infeasible))
+    return _joined(answers, phasing.best)
+
+
+def _is_closed(found: CutsFound, tolerance: float, nothing: float) -> bool:
+    return bool(found.solved) and gap_of(found.solved[0].value, found.lower_bound, nothing) <= tolerance
+
+
+def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """The mixed-integer program by SCIP, its design solved again and bounded by the exact model."""
+    from laufruhe.solvers.stars.mixed_conic import solve_program
+
+    nothing = nothing_of(problem)
+    answers = []
+    for family in families:
+        simple = _amplitudes(phasing, family) is not None
+        space = replace(family.space, mirror=simple, reflect=simple)
+        model = family.model(phasing, space)
+        exact = all(term.measure.norm.is_euclidean for term in problem.objective) and not problem.limits
+        samples = model.samples if exact else PROGRAM_SAMPLES
+        owners = owners_of(model)
+        program = solve_program(model.at(samples), space, owners, phasing.shafts, phasing.time_limit)
+        if program.status == "infeasible":
+            answers.append(Answer((), math.inf, True, 0, "SCIP"))
+            continue
+        # a program that has none yet leaves the first star, whose bound is worth as much
+        star = family.first if program.star is None else program.star
+        again = solve_design(model, star, program.built, owners, problem.tolerance, nothing)
+        if again is None:
+            answers.append(Answer((), 0.0, False, 1, "SCIP"))
+            continue
+        found, cut = again
+        bound = max(program.bound if exact else 0.0, cut.least(space))
+        done = program.status == "optimal" and gap_of(found.value, bound, nothing) <= 2.0 * problem.tolerance
+        method = f"mixed-integer cone program (SCIP: {program.status}) at {samples} angles, design solved again"
+        design = _decided(phasing, family, found.star, found.built, found.value, found.bound, done)
+        answers.append(Answer((design,), bound, done, 1, method))
+    return _joined(answers, phasing.best)
+
+
+def _joined(answers: Sequence[Answer], count: int) -> Answer:
+    """Of several geometries the best designs, equals counted once."""
+    designs = sorted((d for answer in answers for d in answer.designs), key=lambda d: d.value)
+    kept: list[Decided] = []
+    for design in designs:
+        if not any(_equal(design, other) for other in kept):
+            kept.append(design)
+        if len(kept) == count:
+            break
+    return Answer(
+        tuple(kept),
+        min(answer.bound for answer in answers),
+        all(answer.complete for answer in answers),
+        sum(answer.looked_at for answer in answers),
+        answers[0].method,
+        sum(answer.infeasible for answer in answers),
+    )
+
+
+def _equal(a: Decided, b: Decided) -> bool:
+    """Whether one star is an image of the other and is worth the same (S2)."""
+    if a.family is not b.family or a.built != b.built or abs(a.value - b.value) > 1e-6 * max(a.value, b.value):
+        return False
+    space = replace(a.family.space, mirror=True, reflect=True)
+    both = space.canonical(np.array([a.steps, b.steps], dtype=np.uint8))
+    return bool(np.all(both[0] == both[1]))

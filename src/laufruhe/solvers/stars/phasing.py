@@ -1,0 +1,267 @@
+"""Deciding stars, firing orders and shafts (S18)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.errors import ModelError, SolverError
+from laufruhe.machine.firing import MOST_ORDERS
+from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.progress import tell
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import Reach, certified, room_of
+from laufruhe.solvers.conclusion import no_star, with_star
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.answers import Answer, Decided, searched
+from laufruhe.solvers.stars.design import StarDesign, solve_fixed
+from laufruhe.solvers.stars.even_turning import floors, of_wheel, solve_told_alike
+from laufruhe.solvers.stars.families import Family, families_of
+from laufruhe.solvers.stars.program import owners_of, solve_design
+from laufruhe.solvers.stars.ranking import (
+    ORDERS_LISTED,
+    RankedOrder,
+    RankedStar,
+    ranked_orders,
+    ranked_star,
+    ranking_result,
+    told_orders,
+)
+from laufruhe.solvers.throws.starts import none_fires
+
+FINER, ROUNDS = 16, 2
+"""Times as many angles at most for a search whose own are too few to prove its best star, and how often."""
+
+
+def solve_phasing(problem: Problem) -> Result:
+    """Decide open throws, firing orders, shafts and unbalances together.
+
+    Returns
+    -------
+    Result with a ranking. Its certificate is `global` if the search ended by itself,
+    `global within gap` if time ended it, and `local` where throws left the even steps.
+
+    Raises
+    ------
+    SolverError
+        If a solver stops without an answer.
+    """
+    phasing = problem.phasing
+    if phasing is None:
+        raise SolverError("nothing of the phasing is open")
+    if phasing.continuous and any(measure.is_inside for measure in problem.measures):
+        rule = "loads inside the crankcase are decided with even firing or with throws that are given"
+        raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out")
+    wheel = of_wheel(problem)
+    if phasing.continuous and wheel:
+        rule = f"{wheel[0].name} is decided with even firing or with throws that are given"
+        raise ModelError(
+            f"{rule}; leave phasing.intervals and bounds of throws out, or ask for peak to peak stored work"
+        )
+    if phasing.throws is None and wheel:
+        return solve_told_alike(problem, phasing, solve_phasing)
+    started = time.perf_counter()
+    if phasing.throws is not None:
+        result = _of_fixed_throws(problem, phasing)
+    elif phasing.throw_bounds is not None:
+        result = _uneven(problem, phasing, None)
+    else:
+        result = _of_open_throws(problem, phasing)
+    return replace(result, timing={**result.timing, "phasing": time.perf_counter() - started})
+
+
+def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
+    is_even = phasing.intervals.holds([phasing.even_interval])
+    if problem.feels_order and is_even and phasing.shares_throws:
+        pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
+        stars = [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]
+        return _by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
+    families = families_of(phasing, problem.feels_order)[0] if is_even else ()
+    if not families and not phasing.continuous:
+        return no_star(problem, none_fires(phasing)[0])
+    if not families:
+        return _uneven(problem, phasing, None)
+    answer = searched(replace(problem, tolerance=_share(problem)), phasing, families)
+    if not answer.designs:
+        if phasing.continuous:
+            return _uneven(problem, phasing, None)
+        if answer.complete:
+            return _none(problem, answer)
+        why = f"no feasible design was found in phasing.time_limit = {phasing.time_limit:g} s; raise it"
+        return no_star(problem, why, Status.FAILED)
+    result = _best_of(problem, phasing, answer)
+    if answer.complete:
+        result = _with_more_angles(problem, families, result)
+    return _uneven(problem, phasing, result) if phasing.continuous else result
+
+
+def _with_more_angles(problem: Problem, families: Sequence[Family], result: Result) -> Result:
+    """The same search at more angles, while these are all that keeps a gap open (P7)."""
+    for _ in range(ROUNDS):
+        gap = result.certificate.gap if result.certificate else 0.0
+        if gap <= problem.tolerance or passed():
+            break
+        # averages about angles fall short of means by the square of their step
+        times = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), FINER)
+        problem = problem.at(replace(problem.fidelity, samples=times * problem.fidelity.samples))
+        assert problem.phasing is not None
+        answer = searched(replace(problem, tolerance=_share(problem)), problem.phasing, families)
+        found = _best_of(problem, problem.phasing, answer) if answer.designs else result
+        if found.certificate is None or found.certificate.gap >= gap or not answer.complete:
+            break
+        result = found
+    return result
+
+
+def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
+    """Throws as given: the best of their firing orders, and of the sets of shafts."""
+    star = Candidate(phasing.throws or (), None, *phasing.least_geometry)
+    return _by_each_order(problem, phasing, [(star, None)])
+
+
+def _by_each_order(
+    problem: Problem, phasing: Phasing, stars: Sequence[tuple[Candidate, tuple[int, ...] | None]]
+) -> Result:
+    """Every firing order that loads tell apart of every star, and every set of shafts, each solved by itself."""
+    orders = {star: ranked_orders(phasing, star, steps) for star, steps in stars}
+    if not any(orders.values()):
+        return no_star(problem, none_fires(phasing)[0])
+    # the small ones first: a shaft that buys nothing is not built
+    sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
+    told = [(star, order.order) for star, steps in stars for order in told_orders(problem, phasing, star, steps)]
+    if len(told) * len(sets) >= MOST_ORDERS:
+        many = f"{MOST_ORDERS} and more firing orders and sets of shafts are too many to decide one by one"
+        raise ModelError(f"{many}; give a firing order, or throws")
+    designs = [replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in told]
+    every, least, complete = _solved(problem, phasing, designs)
+    solved = [design for design in every if design.is_met]
+    if not solved:
+        proven = complete and all(design.result.status is not Status.FAILED for design in every)
+        why = f"no firing order and no set of shafts that may be built {'keeps' if proven else 'was found that keeps'}"
+        return no_star(problem, f"{why} the limits", Status.INFEASIBLE if proven else Status.FAILED)
+    nothing = nothing_of(problem)
+    best = solved[0]
+    for design in solved[1:]:
+        if design.value < best.value - room_of(best.value, _share(problem), nothing):
+            best = design
+    bound = min([least, *(design.bound for design in every)]) if complete else 0.0
+    count = sum(map(len, orders.values()))
+    of_stars = f" of {len(stars)} stars" if len(stars) > 1 else ""
+    method = f"{len(told)} of {count} firing order(s){of_stars}, {len(sets)} set(s) of shafts examined"
+    if len(every) < len(designs) and complete:
+        method += f", {len(designs) - len(every)} of these by one order of the torque alone"
+    proof = best.result.certificate
+    how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
+    certificate = certified(best.value, bound, nothing, problem.tolerance, Reach.WHOLE, residual, how)
+    ranking = _entries(phasing, [best, *sorted(solved, key=lambda one: one.value)], orders, bound, complete)
+    details = ranking_result(phasing, best.candidate, ranking, count * len(sets), len(solved), method)
+    return with_star(problem, phasing, best.result, best.candidate, certificate, details)
+
+
+def _entries(
+    phasing: Phasing, designs: Sequence[StarDesign], orders: Mapping[Candidate, tuple[RankedOrder, ...]], bound: float,
+    complete: bool,
+) -> list[RankedStar]:  # fmt: skip
+    """The first design of every star, its own firing order before the others of the star."""
+    firsts: dict[Candidate, StarDesign] = {}
+    for design in designs:
+        firsts.setdefault(replace(design.candidate, firing_order=None, left_out=()), design)
+    found = []
+    for star, design in [*firsts.items()][: phasing.best]:
+        entry = ranked_star(phasing, design.candidate, None, design.value, bound, complete)
+        own = next(order for order in orders[star] if order.order == design.candidate.firing_order)
+        rest = tuple(order for order in orders[star] if order != own)
+        found.append(replace(entry, firing_orders=(own, *rest)[:ORDERS_LISTED], even=own.is_even))
+    return found
+
+
+def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) -> tuple[list[StarDesign], float, bool]:
+    """Those that may be the best, the rest at its optimum; what the others are at least; whether time was enough."""
+    started = time.perf_counter()
+    found: list[StarDesign] = []
+    # those that one order of the torque says least of come first
+    lowest, broken = floors(problem, phasing, designs)
+    places, nothing = np.argsort(lowest, kind="stable"), nothing_of(problem)
+    for k, place in enumerate(places):
+        best = min((one.value for one in found), default=math.inf)
+        tell("firing orders and sets of shafts", k, len(designs), best)
+        if lowest[place] > best + room_of(best, problem.tolerance, nothing):
+            return found, float(lowest[place]), True
+        if broken[place]:
+            continue
+        if found and (passed() or time.perf_counter() - started > phasing.time_limit):
+            return found, 0.0, False
+        result = solve_fixed(replace(phasing.realise(designs[place]), tolerance=_share(problem)))
+        found.append(StarDesign(designs[place], result))
+    return found, math.inf, True
+
+
+def _share(problem: Problem) -> float:
+    """Tolerance of one design, and by how much another has to be better: both together are what was asked."""
+    return 0.5 * problem.tolerance
+
+
+def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
+    """The best even design solved once more as a problem of its own, with what was proven of all designs (S17)."""
+    entries = [d.ranked(phasing) for d in answer.designs]
+    fired = [(design, entry) for design, entry in zip(answer.designs, entries, strict=True) if entry.firing_orders]
+    if not fired:
+        return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
+    left = iter(fired)
+    for best, first in left:
+        left_out = phasing.without(_needed(problem, phasing, best))
+        candidate = replace(best.candidate, firing_order=first.firing_orders[0].order, left_out=left_out)
+        result = solve_fixed(replace(phasing.realise(candidate), tolerance=_share(problem), phasing=None))
+        # a peak may stand between the angles at which the search looks
+        if StarDesign(candidate, result).is_met:
+            break
+    else:
+        why = f"each of the {len(fired)} best star(s) breaks a limit between the angles that the search looks at"
+        return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
+    value = result.objective.value if result.objective else best.value
+    certificate = certified(
+        value, answer.bound, nothing_of(problem), problem.tolerance, Reach.WHOLE,
+        result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
+    )  # fmt: skip
+    ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]
+    count = sum(family.size for family in families_of(phasing, problem.feels_order)[0])
+    details = ranking_result(phasing, candidate, ranking, count, answer.looked_at, answer.method)
+    return with_star(problem, phasing, result, candidate, certificate, details)
+
+
+def _needed(problem: Problem, phasing: Phasing, best: Decided) -> tuple[int, ...]:
+    """The sets of shafts without which the design would be worse: the others need not be built."""
+    kept = best.built
+    if not kept:
+        return kept
+    model = best.family.model(phasing)
+    owners = owners_of(model)
+    nothing = nothing_of(problem)
+    for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
+        fewer = tuple(j for j in kept if j != k)
+        again = solve_design(model, best.steps, fewer, owners, _share(problem), nothing)
+        if again is not None and again[0].value <= best.value + room_of(best.value, _share(problem), nothing):
+            kept = fewer
+    return kept
+
+
+def _none(problem: Problem, answer: Answer) -> Result:
+    """Stars exist, but none keeps the limits: the conflict of the first one names them."""
+    result = solve_fixed(replace(problem, phasing=None)) if problem.decisions else None
+    names = result.conflict if result is not None else tuple(limit.name for limit in problem.limits)
+    shown = " and ".join(f"'{name}'" for name in names) or "the bounds"
+    why = f"no star keeps {shown}, whatever else is decided ({answer.infeasible} design(s) tried)"
+    return no_star(problem, why, conflict=names)
+
+
+def _uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
+    from laufruhe.solvers.throws.uneven import solve_uneven
+
+    with limited(phasing.time_limit):
+        return solve_uneven(problem, phasing, even)

@@ -1,0 +1,180 @@
+"""One star with one set of shafts: the cone program of everything else, and what it proves of all stars (S13, S14)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
+from laufruhe.load_models.star_model import StarModel, StarProblem
+from laufruhe.numerics.arrays import Array
+from laufruhe.prove.certificate import Multipliers, best_bound, gap_of
+from laufruhe.prove.throws.star_cut import Cut, cut_of
+from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.cones.conic import solve_cones
+
+COARSE = 48
+# times as many angles, where a limit is nearly at its edge
+FINER = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """One star with one set of shafts, everything else at its optimum.
+
+    Attributes
+    ----------
+    star
+        Steps of the throws.
+    built
+        Which sets of optional shafts are built.
+    value, bound
+        Objective of the design found, and what no design of this star goes under.
+    x
+        Decision vector, zero for shafts that are not built.
+    """
+
+    star: tuple[int, ...]
+    built: tuple[int, ...]
+    value: float
+    bound: float
+    x: Array
+
+
+def owners_of(model: StarModel) -> tuple[int, ...]:
+    """The set of optional shafts that every decision belongs to, -1 for none."""
+    shaft_of = {rotor.name: rotor.shaft.name for rotor in model.problem.engine.rotors}
+    sets = model.phasing.shafts.optional
+    out = []
+    for decision in model.problem.unbalances:
+        shaft = shaft_of[decision.rotor_drives[0].rotor]
+        out.append(next((k for k, names in enumerate(sets) if shaft in names), -1))
+    return tuple(out)
+
+
+def solve_design(
+    model: StarModel,
+    star: tuple[int, ...],
+    built: tuple[int, ...],
+    owners: Sequence[int],
+    tolerance: float,
+    nothing: float = 0.0,
+) -> tuple[Solved, Cut] | None:
+    """The optimum of one star with one set of shafts, and what it proves of all others; None if there is none."""
+    full = model.samples
+    # what bounds means that are averaged bounds the whole cycle (P7)
+    fine, sound = model.at(full), model.at(full, averaged=True)
+    kept = tuple(own < 0 or own in built for own in owners)
+    whole, averaged = _only(fine.at(star), kept), _only(sound.at(star), kept)
+    idle = [not norm.slope.any() for _, norm in whole.limits]
+    if _broken(model, star, whole, idle):
+        return None
+    if not any(kept):
+        return _fixed(sound, whole, star, built)
+    best: tuple[Solved, Multipliers] | None = None
+    for samples in _grids(full):
+        solution = solve_cones(_acting(_only(model.at(samples).at(star), kept), idle))
+        if solution.x is None:
+            # a mean at a few angles may be more than over the cycle, averages never are (P7)
+            rough = _acting(_only(model.at(samples, averaged=True).at(star), kept), idle)
+            solution = solve_cones(replace(rough, limits=tuple((m * (1.0 + KEPT), n) for m, n in rough.limits)))
+            if solution.x is None:
+                return None
+            if samples < full:
+                continue
+        judged = _acting(whole, idle)
+        bound = best_bound(_acting(averaged, idle), solution.x, solution.multipliers)
+        value, excess = judged.objective(solution.x), judged.excess(solution.x)
+        # where the angles forbid what averages allow, what is proven at the angles is too much
+        least = bound.value if excess <= FEASIBLE else min(bound.value, value)
+        found = Solved(star, built, value, least, _spread(solution.x, fine.at(star), kept))
+        best = (found, _with_idle(bound.multipliers, whole, idle))
+        # what averages fall short by, no grid of this fidelity gains
+        if excess <= FEASIBLE and gap_of(averaged.objective(solution.x), least, nothing) <= 0.25 * tolerance:
+            break
+    if best is None:
+        return None
+    found, multipliers = best
+    return found, cut_of(sound, multipliers)
+
+
+def _broken(model: StarModel, star: Sequence[int], whole: AffineProblem, idle: Sequence[bool]) -> bool:
+    """Whether a limit that nothing open acts on is broken, its mean averaged about many angles where that matters."""
+    x, over = np.zeros(whole.size), []
+    for k, (maximum, norm) in enumerate(whole.limits):
+        if idle[k] and norm.value(x) > maximum * (1.0 + FEASIBLE):
+            over.append(k)
+    if not over:
+        return False
+    finer = model.at(FINER * model.samples, averaged=True).at(star).limits
+    return any(norm.value(np.zeros(norm.slope.shape[-1])) > maximum * (1.0 + KEPT) for maximum, norm in
+               (finer[k] for k in over))  # fmt: skip
+
+
+def _acting(affine: AffineProblem, idle: Sequence[bool]) -> AffineProblem:
+    """The problem under those limits alone that something open acts on."""
+    if not any(idle):
+        return affine
+    return replace(affine, limits=tuple(limit for limit, out in zip(affine.limits, idle, strict=True) if not out))
+
+
+def _with_idle(multipliers: Multipliers, whole: AffineProblem, idle: Sequence[bool]) -> Multipliers:
+    """No price on the limits that were left out."""
+    rows = iter(multipliers.limits)
+    limits = tuple(
+        np.zeros_like(norm.constant) if out else next(rows) for (_, norm), out in zip(whole.limits, idle, strict=True)
+    )
+    return replace(multipliers, limits=limits)
+
+
+def _fixed(
+    sound: StarProblem, whole: AffineProblem, star: tuple[int, ...], built: tuple[int, ...]
+) -> tuple[Solved, Cut]:
+    """A star with nothing to decide: its rows are its proof."""
+    averaged = sound.at(star)
+    x = np.zeros(averaged.size)
+    value = whole.objective(np.zeros(whole.size))
+    terms = tuple(n.subgradient(x) for _, n in averaged.terms)
+    limits = tuple(np.zeros_like(n.constant) for _, n in averaged.limits)
+    return Solved(star, built, value, min(averaged.objective(x), value), x), cut_of(sound, Multipliers(terms, limits))
+
+
+def _grids(full: int) -> list[int]:
+    """Numbers of samples from coarse to full, each a divisor of the full number."""
+    divisors = [n for n in range(1, full + 1) if full % n == 0 and n >= min(COARSE, full)]
+    chosen = [divisors[0]]
+    for n in divisors:
+        if n >= 3 * chosen[-1] and n % chosen[-1] == 0:
+            chosen.append(n)
+    return chosen
+
+
+def _only(affine: AffineProblem, kept: Sequence[bool]) -> AffineProblem:
+    """The problem without the decisions of shafts that are not built."""
+    if all(kept):
+        return affine
+    columns = np.concatenate([np.full(d.width, keep) for d, keep in zip(affine.domains, kept, strict=True)])
+
+    def cut(norm: AffineNorm) -> AffineNorm:
+        return replace(norm, slope=norm.slope[..., columns])
+
+    domains, start = [], 0
+    for domain, keep in zip(affine.domains, kept, strict=True):
+        if keep:
+            domains.append(replace(domain, start=start))
+            start += domain.width
+    return AffineProblem(
+        tuple((w, cut(n)) for w, n in affine.terms),
+        tuple((m, cut(n)) for m, n in affine.limits),
+        tuple(domains),
+        affine.samples,
+    )
+
+
+def _spread(x: Array, affine: AffineProblem, kept: Sequence[bool]) -> Array:
+    out = np.zeros(affine.size)
+    columns = np.concatenate([np.full(d.width, keep) for d, keep in zip(affine.domains, kept, strict=True)])
+    out[columns] = x
+    return out

@@ -1,0 +1,1 @@
+"""Throws that leave the even steps."""

@@ -1,0 +1,341 @@
+"""Branch and bound over throws that leave the even steps: firing windows first, then boxes of angles (S29)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.throw_waves import ThrowWaves
+from laufruhe.load_models.uneven_model import rides_of
+from laufruhe.machine.firing_windows import FiringWindow
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.evaluation import over
+from laufruhe.problem.measure import Measure, load_rows
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.phasing import Candidate, Intervals
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.solvers.boxes.search import divided
+from laufruhe.solvers.stars.design import StarDesign
+from laufruhe.solvers.stars.ranking import ranked_orders
+from laufruhe.solvers.throws.boxes import ThrowBox, ThrowPrograms
+from laufruhe.solvers.throws.riders import Riders
+from laufruhe.solvers.throws.windows import amid, firing_of, nearest, windows_of
+
+Improve = Callable[[Candidate], StarDesign | None]
+"""The best design near a candidate, and only the allowed one."""
+
+MOST_BOXES = 300
+FEWEST_SAMPLES, MOST_SAMPLES = 96, 384
+# of the best design, that steps over the period may cost
+STEPS_COST = 1e-3
+# of the tolerance by which a design has to be better, for a box to be looked at
+SHARE = 0.5
+# windows that are tried for a crank that can be evaluated
+_MOST_REALISED = 50
+# of what steps cost, that a bound is beside the best design where more of them are taken
+_FINER = 1.5
+# boxes whose middle is tried: the first few, and one of so many
+_TRIED_FIRST, _TRIED_EACH, _MOST_TRIED = 2, 100, 5
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What boxes of throws told.
+
+    Attributes
+    ----------
+    bound
+        Of every design; infinite where none is allowed.
+    best
+        The best design, None where none was found.
+    boxes
+        How many were looked at.
+    told
+        Limits that no throws keep together, where none is allowed.
+    what
+        Was divided.
+    """
+
+    bound: float
+    best: StarDesign | None
+    boxes: int
+    told: tuple[str, ...]
+    what: str = "boxes of throws"
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A box, the steps that its bound has, and the set of shafts that it is of; all throws where it has no box."""
+
+    bound: float
+    box: ThrowBox | None = None
+    stage: _Stage | None = None
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether there is nothing left to cut."""
+        return self.box is not None and self.box.is_exact
+
+
+class _Stage:
+    """Programs at so many steps over the period, and those at twice as many.
+
+    Parameters
+    ----------
+    make
+        Programs.
+    lost
+        Of the best design, that means lose by steps (P7).
+    value
+        Of the best design.
+    left_out
+        Of the objective, by the orders left out.
+    """
+
+    def __init__(
+        self, make: Callable[[int], ThrowPrograms], samples: int, lost: Callable[[int], float], value: float,
+        left_out: float,
+    ) -> None:  # fmt: skip
+        self._make, self._samples, self._lost, self._value, self._left_out = make, samples, lost, value, left_out
+
+    @cached_property
+    def programs(self) -> ThrowPrograms:
+        """With so many steps."""
+        return self._make(self._samples)
+
+    @cached_property
+    def cost(self) -> float:
+        """Share of the best design that no bound gets back."""
+        return (self._lost(self._samples) + self._left_out) / self._value
+
+    @cached_property
+    def next(self) -> _Stage | None:
+        """With twice as many; None where these are enough."""
+        if self._lost(self._samples) <= STEPS_COST * self._value or 2 * self._samples > MOST_SAMPLES:
+            return None
+        return _Stage(self._make, 2 * self._samples, self._lost, self._value, self._left_out)
+
+    @cached_property
+    def finer(self) -> _Stage | None:
+        """The next, unless its numbers are too many to hold."""
+        if self.next is not None:
+            with suppress(ModelError):
+                _ = self.next.programs
+                return self.next
+        return None
+
+    @property
+    def last(self) -> _Stage:
+        """With the most."""
+        return self if self.next is None else self.next.last
+
+
+@dataclass(frozen=True, eq=False)
+class _Best:
+    design: StarDesign | None
+
+    @property
+    def value(self) -> float:
+        """Infinite where none was found."""
+        return math.inf if self.design is None else self.design.value
+
+
+def search_throws(
+    problem: Problem, phasing: Phasing, best: StarDesign | None, floor: float, improve: Improve
+) -> Searched | None:
+    """What no throws go under, and the best that was found on the way; None where boxes say nothing.
+
+    Parameters
+    ----------
+    best
+        The best design known.
+    floor
+        A bound that holds.
+    improve
+        Told of throws that look good.
+    """
+    if not _suits(problem, phasing):
+        return None
+    windows = windows_of(problem, phasing)
+    if windows is None:
+        return None
+    if not windows:
+        return None if best is not None else Searched(math.inf, None, 0, ())
+    try:
+        search = ThrowSearch(problem, phasing, windows, improve, best)
+    except ModelError:
+        return None
+    return found_by(search, problem, best, floor, "boxes of throws")
+
+
+def found_by(
+    search: ThrowSearch, problem: Problem, best: StarDesign | None, floor: float, what: str
+) -> Searched | None:  # fmt: skip
+    """What dividing boxes told; None where they say nothing."""
+    try:
+        for stage, _, _ in search.roots:
+            # what is too much to hold shows at once
+            _ = stage.programs
+    except ModelError:
+        # a throw alone may drive what no mount carries
+        return None
+    most = len(search.roots) + (MOST_BOXES if problem.search.boxes is None else problem.search.boxes)
+    found, bound, boxes = divided(
+        search, _Part(floor), _Best(best), nothing_of(problem), problem.tolerance + search.cost, most,
+        what,
+    )  # fmt: skip
+    return Searched(min(bound, search.cut(found.value)), found.design, boxes, search.conflict, what)
+
+
+def _suits(problem: Problem, phasing: Phasing) -> bool:
+    """Whether banks and pins are given, and waves know what is asked."""
+    if any(pair is not None and pair[0] < pair[1] for pair in (phasing.bank, phasing.split)):
+        return False
+    return knows(problem)
+
+
+def knows(problem: Problem) -> bool:
+    """Whether waves know what is asked."""
+    if problem.feels_gas and any(r.shaft.ratio != round(r.shaft.ratio) for r in problem.engine.rotors):
+        return False
+    return bool(problem.objective) and all(_is_known(problem, term.measure) for term in problem.objective)
+
+
+def _is_known(problem: Problem, measure: Measure) -> bool:
+    """Whether its orders are all there is of it: a peak of the gas has more."""
+    return not (problem.feels_gas and measure.feels_gas and measure.norm.refinement > 1)
+
+
+class ThrowSearch:
+    """Windows and boxes of the throws of a problem."""
+
+    is_shared = False
+
+    def __init__(
+        self, problem: Problem, phasing: Phasing, windows: Sequence[FiringWindow], improve: Improve,
+        best: StarDesign | None,
+    ) -> None:  # fmt: skip
+        self._problem, self._phasing, self._improve = problem, phasing, improve
+        self._seen = self._tried = 0
+        self._best, self._not_met = _Best(best), set[str]()
+        self.roots: list[tuple[_Stage, FiringWindow, tuple[str, ...]]] = []
+        free = all(decision.set.lower <= 0.0 for decision in problem.unbalances)
+        for built in phasing.shafts.largest if free else phasing.shafts.allowed:
+            left_out = phasing.without(built)
+            for make, loss, own in self._programs(windows, left_out):
+                value = best.value if best is not None and best.value > 0.0 else math.inf
+                stage = _Stage(make, FEWEST_SAMPLES, lambda samples: self._steps_cost(best, samples), value, loss)
+                self.roots += [(stage, window, left_out) for window in own]
+
+    @property
+    def cost(self) -> float:
+        """Share of the best design that no bound gets back."""
+        return max(stage.last.cost for stage in {id(stage): stage for stage, _, _ in self.roots}.values())
+
+    def _steps_cost(self, best: StarDesign | None, samples: int) -> float:
+        """Of a design's value, that means averaged about the steps lose (P7)."""
+        if best is None:
+            return 0.0
+        problem, found = best.result.problem, best.result.final
+        lost = 0.0
+        for term in problem.objective:
+            if term.measure.is_load and term.measure.norm.averages:
+                signals = over(problem.engine.cycle.base_order, found.signals(term.measure.load))
+                averaged = [signal.averaged(signal.period / samples) for signal in signals]
+                rows = load_rows(term.measure, problem.points, averaged, found.engine, 4 * samples)
+                lost += term.weight * max(found.value(term.measure) - rows.value, 0.0)
+        return lost
+
+    def _programs(
+        self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]
+    ) -> Iterator[tuple[Callable[[int], ThrowPrograms], float, Sequence[FiringWindow]]]:
+        """Programs at so many steps over the period, what their orders leave out of the objective, their windows."""
+        phasing, layout = self._phasing, self._phasing.layout(*self._phasing.least_geometry)
+        for k, window in enumerate(windows):
+            candidate = replace(self.candidate(window, amid(window)), left_out=left_out)
+            try:
+                realised = replace(phasing.realise(candidate), phasing=None)
+            except ModelError:
+                # what fires all but at once has no order
+                if k + 1 < min(len(windows), _MOST_REALISED):
+                    continue
+                raise
+            rides = rides_of(phasing, candidate)
+            riders = Riders(self.known(realised), rides, candidate.throws)
+            waves = ThrowWaves(riders.problem, layout, rides)
+            loss = sum(term.weight * waves.left_out(term.measure) for term in realised.objective)
+            yield partial(ThrowPrograms, waves, riders, firing_of(phasing)), loss, windows
+            return
+        raise ModelError("no crank fires")
+
+    @staticmethod
+    def known(problem: Problem) -> Problem:
+        """With the limits that waves know."""
+        limits = tuple(limit for limit in problem.load_limits if _is_known(problem, limit.measure))
+        return replace(problem, limits=limits)
+
+    def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
+        """A design with these throws, and with a firing order that they keep."""
+        told = tuple(float(angle) % math.tau for angle in throws)
+        found = Candidate(told, window.order or None, *self._phasing.least_geometry)
+        if window.order:
+            return found
+        orders = ranked_orders(replace(self._phasing, intervals=Intervals(0.0, math.inf)), found)
+        return replace(found, firing_order=orders[0].order if orders else None)
+
+    @property
+    def conflict(self) -> tuple[str, ...]:
+        """Limits that were not met in boxes."""
+        return tuple(limit.name for limit in self._problem.limits if limit.name in self._not_met)
+
+    def told(self, conflict: Sequence[str]) -> None:
+        """Of boxes that another divided: there is no other."""
+
+    def cut(self, value: float) -> float:
+        """What a design has to be better than."""
+        return value * (1.0 - SHARE * self._problem.tolerance)
+
+    def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | None, _Best | None]]:
+        """Windows of all throws, halves of a box."""
+        box, stage, cut = part.box, part.stage, self.cut(value)
+        if box is None or stage is None:
+            for first, window, left_out in self.roots:
+                cut = self.cut(min(value, self._best.value))
+                programs = first.programs
+                found = programs.box(programs.program(window), *window.box, part.bound, cut, is_new=True)
+                yield self._looked(first, found, left_out)
+        elif part.bound > value * (1.0 - _FINER * stage.cost) and stage.finer is not None:
+            # more steps tell more than smaller boxes
+            programs = stage.finer.programs
+            finer = programs.box(programs.program(box.program.window), box.lower, box.upper, part.bound, cut)
+            yield self._looked(stage.finer, finer, part.left_out)
+        else:
+            for half in stage.programs.parts(box, cut):
+                yield self._looked(stage, half, part.left_out)
+
+    def _looked(
+        self, stage: _Stage, found: ThrowBox | None, left_out: tuple[str, ...]
+    ) -> tuple[_Part | None, _Best | None]:
+        """A box, and a better design near its middle."""
+        self._not_met |= stage.programs.told
+        if found is None:
+            return None, None
+        self._seen += 1
+        tried = self._tried < _MOST_TRIED and (self._seen <= _TRIED_FIRST or self._seen % _TRIED_EACH == 0)
+        if tried:
+            self._tried += 1
+            window = found.program.window
+            candidate = replace(self.candidate(window, nearest(window, found.middle)), left_out=left_out)
+            improved = self._improve(candidate) if candidate.firing_order is not None else None
+            self._best = self.better(self._best, _Best(improved))
+        return _Part(found.bound, found, stage, left_out), self._best if tried else None
+
+    @staticmethod
+    def better(best: _Best, found: _Best) -> _Best:
+        """The better of two designs."""
+        return found if found.value < best.value else best

@@ -1,0 +1,1 @@
+"""Designs for engines as they are built."""

@@ -1,0 +1,150 @@
+"""Who seeks the worst engines of a design: among all errors allowed, or among engines that were drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.load_models.built_engines import BuiltEngines, evaluated, values_of
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.measure import Limit
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.prove.tolerances.error_parts import Terms
+from laufruhe.prove.tolerances.worst_case import MOST_NODES, worst_case
+
+QUICK = 1
+"""Parts of the errors that are looked at while designs still change."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The worst engines of one design.
+
+    Attributes
+    ----------
+    value
+        Objective of the worst engine found.
+    bound
+        What none exceeds.
+    errors
+        Of engines that are worst in the objective, or break a limit.
+    limits
+        What no engine exceeds of each limit.
+    excess
+        Largest relative excess over a limit.
+    divisions
+        Parts of the errors that were looked at.
+    proven
+        Whether the bounds are all that they can be.
+    """
+
+    value: float
+    bound: float
+    errors: tuple[Array, ...]
+    limits: tuple[tuple[Limit, float], ...]
+    excess: float
+    divisions: int
+    proven: bool
+
+
+class Adversary(Protocol):
+    """Seeks the worst engines of a design."""
+
+    @property
+    def samples(self) -> int:
+        """Steps over the cycle."""
+
+    def at(self, values: Sequence[Value], proven: bool) -> Found:
+        """Of a design; where it is to be proven, with a bound that is worth the time."""
+
+
+def moved_limits(problem: Problem) -> tuple[Limit, ...]:
+    """Limits that errors move: masses are those of the drawing."""
+    return tuple(limit for limit in problem.load_limits if limit.measure.is_load)
+
+
+def excess_of(limits: Sequence[tuple[Limit, float]]) -> float:
+    """Largest relative excess; negative where all have room."""
+    return max(((value - limit.maximum) / (limit.maximum or 1.0) for limit, value in limits), default=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class EveryError:
+    """All errors within the tolerances, every load affine in them (R4)."""
+
+    problem: Problem
+    samples: int
+    tolerance: float
+
+    def at(self, values: Sequence[Value], proven: bool) -> Found:
+        """By branch and bound."""
+        built = BuiltEngines(self.problem, values, self.samples)
+        columns, most = self.problem.tolerances.columns, MOST_NODES if proven else QUICK
+        found = worst_case(built.terms, columns, self.tolerance, most=most)
+        errors, limits, divisions = [found.errors], [], found.nodes
+        for limit in moved_limits(self.problem):
+            terms: Terms = ((1.0, built.norm(limit.measure)),)
+            own = worst_case(terms, columns, self.tolerance, most=most)
+            limits.append((limit, own.bound if proven else own.value))
+            divisions += own.nodes
+            if own.value > limit.maximum:
+                errors.append(own.errors)
+        return Found(found.value, found.bound, tuple(errors), tuple(limits), excess_of(limits), divisions, proven)
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnEngines:
+    """Engines that were drawn, or some of them.
+
+    Attributes
+    ----------
+    errors
+        Shape (engines, columns).
+    """
+
+    problem: Problem
+    errors: Array
+    samples: int
+    models: list[AffineModel] = field(default_factory=list)
+
+    def kept(self, which: NDArray[np.intp]) -> DrawnEngines:
+        """Some of them."""
+        models = [self.models[k] for k in which] if self.models else []
+        return DrawnEngines(self.problem, self.errors[which], self.samples, models)
+
+    def objective(self, values: Sequence[Value]) -> Array:
+        """Of every engine."""
+        return np.asarray(self._measured(values, None))
+
+    def at(self, values: Sequence[Value], proven: bool) -> Found:  # noqa: ARG002
+        """All of them, exactly."""
+        worst = self._measured(values, None)
+        errors, limits = [self.errors[int(np.argmax(worst))]], []
+        for limit in moved_limits(self.problem):
+            own = self._measured(values, limit)
+            limits.append((limit, float(own.max())))
+            if own.max() > limit.maximum:
+                errors.append(self.errors[int(np.argmax(own))])
+        value = float(worst.max())
+        return Found(value, value, tuple(errors), tuple(limits), excess_of(limits), len(self.errors), True)
+
+    def _measured(self, values: Sequence[Value], limit: Limit | None) -> Array:
+        if self.problem.tolerances.is_affine:
+            built = BuiltEngines(self.problem, values, self.samples)
+            terms: Sequence[tuple[float, AffineNorm]] = (
+                built.terms if limit is None else ((1.0, built.norm(limit.measure)),)
+            )
+            return values_of(terms, self.errors)
+        if not self.models:
+            self.models.extend(AffineModel(self.problem.built(z)) for z in self.errors)
+        found = (evaluated(model.problem, values, self.samples) for model in self.models)
+        return np.array([
+            objective_value(self.problem, each) if limit is None else each.value(limit.measure) for each in found
+        ])  # fmt: skip

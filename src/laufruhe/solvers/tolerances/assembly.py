@@ -1,0 +1,256 @@
+"""Selective assembly: which measured piston and rod goes into which cylinder, by branch and bound (R12).
+
+Loads are affine in the masses, so a norm of them is bounded below by dual rows: for any of these the best of all
+assemblies is a linear assignment, which is solved exactly. What is still free stands at a mixture of all assemblies
+that the bound is drawn to, step by step; every such assignment is an assembly too, and is tried.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.built_engines import BuiltEngines, values_of
+from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.progress import tell
+from laufruhe.problem.assembly import Lot
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.tolerance import AddedDrive, Error, PistonDrive, Tolerance, Tolerances
+from laufruhe.prove.best_first import Division, Parts, Waiting
+from laufruhe.prove.certificate import Proof, Reach, certified
+from laufruhe.prove.tolerances.error_parts import Terms
+from laufruhe.prove.tolerances.worst_case import value_at
+from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.conclusion import KEPT, limit_values
+from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.tolerances.assembly_result import AssemblyResult, Place
+from laufruhe.solvers.tolerances.result import SHARES
+
+Chosen = tuple[tuple[int, ...], ...]
+"""Of every lot the part in each cylinder."""
+
+MOST_NODES, STEPS, RANDOM = 20_000, 8, 2000
+"""Parts of all assemblies that are bounded, steps of each bound, and assemblies at random that are shown."""
+LENGTHS = np.linspace(0.0, 1.0, 9)[1:]
+PER_KILOGRAM = 0.01
+"""Mass that is added to find what a kilogram does [kg]: small beside a piston."""
+
+
+def solve_assembly(problem: Problem) -> Result:
+    """The best assembly, proven.
+
+    Raises
+    ------
+    ModelError
+        If anything else is open, or is asked that is not affine in the masses.
+    """
+    assembly = problem.assembly
+    if assembly is None:
+        raise ValueError("there are no parts to choose among")
+    _check(problem)
+    started = time.perf_counter()
+    tell("what every part adds")
+    terms, lots = _terms(problem), assembly.lots
+    search = _Search(terms, lots, len(problem.engine.slider_cranks), problem.tolerance)
+    bound = search.run()
+    tell("the best assembly, and random ones", value=search.value, bound=bound)
+    given = replace(problem, engine=assembled(problem.engine, lots, search.given))
+    best = replace(problem, engine=assembled(problem.engine, lots, search.best))
+    initial, final = evaluate(given), evaluate(best)
+    value = objective_value(problem, final)
+    certificate = certified(
+        value, bound, nothing_of(problem), problem.tolerance, Reach.WHOLE, 0.0,
+        f"branch and bound over assignments, {search.seen} parts bounded by dual rows",
+    )  # fmt: skip
+    limits = limit_values(problem, final)
+    met = final.excess(problem.limits) <= KEPT
+    status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
+    return Result(
+        problem=problem, status=status if met else Status.FAILED,
+        objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)), certificate=certificate,
+        decisions=(), limits=limits, initial=initial, final=final,
+        message="" if met else "the best assembly breaks a limit, and limits do not choose parts; relax it",
+        error_estimate=error_of(problem, final), timing={"solve": time.perf_counter() - started},
+        assembly=search.result([part.name for part in problem.engine.slider_cranks]),
+    )  # fmt: skip
+
+
+def _check(problem: Problem) -> None:
+    """Refuse what is not decided with the parts."""
+    if problem.decisions or problem.phasing is not None:
+        raise ModelError(
+            "[assembly] chooses parts of an engine that is fixed; fix what is open, or leave [assembly] out"
+        )
+    if problem.over is not None:
+        raise ModelError("[assembly] takes measured parts, [robust] unmeasured ones; leave one of them out")
+    if problem.fidelity.is_uneven:
+        raise ModelError("[assembly] takes a crank that turns evenly; leave fidelity.crank_inertia out")
+    for term in problem.objective:
+        if not term.measure.is_load or term.measure.channel.feels_inertia:
+            raise ModelError(f"[assembly] minimises loads only, not {term.measure.name}; ask for a load")
+    if not problem.objective:
+        raise ModelError("[assembly] minimises nothing; add [objective]")
+
+
+def assembled(engine: Engine, lots: Sequence[Lot], chosen: Chosen) -> Engine:
+    """An engine of these parts; what they weigh more than the mean of their lot, it weighs more than the drawing."""
+    more = np.sum([lot.differences[list(parts)] for lot, parts in zip(lots, chosen, strict=True)], axis=0)
+    drawing = [
+        AddedDrive(f"difference of the rod of {part.name}", part.x, part.crank_radius * _unit(part.throw), part.shaft)
+        for part in engine.slider_cranks
+    ]
+    pistons = tuple(
+        replace(part, reciprocating_mass=part.reciprocating_mass + float(own))
+        for part, own in zip(engine.slider_cranks, more[:, 0], strict=True)
+    )
+    rotors = tuple(drive.rotor(float(own)) for drive, own in zip(drawing, more[:, 1], strict=True) if own)
+    return replace(engine, slider_cranks=pistons, rotors=(*engine.rotors, *rotors))
+
+
+def _unit(angle: float) -> complex:
+    return complex(math.cos(angle), math.sin(angle))
+
+
+def _terms(problem: Problem) -> Terms:
+    """The objective as norms of rows that are affine in what every cylinder has more: to and fro, then turning [kg]."""
+    parts = problem.engine.slider_cranks
+    errors = [Error(part.name, (PistonDrive(k, PER_KILOGRAM),)) for k, part in enumerate(parts)]
+    errors += [
+        Error(
+            part.name,
+            (AddedDrive(part.name, part.x, PER_KILOGRAM * part.crank_radius * _unit(part.throw), part.shaft),),
+        )
+        for part in parts
+    ]
+    unit = Tolerance("a part", "kg", PER_KILOGRAM, tuple(errors))
+    built = BuiltEngines(replace(problem, tolerances=Tolerances((unit,))), (), problem.fidelity.samples)
+    return tuple((weight, replace(norm, slope=norm.slope / PER_KILOGRAM)) for weight, norm in built.terms)
+
+
+class _Search(Division[Chosen]):
+    """Branch and bound over assemblies."""
+
+    what = "parts bounded"
+
+    def __init__(self, terms: Terms, lots: Sequence[Lot], cylinders: int, tolerance: float) -> None:
+        self.terms, self.lots, self.cylinders, self.tolerance = terms, lots, cylinders, tolerance
+        self.more = [lot.differences for lot in lots]
+        self.given: Chosen = tuple(tuple(range(cylinders)) for _ in lots)
+        self.best, self.value = self.given, self._value(self.given)
+        sizes = [sum(w * n.norm.value(n.grid, n.slope[..., k]) for w, n in terms) for k in range(2 * cylinders)]
+        spread = [np.ptp(more, axis=0) for more in self.more]
+        order = [
+            (-(sizes[k] * s[0] + sizes[cylinders + k] * s[1]), lot, k)
+            for lot, s in enumerate(spread) for k in range(cylinders)
+        ]  # fmt: skip
+        self.order = [(lot, k) for _, lot, k in sorted(order)]
+
+    def run(self) -> float:
+        """The best assembly, and what none goes under."""
+        free: Chosen = tuple((-1,) * self.cylinders for _ in self.lots)
+        return min(self.divide((self._bound(free), free), MOST_NODES), self._enough)
+
+    @property
+    def _enough(self) -> float:
+        return self.value * (1.0 - 0.5 * self.tolerance)
+
+    def is_done(self, one: Waiting[Chosen]) -> bool:
+        """Whether no assembly of it is better by half the tolerance."""
+        return one.bound >= self._enough
+
+    def parts(self, taken: Sequence[Waiting[Chosen]]) -> Parts[Chosen]:
+        """Every part that is left in the cylinder that counts most of those without one."""
+        ((under, _, node),) = taken
+        lot, cylinder = next((at for at in self.order if node[at[0]][at[1]] < 0), (-1, -1))
+        for part in range(len(self.more[lot])) if lot >= 0 else ():
+            if part in node[lot]:
+                continue
+            own = tuple(part if k == cylinder else old for k, old in enumerate(node[lot]))
+            child = (*node[:lot], own, *node[lot + 1 :])
+            bound = max(self._bound(child), under)
+            yield (bound, child) if bound < self._enough else None
+
+    def _mass(self, chosen: Chosen) -> Array:
+        """What every cylinder has more: to and fro, then turning."""
+        return np.asarray(np.sum([m[list(p)] for m, p in zip(self.more, chosen, strict=True)], axis=0)).T.reshape(-1)
+
+    def _value(self, chosen: Chosen) -> float:
+        return value_at(self.terms, self._mass(chosen))
+
+    def _try(self, chosen: Chosen) -> float:
+        value = self._value(chosen)
+        if value < self.value:
+            self.best, self.value = chosen, value
+        return value
+
+    def _bound(self, node: Chosen) -> float:
+        """What no assembly of a node goes under; those that come up are tried."""
+        if all(part >= 0 for parts in node for part in parts):
+            return self._try(node)
+        point, best = self._middle(node), -math.inf
+        for _ in range(STEPS):
+            value, slope = 0.0, np.zeros(2 * self.cylinders)
+            for weight, norm in self.terms:
+                value += weight * norm.value(point)
+                slope += weight * np.einsum("kd,kdn->n", norm.subgradient(point), norm.slope)
+            corner = self._assigned(node, slope)
+            end = self._mass(corner)
+            best = max(best, value + float(slope @ (end - point)))
+            self._try(corner)
+            if best >= self._enough or value - best <= 0.1 * self.tolerance * value:
+                break
+            tried = [(value_at(self.terms, point + share * (end - point)), share) for share in LENGTHS]
+            point = point + min(tried)[1] * (end - point)
+        return best
+
+    def _middle(self, node: Chosen) -> Array:
+        """Free cylinders have the mean of the parts that are left."""
+        total = np.zeros((self.cylinders, 2))
+        for more, parts in zip(self.more, node, strict=True):
+            left = [k for k in range(len(more)) if k not in parts]
+            mean = more[left].mean(axis=0) if left else np.zeros(2)
+            total += np.array([more[part] if part >= 0 else mean for part in parts])
+        return np.asarray(total.T.reshape(-1))
+
+    def _assigned(self, node: Chosen, slope: Array) -> Chosen:
+        """The assembly of a node that goes farthest down a slope."""
+        from scipy.optimize import linear_sum_assignment
+
+        found = []
+        for more, parts in zip(self.more, node, strict=True):
+            free, left = (
+                [k for k, part in enumerate(parts) if part < 0],
+                [k for k in range(len(more)) if k not in parts],
+            )
+            cost = np.outer(slope[: self.cylinders][free], more[left, 0])
+            cost += np.outer(slope[self.cylinders :][free], more[left, 1])
+            own = list(parts)
+            for row, column in zip(*linear_sum_assignment(cost), strict=True):
+                own[free[row]] = left[column]
+            found.append(tuple(own))
+        return tuple(found)
+
+    def result(self, names: Sequence[str]) -> AssemblyResult:
+        """The best assembly cylinder by cylinder, beside others at random."""
+        random = np.random.default_rng(0)
+        others = [tuple(tuple(random.permutation(len(m))[: self.cylinders]) for m in self.more) for _ in range(RANDOM)]
+        values = values_of(self.terms, np.array([self._mass(chosen) for chosen in others]))
+        places = tuple(
+            Place(name, tuple(int(p[k]) + 1 for p in self.best),
+                  tuple(lot.masses[int(p[k])] for lot, p in zip(self.lots, self.best, strict=True)))
+            for k, name in enumerate(names)
+        )  # fmt: skip
+        return AssemblyResult(
+            tuple(lot.kind for lot in self.lots), places,
+            math.prod(float(math.perm(len(m), self.cylinders)) for m in self.more), self.seen,
+            tuple(float(q) for q in np.quantile(values, SHARES)), float(values.max()),
+            value_at(self.terms, np.zeros(2 * self.cylinders)), RANDOM,
+        )  # fmt: skip

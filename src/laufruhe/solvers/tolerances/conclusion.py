@@ -1,0 +1,199 @@
+"""A design for built engines as a result: judged, compared with the best drawing, its tolerances priced (R10, R11)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from laufruhe.load_models.built_engines import BuiltEngines, evaluated, values_of
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Limit
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.problem.tolerance import Over, Tolerance
+from laufruhe.prove.certificate import Proof, certified
+from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, decision_values, limit_values
+from laufruhe.solvers.result import LimitValue, ObjectiveValue, Result, Status
+from laufruhe.solvers.tolerances.adversaries import Adversary, Found
+from laufruhe.solvers.tolerances.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
+
+CHECKED, CHECKED_CURVED = 20_000, 400
+"""Engines of the second sample: where loads are affine in the errors, and where each is built anew."""
+STEP = 0.05
+"""Share of a tolerance by which it is moved to price it."""
+
+
+class Holding(Protocol):
+    """What holds a design."""
+
+    @property
+    def errors(self) -> tuple[Array, ...]:
+        """Of every set."""
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Of every set in the largest objective."""
+
+    @property
+    def prices(self) -> tuple[tuple[tuple[Limit, float], ...], ...]:
+        """Multipliers of the limits of every set."""
+
+
+def compared(
+    problem: Problem, seeker: Adversary, nominal: Sequence[Value], robust: Sequence[Value], found: Found,
+    held: Holding, scenarios: int,
+) -> RobustResult:  # fmt: skip
+    """The best drawing and the design decided, each built many times, and the price of every tolerance."""
+    over = problem.over or Over()
+    sample = _Sample.of(problem, over, seeker.samples)
+    values = sample.values(problem, robust)
+    share = SHARE if over.share is None else over.share
+    first = seeker.at(nominal, proven=True)
+    designs = (
+        _design("best drawing", problem, nominal, first, sample.values(problem, nominal), share),
+        _design("decided", problem, robust, found, values, share),
+    )
+    exceeding = int((values > found.bound * (1.0 + 1e-12)).sum())
+    return RobustResult(
+        over=over, exact=over.share is None and problem.tolerances.is_affine, share=share,
+        nominal=designs[0], robust=designs[1], tolerances=_priced(problem, robust, held, sample, share),
+        scenarios=scenarios, divisions=found.divisions, engines=len(values), seed=sample.seed,
+        exceeding=exceeding, exceeding_at_most=_at_most(exceeding, len(values)),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Sample:
+    """Engines that no decision has seen."""
+
+    errors: Array
+    seed: int
+    samples: int
+
+    @classmethod
+    def of(cls, problem: Problem, over: Over, samples: int) -> _Sample:
+        count = CHECKED if problem.tolerances.is_affine else min(over.engines, CHECKED_CURVED)
+        random = np.random.default_rng([over.seed, 1])
+        return cls(problem.tolerances.draw(random, count), over.seed, samples)
+
+    def values(self, problem: Problem, values: Sequence[Value]) -> Array:
+        """Objective of every engine of a design; errors that loads are affine in are all taken at once."""
+        if problem.tolerances.is_affine:
+            return values_of(BuiltEngines(problem, values, self.samples).terms, self.errors)
+        return np.array([_value(problem, values, z, self.samples) for z in self.errors])
+
+
+def _value(problem: Problem, values: Sequence[Value], errors: Array, samples: int) -> float:
+    return objective_value(problem, evaluated(problem.built(errors), values, samples))
+
+
+def _design(
+    name: str, problem: Problem, values: Sequence[Value], found: Found, built: Array, share: float
+) -> BuiltDesign:
+    from scipy.stats import binom
+
+    ordered = np.sort(built)
+    low, high = (int(binom.ppf(0.5 + side * 0.5 * CONFIDENCE, len(built), share)) for side in (-1.0, 1.0))
+    decided = zip(problem.decisions, values, strict=True)
+    entries = tuple((e.name, e.value, e.unit) for d, v in decided for e in decision_values(d, v))
+    drawing = _value(problem, values, np.zeros(problem.tolerances.count), problem.fidelity.samples)
+    level = float(ordered[min(int(np.ceil(share * len(built))) - 1, len(built) - 1)])
+    worst = found.bound if problem.over is None or problem.over.share is None else float(ordered[-1])
+    return BuiltDesign(
+        name, entries, drawing, worst, level,
+        float(ordered[max(low - 1, 0)]), float(ordered[min(high, len(built) - 1)]),
+        tuple(float(q) for q in np.quantile(built, SHARES)),
+    )  # fmt: skip
+
+
+def _at_most(exceeding: int, engines: int) -> float:
+    """Share of all engines that exceeds, at most, with CONFIDENCE (Clopper and Pearson, R10)."""
+    from scipy.stats import beta
+
+    return float(beta.ppf(CONFIDENCE, exceeding + 1, engines - exceeding)) if exceeding < engines else 1.0
+
+
+def _priced(
+    problem: Problem, values: Sequence[Value], held: Holding, sample: _Sample, share: float
+) -> tuple[PricedTolerance, ...]:
+    """Every tolerance with its price, the dearest first."""
+    told = []
+    for tolerance in problem.tolerances.each:
+        wide, narrow = (_taken(problem, values, held, sample, share, tolerance, 1.0 + s) for s in (STEP, -STEP))
+        saving = (wide - narrow) / (2.0 * STEP)
+        told.append(PricedTolerance(
+            tolerance.name, tolerance.size, tolerance.unit, str(tolerance.law), str(tolerance.scope),
+            len(tolerance.errors), saving / tolerance.size, saving,
+        ))  # fmt: skip
+    return tuple(sorted(told, key=lambda one: -one.saving))
+
+
+def _taken(
+    problem: Problem, values: Sequence[Value], held: Holding, sample: _Sample, share: float, tolerance: Tolerance,
+    factor: float,
+) -> float:  # fmt: skip
+    """What holds the design, with one tolerance so many times as wide and all else as it is (R11)."""
+    moved = replace(problem, tolerances=problem.tolerances.scaled(tolerance.name, factor))
+    if problem.over is not None and problem.over.share is not None:
+        return float(np.quantile(sample.values(moved, values), share))
+    total = 0.0
+    for errors, own, prices in zip(held.errors, held.shares, held.prices, strict=True):
+        priced = [(limit, price) for limit, price in prices if price > 0.0 and limit.measure.is_load]
+        if own > 0.0 or priced:
+            found = evaluated(moved.built(errors), values, sample.samples)
+            total += own * objective_value(problem, found)
+            total += sum(price * found.value(limit.measure) for limit, price in priced)
+    return total
+
+
+def _limited(own: LimitValue, worst: float, price: float, tolerance: float) -> LimitValue:
+    """A limit as the worst engine stands to it."""
+    active = worst >= own.limit * (1.0 - tolerance)
+    return replace(own, value=worst, active=active, shadow_price=price if active else 0.0)
+
+
+def robust_result(
+    problem: Problem, design: Design, given: Found, found: Found, held: Holding, shown: Shown, details: RobustResult,
+    timing: dict[str, float],
+) -> Result:  # fmt: skip
+    """The result of a design whose objective and limits are those of built engines; `given` is of the one given."""
+    met = max(found.excess, design.excess) <= KEPT
+    nothing = nothing_of(problem, design.evaluation.engine)
+    certificate = certified(
+        found.bound, shown.bound, nothing, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
+    )
+    worst = dict(found.limits)
+    prices: dict[Limit, float] = {}
+    for limit, price in (priced for own in held.prices for priced in own):
+        prices[limit] = prices.get(limit, 0.0) + price
+    limits = tuple(
+        _limited(own, worst.get(limit, own.value), prices.get(limit, 0.0), problem.tolerance)
+        for limit, own in zip(problem.limits, limit_values(problem, design.evaluation), strict=True)
+    )
+    status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
+    broken = [limit.name for limit in problem.limits if worst.get(limit, 0.0) > limit.maximum * (1.0 + KEPT)]
+    message = f"the best design found breaks {' and '.join(map(repr, broken)) or 'a limit'} in some engines"
+    return Result(
+        problem=problem,
+        status=status if met else Status.FAILED,
+        objective=ObjectiveValue.of(problem, found.bound, given.value),
+        certificate=certificate,
+        decisions=tuple(
+            entry
+            for decision, value in zip(problem.decisions, design.values, strict=True)
+            for entry in decision_values(decision, value)
+        ),
+        limits=limits,
+        initial=evaluate(problem),
+        final=design.evaluation,
+        message="" if met else message,
+        error_estimate=error_of(problem, design.evaluation),
+        timing=timing,
+        robust=details,
+    )  # fmt: skip

@@ -1,0 +1,344 @@
+"""Unbalances decided for the engines that tolerances allow: the least worst case, or what a share stays below.
+
+The least worst case is a cone program with a sum of norms for every extreme point of the errors (R4). Only those that
+hold the design are in it: the worst engine of a design joins, the program is solved again, and what it cannot go under
+meets what no engine exceeds (R8).
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.affine import AffineModel, AffineProblem
+from laufruhe.load_models.built_engines import evaluated
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.budget import in_time
+from laufruhe.numerics.progress import tell, within
+from laufruhe.numerics.spectrum import common_base
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Limit
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.problem.tolerance import Over
+from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, angle_name, judged, none_within
+from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.cones.unbalances import conflict_of, tightened
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.tolerances.adversaries import DrawnEngines, EveryError, Found
+from laufruhe.solvers.tolerances.conclusion import compared, robust_result
+
+Solve = Callable[[Problem], Result]
+
+MOST_ROUNDS = 60
+MOST_SCENARIOS = 24
+COARSER = 4
+"""The program has so many times fewer angles than the fidelity at first."""
+SAME = 1e-9
+JOINS = 0.1
+"""Share of the tolerance by which an engine has to be worse than all in the program to join it."""
+MOST_MARGINS, MOST_DOUBLINGS = 3, 3
+"""Times that limits are lowered, and that the angles of the fidelity are doubled, where its own leave a gap."""
+OUTER = 12
+"""Rounds in which the engines that may be above are chosen anew."""
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What holds a design: sets of errors, and the multipliers of their objectives and limits.
+
+    Attributes
+    ----------
+    errors
+        Shape (columns,) each.
+    shares
+        Of each in the largest objective, adding up to one.
+    prices
+        Of each the multipliers of its limits.
+    residual
+        Of the optimality conditions (P5).
+    """
+
+    errors: tuple[Array, ...] = ()
+    shares: tuple[float, ...] = ()
+    prices: tuple[tuple[tuple[Limit, float], ...], ...] = ()
+    residual: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Least:
+    """A design, what no engine of it exceeds, and what no design goes under.
+
+    Attributes
+    ----------
+    samples
+        Steps over the cycle at which engines are measured.
+    conflict
+        Limits that no design keeps in every engine; nothing else means anything then.
+    """
+
+    values: tuple[Value, ...]
+    found: Found
+    bound: float
+    held: Held
+    scenarios: int
+    angles: int
+    samples: int
+    conflict: tuple[str, ...] = ()
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """By what breaks limits least, then by what is least."""
+        broken = self.found.excess > KEPT
+        return broken, self.found.excess if broken else self.found.bound
+
+
+def solve_robust(problem: Problem, solve: Solve) -> Result:
+    """Decide for the engines that tolerances allow.
+
+    Parameters
+    ----------
+    problem
+        Its unbalances may be open.
+    solve
+        Decides the drawing.
+
+    Raises
+    ------
+    ModelError
+        If anything else is open or asked.
+    """
+    over = problem.over
+    if over is None:
+        raise ValueError("nothing is asked of built engines")
+    _check(problem)
+    started = time.perf_counter()
+    with within("drawing"):
+        drawing = solve(problem.changed(over=None))
+    acting = problem.tolerances.acting
+    if (drawing.certificate is None and problem.decisions) or not acting.each:
+        return replace(drawing, problem=problem)
+    problem = replace(problem, tolerances=acting, fidelity=drawing.problem.fidelity)
+    start = decided_values(problem, drawing)
+    tell("worst errors of the drawing")
+    seeker, found = _found(problem, over, start, drawing)
+    if found.conflict:
+        return none_within(problem, evaluate(problem), found.conflict, {"solve": time.perf_counter() - started})
+    solved = time.perf_counter()
+    seeker = replace(seeker, samples=found.samples)
+    reach = Reach.WHOLE if over.share is None else Reach.ASIDE
+    design = judged(problem, found.values, found.samples)
+    shown = Shown(found.bound, reach, found.held.residual, _method(problem, found))
+    details = compared(problem, seeker, start, found.values, found.found, found.held, found.scenarios)
+    timing = {"solve": solved - started, "compare": time.perf_counter() - solved}
+    given = seeker.at(problem.start, proven=False)
+    return robust_result(problem, design, given, found.found, found.held, shown, details, timing)
+
+
+def _found(
+    problem: Problem, over: Over, start: tuple[Value, ...], drawing: Result
+) -> tuple[EveryError | DrawnEngines, Least]:
+    """Who seeks the worst engines, and the design that is best against it."""
+    tolerances, samples = problem.tolerances, problem.fidelity.samples
+    nothing, random = nothing_of(problem, drawing.final.engine), np.random.default_rng(over.seed)
+    if over.share is None and tolerances.is_affine:
+        every = EveryError(problem, samples, 0.5 * problem.tolerance)
+        return every, _least_worst(problem, every, start, nothing)
+    if over.share is None:
+        drawn = DrawnEngines(problem, tolerances.draw(random, over.engines), samples)
+        return drawn, _least_worst(problem, drawn, start, nothing)
+    drawn = DrawnEngines(problem, tolerances.mirrored(random, over.engines), samples)
+    found = _least_share(problem, drawn, start, over.share, nothing)
+    # of errors that lie alike to both sides half of all engines are no better than the drawing (R9)
+    bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
+    return drawn, replace(found, bound=bound if problem.decisions else found.found.bound)
+
+
+def _check(problem: Problem) -> None:
+    """Refuse what no method decides for built engines."""
+    open_kinds = {decision.kind for decision in problem.decisions} - {Kind.UNBALANCE}
+    if problem.phasing is not None:
+        raise ModelError("stars and firing orders are decided for the drawing alone; fix them, or leave [robust] out")
+    if open_kinds:
+        names = ", ".join(d.name for d in problem.decisions if d.kind in open_kinds)
+        raise ModelError(f"[robust] decides unbalances, and {names} is open too; fix it, or leave [robust] out")
+    if problem.engine.geared:
+        raise ModelError("[robust] takes all inertia on the crank; leave [[geared_inertias]] out, or [robust]")
+    if problem.fidelity.is_uneven:
+        raise ModelError("[robust] takes a crank that turns evenly; leave fidelity.crank_inertia out, or [robust]")
+    for measure in problem.measures:
+        if measure.channel.is_number or measure.channel.feels_inertia:
+            raise ModelError(f"[robust] is for loads only, not for {measure.name}; ask for it without [robust]")
+    if not problem.objective:
+        raise ModelError("[robust] minimises nothing; add [objective]")
+    if problem.over is not None and problem.over.share is not None and any(m.measure.is_load for m in problem.limits):
+        raise ModelError('limits of loads are kept in the worst case only; take over = "worst case", or leave them out')
+
+
+def decided_values(problem: Problem, result: Result) -> tuple[Value, ...]:
+    """Decisions of a result, complex (C4)."""
+    sizes = {entry.name: entry.value for entry in result.decisions}
+    values: list[Value] = []
+    for decision in problem.decisions:
+        turned = sizes[angle_name(decision)] if decision.set.width > 1 else decision.set.angles[0]
+        values.append(sizes[decision.name] * cmath.exp(1j * turned))
+    return tuple(values)
+
+
+def _method(problem: Problem, found: Least) -> str:
+    over, angles = problem.over or Over(), f"at {found.angles} angles; " if found.angles else ""
+    cones = f"second-order cones over {found.scenarios} sets of errors {angles}" if angles else ""
+    if over.share is not None:
+        bounded = "bounded by the drawing" if problem.tolerances.is_affine else "without a bound"
+        return f"{cones}{over.engines} drawn engines, {bounded}"
+    if problem.tolerances.is_affine:
+        return f"{cones}every error bounded by branch and bound"
+    return f"{cones}the worst of {over.engines} drawn engines, not of all"
+
+
+class _Program:
+    """The cone program of several sets of errors, as they join."""
+
+    def __init__(self, problem: Problem, nothing: float) -> None:
+        self.problem, self.nothing, self.samples = problem, nothing, problem.fidelity.samples
+        self.errors: list[Array] = []
+        self.models: list[AffineModel] = []
+        self.shares: list[float] = []
+        self.held = Held()
+        self.margin, self.margins = 0.0, 0
+        self.conflict: tuple[str, ...] = ()
+
+    def add(self, errors: Sequence[Array]) -> bool:
+        """Sets that are not in it yet; whether there were any."""
+        new = [z for z in errors if all(np.abs(z - own).max(initial=0.0) > SAME for own in self.errors)]
+        while self.errors and len(self.errors) + len(new) > MOST_SCENARIOS:
+            least = int(np.argmin(self.shares)) if self.shares else 0
+            for own in (self.errors, self.models, self.shares):
+                del own[least]
+        for z in new:
+            self.errors.append(z)
+            self.models.append(AffineModel(self.problem.built(z)))
+            self.shares.append(1.0)
+        base = common_base([model.base for model in self.models])
+        for model in self.models:
+            model.base = base
+        return bool(new)
+
+    @property
+    def angles(self) -> int:
+        """Of the fidelity within the period of all loads."""
+        return max(model.full_samples for model in self.models)
+
+    def at(self, samples: int, averaged: bool = False) -> tuple[AffineProblem, list[tuple[int, Limit]]]:
+        """All sets at so many angles, and of every limit the set and the limit that it is of."""
+        parts = [model.at(samples, averaged) for model in self.models]
+        limits = [(k, limit, own) for k, part in enumerate(parts)
+                  for limit, own in zip(self.problem.load_limits, part.limits, strict=True)
+                  if k == 0 or limit.measure.is_load]  # fmt: skip
+        return AffineProblem(
+            tuple(term for part in parts for term in part.terms),
+            tuple(own for _, _, own in limits),
+            parts[0].domains,
+            samples,
+            tuple(k for k, part in enumerate(parts) for _ in part.terms),
+        ), [(k, limit) for k, limit, _ in limits]
+
+    def solved(self, samples: int) -> tuple[tuple[Value, ...], float] | None:
+        """Its optimum and what no design goes under; None where no design keeps the limits."""
+        coarse, owners = self.at(samples)
+        coarse = tightened(coarse, self.margin)
+        solution = solve_cones(coarse)
+        if solution.x is None:
+            names = [limit.name for _, limit in owners]
+            self.conflict = tuple(dict.fromkeys(conflict_of(coarse, names)))
+            return None
+        shares = solution.shares
+        terms = tuple(z for z, k in zip(solution.multipliers.terms, coarse.groups, strict=True) if shares[k] > 0.0)
+        told = replace(solution.multipliers, terms=terms)
+        fine, _ = self.at(2 * max(self.angles, samples), averaged=True)
+        weighed = fine.shared(shares)
+        bound = best_bound(weighed, solution.x, told)
+        self.shares = [float(share) for share in shares]
+        prices = bound.multipliers.shadow_prices(weighed)
+        residual = kkt_residual(weighed, solution.x, bound)
+        of = [[(limit, price) for (owner, limit), price in zip(owners, prices, strict=True) if owner == k]
+              for k in range(len(self.errors))]  # fmt: skip
+        self.held = Held(tuple(self.errors), tuple(self.shares), tuple(map(tuple, of)), residual)
+        return tuple(domain.complex_value(solution.x) for domain in coarse.domains), bound.value
+
+    def level(self, values: Sequence[Value]) -> float:
+        """The largest objective of a design with the errors that are in it."""
+        found = (evaluated(model.problem, values, self.samples) for model in self.models)
+        return max(objective_value(self.problem, each) for each in found)
+
+
+def _least_worst(
+    problem: Problem, seeker: EveryError | DrawnEngines, start: tuple[Value, ...], nothing: float
+) -> Least:
+    """The design whose worst engine is least, from a given one (R8)."""
+    found = seeker.at(start, proven=not problem.decisions)
+    best = Least(start, found, 0.0, Held((found.errors[0],), (1.0,), ((),)), 1, 0, seeker.samples)
+    if not problem.decisions:
+        return replace(best, bound=found.value)
+    program, values, bound = _Program(problem, nothing), start, 0.0
+    program.add([np.zeros(problem.tolerances.count)])
+    samples, level = program.angles // COARSER, 0.0
+    for _ in in_time(range(MOST_ROUNDS)):
+        if (found.value > level * (1.0 + JOINS * problem.tolerance) or found.excess > FEASIBLE) and program.add(
+            found.errors
+        ):
+            samples = max(samples, program.angles // COARSER)
+        elif found.excess > FEASIBLE and samples >= program.angles and program.margins < MOST_MARGINS:
+            # it knows all engines that hold this design, and peaks stand between its angles: limits a little lower
+            program.margin, program.margins = program.margin + 1.05 * found.excess, program.margins + 1
+        else:
+            samples, program.margin, program.margins = 2 * samples, 0.0, 0
+            if samples > program.angles << MOST_DOUBLINGS:
+                break
+            if samples > program.angles:
+                seeker = replace(seeker, samples=2 * seeker.samples)
+                program.samples = seeker.samples
+        solved = program.solved(samples)
+        if solved is None:
+            return replace(best, conflict=program.conflict)
+        values, own = solved
+        bound, level = max(bound, own), program.level(values)
+        found = seeker.at(values, proven=False)
+        if gap_of(found.value, bound, nothing) <= problem.tolerance and found.excess <= FEASIBLE:
+            found = seeker.at(values, proven=True)
+        each = Least(values, found, bound, program.held, len(program.errors), samples, seeker.samples)
+        best = min(best, each, key=lambda one: (one.found.excess > KEPT, one.found.value))
+        if gap_of(found.bound, bound, nothing) <= problem.tolerance and found.excess <= FEASIBLE:
+            break
+    found = best.found
+    if not found.proven or best.samples < seeker.samples:
+        found = seeker.at(best.values, proven=True)
+    return replace(best, found=found, bound=bound, samples=seeker.samples)
+
+
+def _least_share(
+    problem: Problem, seeker: DrawnEngines, start: tuple[Value, ...], share: float, nothing: float
+) -> Least:
+    """The design that a share of the drawn engines stays below least, as far as a search finds it (R9)."""
+    below = math.ceil(share * len(seeker.errors))
+    values, best = start, None
+    for _ in in_time(range(OUTER)):
+        order = np.argsort(seeker.objective(values), kind="stable")
+        kept = seeker.kept(order[:below])
+        each = _least_worst(problem, kept, values, nothing)
+        if best is not None and each.found.value >= best.found.value * (1.0 - SAME):
+            break
+        best, values = each, each.values
+    if best is None:
+        raise ModelError("no design was found within the time limit; raise it")
+    level = float(np.sort(seeker.objective(best.values))[below - 1])
+    return replace(best, found=replace(best.found, value=level, bound=level))
