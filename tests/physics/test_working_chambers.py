@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
@@ -113,6 +113,7 @@ def test_ends_of_a_scotch_yoke_are_images() -> None:
 
 
 @given(st.floats(0.05, 0.6), st.floats(0.0, 1.0), st.floats(0.0, 0.5), st.floats(0.01, 0.3))
+@example(0.5, 0.0, 2.2e-313, 0.25)
 def test_pressure_stays_between_its_ends(cut_off: float, release: float, compression: float, clearance: float) -> None:
     diagram = Steam(8e5, 1e5, cut_off, cut_off + (1 - cut_off) * release, compression, 0.5 * compression, clearance)
     chamber = replace(HEAD, diagram=diagram)
