@@ -19,7 +19,7 @@ from laufruhe.machine.drives import DRIVES, Sizes
 from laufruhe.machine.facing import least_room, with_shared_chambers
 from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
 from laufruhe.machine.leads import led_parts
-from laufruhe.numerics.turns import as_turn, within
+from laufruhe.numerics.turns import direction
 
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
 
@@ -290,9 +290,9 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
 
 def _sharing(table: EngineTable, part: SliderCrankTable) -> int:
     """Slider-cranks on the throw of this one that share the mass given for every throw."""
-    here = (part.shaft, part.x, within(as_turn(part.throw), 1))
+    here = (part.shaft, part.x, direction(part.throw))
     return sum(
-        (each.shaft, each.x, within(as_turn(each.throw), 1)) == here and each.rotating_mass is None
+        (each.shaft, each.x, direction(each.throw)) == here and each.rotating_mass is None
         for each in table.slider_cranks
     )
 

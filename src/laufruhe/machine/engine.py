@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
+from functools import lru_cache
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.bearing import Bearing
@@ -23,7 +24,7 @@ from laufruhe.machine.running_gear import Moving, RunningGear, Size
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.machine.torsion import Torsion
 from laufruhe.numerics.spectrum import as_order
-from laufruhe.numerics.turns import as_turn, cis, within
+from laufruhe.numerics.turns import as_turn, cis, direction, within
 
 
 class Cycle(Enum):
@@ -113,13 +114,13 @@ class Engine:
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "bearings", "geared"):
-            names = Counter(part.name for part in getattr(self, kind))
-            double = [name for name, count in names.items() if count > 1]
-            if double:
-                raise ModelError(f"two {kind.replace('_', '-')} are called '{double[0]}'; give each its own name")
+            names = [part.name for part in getattr(self, kind)]
+            if len(set(names)) < len(names):
+                double = next(name for name, count in Counter(names).items() if count > 1)
+                raise ModelError(f"two {kind.replace('_', '-')} are called '{double}'; give each its own name")
         places: dict[object, str] = {}
         for part in self.slider_cranks:
-            place = (part.shaft.y, part.shaft.z, part.x, within(as_turn(part.bank), 1))
+            place = (part.shaft.y, part.shaft.z, part.x, direction(part.bank))
             if place in places:
                 raise ModelError(f"{part.name} stands in the place of {places[place]}; move one of them")
             places[place] = part.name
@@ -129,8 +130,7 @@ class Engine:
             self._check_firing(part)
 
     def _check_period(self, shaft: Shaft) -> None:
-        turns = as_order(shaft.ratio) * self.cycle.turns
-        if turns.denominator != 1 or turns == 0:
+        if not _returns(shaft.ratio, self.cycle.turns):
             raise ModelError(
                 f"shaft '{shaft.name}' with ratio {shaft.ratio:g} does not return within the cycle of "
                 f"{self.cycle.turns} turns; use a multiple of 1/{self.cycle.turns}"
@@ -192,3 +192,10 @@ class Engine:
         turns = sorted(within(as_turn(part.firing_angle), whole) for part in self.cylinders)
         following = [*turns[1:], turns[0] + whole] if turns else []
         return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))
+
+
+@lru_cache(maxsize=256)
+def _returns(ratio: float, turns: int) -> bool:
+    """Whether a shaft stands after so many turns of the crank as before, and turns at all."""
+    own = as_order(ratio) * turns
+    return own.denominator == 1 and own != 0

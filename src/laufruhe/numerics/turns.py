@@ -42,6 +42,12 @@ def within(turn: Turn, whole: int) -> Turn:
     return rest if whole - rest > SAME_TURN else Fraction(0)
 
 
+@lru_cache(maxsize=4096)
+def direction(angle: float) -> Turn:
+    """An angle in radians as a part of one turn: equal for angles that point the same way."""
+    return within(as_turn(angle), 1)
+
+
 def angle_of(turn: Turn) -> float:
     """Radians of a part of a turn."""
     return math.tau * float(turn)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.machine import Engine, Role, Shaft, SliderCrank
-from laufruhe.numerics.turns import as_turn, cis, within
+from laufruhe.numerics.turns import as_turn, cis, direction
 
 _ROUNDING = 1e-9
 
@@ -67,5 +67,5 @@ def _throws(parts: Sequence[SliderCrank]) -> list[list[SliderCrank]]:
     """Parts that work on one pin, from the front: those of one place and angle."""
     found: dict[tuple[float, object], list[SliderCrank]] = {}
     for part in parts:
-        found.setdefault((round(part.x, 9), within(as_turn(part.throw), 1)), []).append(part)
+        found.setdefault((round(part.x, 9), direction(part.throw)), []).append(part)
     return list(found.values())
