@@ -42,8 +42,10 @@ solve: $(STAMP)
 study: $(STAMP)
 	$(BIN)/laufruhe study $(STUDY)
 
-# A process for every core, one thread in each.
+# A process for every core, one thread in each. Compiled modules are kept: every process, and every command that a test
+# starts, would compile all of them again.
 test test-fast test-long: export OMP_NUM_THREADS = 1
+test test-fast test-long: export PYTHONDONTWRITEBYTECODE =
 
 test: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) $(TESTS)

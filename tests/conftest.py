@@ -1,5 +1,6 @@
 """Settings that every test shares."""
 
+import gc
 import os
 import tempfile
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 from hypothesis import settings
 from hypothesis.configuration import set_hypothesis_home_dir
 
+import core_seconds
 import shared
 
 # Tests run in a process for each core: none of them starts further ones unless it says how many.
@@ -26,6 +28,7 @@ settings.load_profile("laufruhe")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="run what is marked long, and only that")
+    core_seconds.add_options(parser)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -39,7 +42,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_configure(config: pytest.Config) -> None:
     shared.prepare(config)
-    # Hypothesis keeps tables beside the tests unless told where; nothing may stay behind.
-    home = tempfile.TemporaryDirectory(prefix="hypothesis-")
-    set_hypothesis_home_dir(Path(home.name))
-    config.add_cleanup(home.cleanup)
+    config.pluginmanager.register(core_seconds.CoreSeconds(config))
+    # Hypothesis keeps tables of the source beside the tests unless told where: they belong into pytest's own cache
+    # (seconds of every process), and where there is none nothing may stay behind.
+    if hasattr(config, "cache"):
+        set_hypothesis_home_dir(config.cache.mkdir("hypothesis"))
+    else:
+        home = tempfile.TemporaryDirectory(prefix="hypothesis-")
+        set_hypothesis_home_dir(Path(home.name))
+        config.add_cleanup(home.cleanup)
+
+
+def pytest_collection_finish() -> None:
+    """What is imported and collected lives to the end; looking through it again and again costs seconds."""
+    gc.collect()
+    gc.freeze()

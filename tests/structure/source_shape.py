@@ -9,6 +9,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 SOURCE = Path(__file__).parents[2] / "src"
@@ -69,9 +70,17 @@ def total_lines() -> int:
     return sum(path.read_text(encoding="utf-8").count("\n") for path in SOURCE.rglob("*.py"))
 
 
+def inside(node: ast.AST) -> Iterator[ast.AST]:
+    """Statements of a statement, with the arms of `try` and `match`; expressions hold neither functions nor imports."""
+    for field in ("body", "orelse", "finalbody", "handlers", "cases"):
+        found = getattr(node, field, None)
+        if isinstance(found, list):
+            yield from found
+
+
 def functions(tree: ast.AST, prefix: str = "") -> Iterator[tuple[str, Function]]:
     """Every function with its dotted name inside the module, those of classes and of functions too."""
-    for node in ast.iter_child_nodes(tree):
+    for node in inside(tree):
         if isinstance(node, Function | ast.ClassDef):
             name = f"{prefix}{node.name}"
             if isinstance(node, Function):
@@ -93,11 +102,17 @@ def imported(node: ast.AST, module: str, known: Trees) -> set[str]:
 
 
 def run_nodes(tree: ast.AST) -> Iterator[ast.AST]:
-    """Every node but those that only a type checker reads."""
-    for node in ast.iter_child_nodes(tree):
+    """Every statement but those that only a type checker reads."""
+    for node in inside(tree):
         if not (isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"):
             yield node
             yield from run_nodes(node)
+
+
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    for part in inside(node):
+        yield part
+        yield from statements(part)
 
 
 def own_imports(known: Trees) -> dict[str, set[str]]:
@@ -175,14 +190,16 @@ def late_imports(known: Trees) -> set[str]:
         for module, tree in known.items()
         if room(module) not in LATE_ROOMS
         for _, function in functions(tree)
-        for node in ast.walk(function)
+        for node in statements(function)
         for name in imported(node, module, known)
         if name.partition(".")[0] not in HEAVY and name not in heavy
     }
 
 
-def operands(tree: ast.Module) -> Iterator[ast.expr]:
+@cache
+def operands(tree: ast.Module) -> tuple[ast.expr, ...]:
     """What comparisons, patterns and `isinstance` ask for, tuples taken apart."""
+    found: list[ast.expr] = []
     for node in ast.walk(tree):
         asked: list[ast.expr] = []
         if isinstance(node, ast.Compare):
@@ -192,13 +209,14 @@ def operands(tree: ast.Module) -> Iterator[ast.expr]:
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance":
             asked = node.args[1:]
         for expression in asked:
-            yield from expression.elts if isinstance(expression, ast.Tuple | ast.Set | ast.List) else (expression,)
+            found += expression.elts if isinstance(expression, ast.Tuple | ast.Set | ast.List) else [expression]
+    return tuple(found)
 
 
 def names_of(tree: ast.Module, home: str) -> set[str]:
     """Names that a module has from `home`, or from what is below it, and the name of `home` itself."""
     found: set[str] = set()
-    for node in ast.walk(tree):
+    for node in statements(tree):
         if isinstance(node, ast.ImportFrom):
             base = node.module or ""
             names = {alias.asname or alias.name: f"{base}.{alias.name}" for alias in node.names}
