@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test test-fast test-long attack matrix faults bench proofs speed pictures docs lint format clean distclean
+.PHONY: help solve study test test-fast test-long lanes attack matrix faults bench proofs speed pictures docs lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
@@ -15,6 +15,7 @@ help:
 	@echo "make test-fast  tests of every room, under a minute on two cores"
 	@echo "make test       all tests, minutes"
 	@echo "make test-long  the long tail of random families, which make test leaves out"
+	@echo "make lanes      which tests are too slow for the fast lane, measured; writes tests/slow.txt"
 	@echo "make attack     random problems against an independent model, ATTACK='--number 100'"
 	@echo "make matrix     every kind of decision, measure and layout together, an hour and more; MATRIX='--share 0.1'"
 	@echo "make lint       style, types, direction of imports"
@@ -44,8 +45,8 @@ study: $(STAMP)
 
 # A process for every core, one thread in each. Compiled modules are kept: every process, and every command that a test
 # starts, would compile all of them again.
-test test-fast test-long: export OMP_NUM_THREADS = 1
-test test-fast test-long: export PYTHONDONTWRITEBYTECODE =
+test test-fast test-long lanes: export OMP_NUM_THREADS = 1
+test test-fast test-long lanes: export PYTHONDONTWRITEBYTECODE =
 
 test: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) $(TESTS)
@@ -55,6 +56,10 @@ test-fast: $(STAMP)
 
 test-long: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) --long $(TESTS)
+
+# What each test takes of a core decides its lane.
+lanes: $(STAMP)
+	$(BIN)/python -m pytest $(LANES) -m "not slow" --hypothesis-profile=fast --relist $(TESTS)
 
 # What the log under results/attack/ has is not run again.
 attack: export OMP_NUM_THREADS = 1

@@ -31,7 +31,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     core_seconds.add_options(parser)
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    core_seconds.mark_listed(config, items)
     wanted = bool(config.getoption("--long"))
     sorted_out: dict[bool, list[pytest.Item]] = {True: [], False: []}
     for item in items:

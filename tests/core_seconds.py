@@ -1,16 +1,12 @@
-"""What every test takes of one core, and which of them are in the wrong lane.
+"""What every test takes of one core, and which lane that puts it into.
 
-    python -m pytest -n 2 --core-seconds seconds.txt      # the costliest first: seconds, marks, name
-    python tests/core_seconds.py seconds.txt              # marks `slow` what that file shows to be
-
-Nothing fails by a time: a run names what it saw over half a second without the mark.
+`slow.txt` lists what took more than a quarter of a second and bears no mark `slow` of its own; `make lanes` writes
+it anew. Nothing fails by a time: a run names what it saw over that in the fast lane.
 """
 
 from __future__ import annotations
 
-import re
 import resource
-import sys
 from collections import defaultdict
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
@@ -19,12 +15,29 @@ from time import process_time
 
 import pytest
 
-MOST = 0.5
+MOST = 0.25
 """Core-seconds that a test of the fast lane may take."""
 
+LISTED = Path(__file__).with_name("slow.txt")
+_HEAD = "# What takes over a quarter of a second of one core; written by `make lanes`.\n"
 _NAMED = 12
 _PROPERTY = "core-seconds"
-_LINE = re.compile(r"(?P<seconds>[\d.]+) (?P<lane>slow|fast) (?P<name>.+)")
+
+
+def add_options(parser: pytest.Parser) -> None:
+    parser.addoption("--core-seconds", metavar="FILE", help="write what every test takes of one core to FILE")
+    parser.addoption("--relist", action="store_true", help=f"write {LISTED.name} anew, for the tests that run")
+
+
+def mark_listed(config: pytest.Config, items: Iterable[pytest.Item]) -> None:
+    listed = set() if config.getoption("--relist") else set(listed_now())
+    for item in items:
+        if item.nodeid in listed:
+            item.add_marker("slow")
+
+
+def listed_now() -> list[str]:
+    return [line for line in LISTED.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
 
 
 def _spent() -> float:
@@ -48,7 +61,7 @@ class CoreSeconds:
         return (yield)
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_makereport(self, item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    def pytest_runtest_makereport(self) -> Generator[None, pytest.TestReport, pytest.TestReport]:
         report = yield
         before, self.since = self.since, _spent()
         report.user_properties.append((_PROPERTY, self.since - before))
@@ -63,46 +76,24 @@ class CoreSeconds:
         costly_first = sorted(self.spent.items(), key=lambda pair: -pair[1])
         if target := self.config.getoption("--core-seconds"):
             lines = (f"{taken:.3f} {'slow' if name in self.slow else 'fast'} {name}\n" for name, taken in costly_first)
-            Path(target).write_text("".join(lines))
-        in_wrong_lane = [(name, taken) for name, taken in costly_first if taken > MOST and name not in self.slow]
-        if in_wrong_lane:
-            terminalreporter.section("more than half a second of one core, without the mark `slow`")
-            for name, taken in in_wrong_lane[:_NAMED]:
+            Path(target).write_text("".join(lines), encoding="utf-8")
+        over = [(name, taken) for name, taken in costly_first if taken > MOST and name not in self.slow]
+        if self.config.getoption("--relist"):
+            self._relist({name for name, _ in over})
+        elif over:
+            terminalreporter.section(f"over {MOST} s of one core in the fast lane; `make lanes` lists them")
+            for name, taken in over[:_NAMED]:
                 terminalreporter.write_line(f"{taken:.1f} s {name}")
-            if further := in_wrong_lane[_NAMED:]:
+            if further := over[_NAMED:]:
                 terminalreporter.write_line(f"and {len(further)} further")
 
-
-def add_options(parser: pytest.Parser) -> None:
-    parser.addoption("--core-seconds", metavar="FILE", help="write what every test takes of one core to FILE")
-
-
-def _functions_to_mark(lines: Iterable[str]) -> dict[Path, set[str]]:
-    """Those of which every case, or one that has no parameters, is over the half second and unmarked."""
-    found: dict[tuple[Path, str], list[bool]] = defaultdict(list)
-    for line in lines:
-        if told := _LINE.match(line):
-            file, *_, function = told["name"].split("[")[0].split("::")
-            found[Path(file), function].append(told["lane"] == "fast" and float(told["seconds"]) > MOST)
-    wanted: dict[Path, set[str]] = defaultdict(set)
-    for (path, function), over in found.items():
-        if any(over):
-            if all(over):
-                wanted[path].add(function)
-            else:
-                print(f"{path}::{function}: {sum(over)} of {len(over)} cases; mark them by hand")
-    return wanted
+    def _relist(self, over: set[str]) -> None:
+        kept = {name for name in listed_now() if name not in self.spent and _is_there(name)}
+        LISTED.write_text(_HEAD + "".join(f"{name}\n" for name in sorted(kept | over)), encoding="utf-8")
 
 
-def _mark(path: Path, functions: set[str]) -> None:
-    source = path.read_text()
-    for function in sorted(functions):
-        head = re.compile(rf"^( *)((?:@.*\n(?:(?!\1(?:def|@)).*\n)*\1)*)(def {function}\()", re.MULTILINE)
-        source = head.sub(r"\1@pytest.mark.slow\n\1\2\3", source, count=1)
-    path.write_text(source)
-
-
-if __name__ == "__main__":
-    for changed, names in _functions_to_mark(Path(sys.argv[1]).read_text().splitlines()).items():
-        _mark(changed, names)
-        print(f"{changed}: {', '.join(sorted(names))}")
+def _is_there(name: str) -> bool:
+    file, _, rest = name.partition("::")
+    path = LISTED.parents[1] / file
+    function = rest.partition("[")[0].rpartition("::")[2]
+    return path.exists() and f"def {function}(" in path.read_text(encoding="utf-8")
