@@ -645,7 +645,8 @@ def leads(rng: Generator) -> Table:
     on = ["crankshaft", *(shaft["name"] for shaft in engine["shafts"]), *["crankshaft"] * int(rng.integers(0, 2))]
     engine["slider_cranks"] = [
         {
-            "x": q(0.15 * k, "m"),
+            # at x = 0 no couple of a crank's would be left
+            "x": q(0.15 * k + 0.04, "m"),
             "throw": angle(rng),
             "bank_angle": angle(rng) if not gas and rng.random() < 0.3 else 0.0,
             "shaft": name,

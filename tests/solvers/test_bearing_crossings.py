@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.errors import ModelError
+from laufruhe.errors import InputError, ModelError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
@@ -37,6 +37,12 @@ POINTS = [
 ]  # fmt: skip
 VEE = ENGINE | {"layout": "vee", "bank_angle": 60, "throws": [0, 120, 240]}
 WIEBE = {"model": "wiebe", "imep": "6 bar", "start": "-8 deg", "duration": "60 deg"}
+RADIAL = {
+    **{key: value for key, value in ENGINE.items() if key not in ("cylinder_spacing", "throws", "rod")},
+    "layout": "radial", "cylinders": 3, "knuckle_radius": "42 mm",
+}  # fmt: skip
+ON_ONE_THROW = [{**web, "x": f"{x} mm", "opposite_throw": 1} for web, x in zip(WEBS, (60, 20, -60), strict=True)]
+BESIDE = [{"beside_throws": "80 mm", "diameter": "70 mm", "width": "40 mm"}]
 CASES: dict[str, dict[str, Any]] = {
     "uneven throws": {"engine": ENGINE | {"throws": [0, 100, 250], "firing_order": [1, 3, 2]}},
     "three points": {"operating_points": POINTS},
@@ -46,6 +52,7 @@ CASES: dict[str, dict[str, Any]] = {
     "two-stroke": {"engine": ENGINE | {"cycle": "two-stroke", "firing_order": [1, 3, 2]}},
     "elastic mounts": ELASTIC,
     "as a beam": {"fidelity": {"samples": 120, "crankshaft": "beam"}},
+    "radial": {"engine": RADIAL, "main_bearings": BESIDE, "counterweights": ON_ONE_THROW, "gas": None},
     "pin off its path": {"engine": ENGINE | {"offset": "6 mm", "firing_order": [1, 3, 2]}},
 }
 
@@ -80,12 +87,16 @@ def test_no_design_goes_under_the_bound(name: str, quantity: str) -> None:
 
 
 def test_mechanisms_whose_rods_are_not_modelled_are_refused_by_name() -> None:
-    radial = {key: value for key, value in ENGINE.items() if key not in ("cylinder_spacing", "throws", "rod")}
-    radial |= {"layout": "radial", "cylinders": 3, "knuckle_radius": "42 mm"}
-    told = {"engine": radial, "counterweights": [{**WEBS[0], "opposite_throw": 1}], "mounts": None,
-            "main_bearings": [{"x": "80 mm"}, {"x": "-80 mm"}]}  # fmt: skip
+    yoke = {key: value for key, value in ENGINE.items() if key not in ("rod", "rod_length", "rod_ratio")}
+    yoke |= {"drive": "swinging-yoke", "pivot_distance": "200 mm", "return_ratio": 1.6}
     with pytest.raises(ModelError, match="loads of its rod are not modelled"):
-        laufruhe.solve(problem_of(told, "mean main-bearing force"))
+        laufruhe.solve(problem_of({"engine": yoke, "gas": None}, "mean main-bearing force"))
+
+
+def test_sizes_of_rods_on_a_master_rod_are_refused_by_name() -> None:
+    told = {**CASES["radial"], "running_gear": {"rod": {"diameter": "30 mm"}}}
+    with pytest.raises(InputError, match="hinged to a master rod"):
+        problem_of(told, "maximum rod stress")
 
 
 def _shaft(x: Any) -> list[dict[str, Any]]:

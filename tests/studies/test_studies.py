@@ -201,6 +201,25 @@ def test_designs_are_ranked_by_further_quantities(tmp_path: Path) -> None:
     assert next(row for row in ranking.rows if row[0] == "boxer-four")[2] == "0 (1)"
 
 
+def test_an_engine_without_a_further_quantity_says_why(tmp_path: Path, small: Path) -> None:
+    """One of two engines has main bearings; the other has a reason in its cell."""
+    folder = tmp_path / "problems"
+    shutil.copytree(small, folder)
+    text = (folder / "single.toml").read_text(encoding="utf-8")
+    bearings = '[[main_bearings]]\nbeside_throws = "50 mm"\n'
+    (folder / "carried.toml").write_text(f"{text}\n{bearings}", encoding="utf-8")
+    more = 'metric = "mean mount force"\nfurther = ["maximum main-bearing force"]\nflywheel_for = "1/50"'
+    data = computed(study(tmp_path, part("layout comparison", ["single", "carried"], more=more)), folder)
+    *_, ranking = LayoutComparison.table(data)
+    assert ranking.head[-2:] == ["maximum main-bearing force [N]", "flywheel for 1/50 [kg m²]"]
+    cells = {row[0]: row[2] for row in ranking.rows}
+    assert cells["single"] == "– needs main bearings"
+    assert cells["carried"].endswith(" (1)")
+    assert data["untold"].values.tolist() == [["needs main bearings", ""], ["", ""]]
+    wheel = data["further"].sel(quantity="flywheel for 1/50").values
+    assert wheel[0] == wheel[1] > 0.0
+
+
 def test_a_further_quantity_that_an_engine_lacks_is_one_line(tmp_path: Path) -> None:
     more = 'further = ["maximum main-bearing force"]'
     with pytest.raises(InputError, match="needs main bearings") as caught:

@@ -23,9 +23,12 @@ from hypothesis import strategies as st
 
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
-from laufruhe.machine import Engine, SliderCrank
+from laufruhe.machine import Bearing, Engine, OperatingPoint, Seiliger, SliderCrank
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
+from laufruhe.physics.bearing_loads import crank_forces, main_bearing_forces, pin_forces, piston_pin_forces
+from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.physics.shaking_loads import (
     inertia_coefficients,
     reciprocating_loads,
@@ -87,11 +90,18 @@ class Star:
 
     def on_the_block(self, phi: float, gas: dict[int, float] | None = None, massless: bool = False) -> tuple[Any, Any]:
         """Force and roll moment by Newton and Euler at every body, the crank turning evenly."""
+        return self.solved(phi, gas, massless)[:2]
+
+    def solved(
+        self, phi: float, gas: dict[int, float] | None = None, massless: bool = False
+    ) -> tuple[Any, Any, list[complex], list[float]]:
+        """The same; what every rod presses its lower pin with, and every piston its wall."""
         weight = 0.0 if massless else 1.0
         _, lower, upper = self.places(mp.mpf(phi))
         force, roll = 0j, 0.0
         count = len(self.banks)
         to_master: list[tuple[complex, complex]] = []
+        on_pins, on_walls = [0j] * count, [0.0] * count
         for k in reversed(range(count)):
             mass, _, inertia = (weight * v for v in (LINK if k else MASTER))
             share = (LINK if k else MASTER)[1] / self.lengths[k]
@@ -119,6 +129,7 @@ class Star:
             right[4] = inertia * float(np.real(turning)) - torque
             found = np.linalg.solve(matrix, right)
             against = -side * found[0]
+            on_pins[k], on_walls[k] = -complex(found[3], found[4]), -float(found[0])
             force += against - push
             # Mx = y Fz - z Fy counts against the sense of angles
             roll -= (high.conjugate() * against).imag
@@ -126,7 +137,7 @@ class Star:
                 to_master.append((low, -complex(found[3], found[4])))
             else:
                 force -= complex(found[3], found[4])
-        return force, roll
+        return force, roll, on_pins, on_walls
 
     @staticmethod
     def _second(phi: float, of: Any) -> complex:
@@ -168,6 +179,64 @@ def test_loads_are_those_of_rigid_bodies(five: Problem) -> None:
             ours, our_roll = loads_of(five.engine, phi)
             assert abs(ours - force) <= 1e-9 * abs(force)
             assert our_roll == pytest.approx(roll, rel=1e-9, abs=1e-9 * abs(force) * RADIUS)
+
+
+def test_pins_and_walls_feel_what_rigid_bodies_do(five: Problem) -> None:
+    """Knuckle pins, the crank pin under the master rod, and the walls, of masses and of gas (B11)."""
+    star, engine = star_of(five.engine), five.engine
+    point, turning = replace(five.points[0], gas=None), 1j * RADIUS * SPEED
+    torque = crank_torque(engine, point)
+    with mp.workdps(40):
+        for phi in (0.1, 0.9, 2.0, 3.3, 4.4, 5.9):
+            _, _, on_pins, on_walls = star.solved(phi)
+            at = np.array([phi])
+            pins, walls = pin_forces(engine, point).values(at)[0], piston_pin_forces(engine, point).values(at)[0]
+            size = max(abs(pin) for pin in on_pins)
+            assert pins[:, 2] + 1j * pins[:, 1] == pytest.approx(on_pins, abs=1e-9 * size)
+            assert -walls[:, 1] == pytest.approx(on_walls, abs=1e-9 * size)
+            # all of it reaches the crankshaft through the one pin, and drives it
+            crank = crank_forces(engine, point).values(at)[0].sum(axis=0)
+            assert complex(crank[2], crank[1]) == pytest.approx(on_pins[0], abs=1e-9 * size)
+            velocity = turning * cmath.exp(1j * (phi + star.banks[0]))
+            power = velocity.real * crank[2] + velocity.imag * crank[1]
+            assert power == pytest.approx(SPEED * torque.values(at)[0], abs=1e-9 * size * abs(velocity))
+            bearings = main_bearing_forces(carried(engine), point).values(at)[0]
+            assert bearings.sum(axis=0) == pytest.approx(crank, abs=1e-9 * size)
+            assert bearings[0] == pytest.approx(0.25 * crank, abs=1e-9 * size)
+
+
+def test_gas_reaches_pins_and_walls_through_the_master_rod(five: Problem) -> None:
+    star, engine = star_of(five.engine), five.engine
+    gas = Seiliger(peak_pressure=60e5, imep=8e5)
+    point = replace(five.points[0], gas=gas)
+    light = replace(engine, slider_cranks=tuple(
+        part.only(dict.fromkeys(part.weightless, 0.0)) for part in engine.slider_cranks))  # fmt: skip
+    pins, walls = pin_forces(light, point), piston_pin_forces(light, point)
+    with mp.workdps(40):
+        for phi in (0.4, 2.9, 7.7):
+            pressed = {}
+            for k, part in enumerate(engine.slider_cranks):
+                since = (phi - part.firing_angle) % (4.0 * math.pi)
+                pressed[k] = float(-thrust_at(gas, part, engine.cycle, np.array([since]))[0])
+            _, _, on_pins, on_walls = star.solved(phi, pressed, massless=True)
+            size, at = max(abs(pin) for pin in on_pins), np.array([phi])
+            found = pins.values(at)[0]
+            assert found[:, 2] + 1j * found[:, 1] == pytest.approx(on_pins, abs=1e-4 * size)
+            assert -walls.values(at)[0][:, 1] == pytest.approx(on_walls, abs=1e-4 * size)
+
+
+def carried(engine: Engine) -> Engine:
+    return replace(engine, bearings=(Bearing("front", 0.15), Bearing("rear", -0.05)))
+
+
+def test_rods_on_one_pin_press_it_as_hinged_ones_close_to_it(tmp_path: Path) -> None:
+    """What reaches the crank goes to that of rods side by side on the pin as the knuckle pins come to it."""
+    found = []
+    for radius in ("0 mm", "1e-3 mm"):
+        engine = loaded(tmp_path, TEXT.replace('knuckle_radius = "50 mm"', f'knuckle_radius = "{radius}"')).engine
+        point = OperatingPoint("run", SPEED)
+        found.append(main_bearing_forces(carried(engine), point).sample(64))
+    assert found[1] == pytest.approx(found[0], abs=1e-4 * np.abs(found[0]).max())
 
 
 def test_gas_closes_inside_and_gives_its_torque(five: Problem) -> None:

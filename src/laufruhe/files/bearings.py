@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from pydantic import Field
 
@@ -11,12 +12,16 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Bearing, Shaft, SliderCrank
+from laufruhe.machine.layouts import Throw
 
 
 class MainBearingTable(Table):
     """A main bearing."""
 
-    x: f.Length
+    x: f.Length | None = f.told("Place along the shaft.")
+    beside_throws: f.PositiveLength | None = f.told(
+        "In place of x, a bearing in the middle between neighbouring throws, and one so far beyond either end."
+    )
     name: Name | None = f.told("Name of the bearing; by default its number from the front.")
     shaft: str = CRANKSHAFT.name
     diameter: f.OpenPositiveLength | None = f.told(
@@ -24,6 +29,30 @@ class MainBearingTable(Table):
     )
     width: f.OpenPositiveLength | None = Field(default=None, description="Width of the journal; needed for a pressure.")
     friction: f.NonNegative | None = f.told("Coefficient of friction; needed for friction power.")
+
+
+def one_by_one(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> list[MainBearingTable]:
+    """A table for every bearing, those beside throws in order from the front."""
+    found: list[MainBearingTable] = []
+    for k, table in enumerate(tables):
+        where, beyond = f"main_bearings[{k + 1}]", table.beside_throws
+        if (beyond is None) == (table.x is None):
+            rule = "is missing; give a place, or beside_throws" if beyond is None else "is told beside beside_throws"
+            raise Refused(f"{where}.x", None, rule, "leave one out" if beyond else '"-62.5 mm", for example')
+        if beyond is None:
+            found.append(table)
+            continue
+        if table.name is not None:
+            raise Refused(f"{where}.name", table.name, "names several bearings", "leave it out")
+        for key in ("diameter", "width"):
+            if isinstance(getattr(table, key), Open):
+                raise Refused(f"{where}.{key}", None, "is open for several bearings", "list them one by one, by x")
+        at = sorted({throw.x for throw in throws if throw.shaft.name == table.shaft}, reverse=True)
+        if not at:
+            raise Refused(f"{where}.shaft", table.shaft, "has no throws", "name a shaft with cranks")
+        places = [at[0] + beyond, *(0.5 * (a + b) for a, b in pairwise(at)), at[-1] - beyond]
+        found += [table.model_copy(update={"x": x, "beside_throws": None}) for x in places]
+    return found
 
 
 def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]) -> tuple[Bearing, ...]:
@@ -39,7 +68,7 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
             raise Refused(f"{where}.friction", table.friction, rule, "add diameter")
         name = table.name or str(k + 1)
         size = [None if each is None else Open.of(each).start for each in (table.diameter, table.width)]
-        bearing = Bearing(name, table.x, size[0], size[1], table.friction, shafts[table.shaft])
+        bearing = Bearing(name, table.x or 0.0, size[0], size[1], table.friction, shafts[table.shaft])
         for other in found:
             _check_apart(bearing, other, where)
         if any(part.shaft == bearing.shaft and part.x == bearing.x for part in parts):

@@ -20,7 +20,7 @@ from laufruhe.errors import Complaint, InputError, ModelError, wrong_call
 from laufruhe.files import edits
 from laufruhe.files.asked import limits_of, objectives_of
 from laufruhe.files.assembly import assembly_of
-from laufruhe.files.bearings import bearings_of
+from laufruhe.files.bearings import MainBearingTable, bearings_of, one_by_one
 from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, complaints_of, key_path, toml_remedy
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
@@ -266,7 +266,8 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     """The problem of a file whose [engine] has this table in its place."""
     told = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
     cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and any(point.gas for point in told))
-    bearings = bearings_of(file.main_bearings, cylinders)
+    told_bearings = one_by_one(file.main_bearings, throws)
+    bearings = bearings_of(told_bearings, cylinders)
     gear, cylinders, throws = weighed(file.running_gear, cylinders, throws, bearings)
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
@@ -282,7 +283,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run, gear, geared,
         load_cases_of(file.load_cases, found.block),
     )  # fmt: skip
-    of_sizes = _sizes(file, table, bearings, gear)
+    of_sizes = _sizes(file, table, told_bearings, bearings, gear)
     check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)
     scene, decisions = Scene(engine, points), (*loads, *found.decisions, *of_wheel, *of_chain, *of_sizes)
@@ -309,10 +310,11 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
 
 
 def _sizes(
-    file: ProblemFile, table: EngineTable, bearings: Sequence[Bearing], gear: RunningGear | None
-) -> tuple[Decision, ...]:
+    file: ProblemFile, table: EngineTable, told: Sequence[MainBearingTable], bearings: Sequence[Bearing],
+    gear: RunningGear | None,
+) -> tuple[Decision, ...]:  # fmt: skip
     """Open sizes of the running gear."""
-    found = tuple(size_decisions(file.running_gear, table, file.main_bearings, bearings))
+    found = tuple(size_decisions(file.running_gear, table, told, bearings))
     if found and gear is not None and gear.density is not None:
         check_factors(file.counterweights, "counts masses that follow from sizes, which are open")
     return found

@@ -91,6 +91,9 @@ def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequ
     if table.density is not None and any(type(p) is not SliderCrank or p.shaft != CRANKSHAFT for p in parts):
         rule = "weighs running gear of plain slider-cranks on one crankshaft"
         raise Refused("running_gear.density", units.shown(table.density, "kg/m^3"), rule, "give the masses in [engine]")
+    if any(part.master_bank is not None for part in parts):
+        rule = "sizes rods that work on the crank pin, and these are hinged to a master rod"
+        raise Refused("running_gear", None, rule, "leave it out")
     with blamed_on("running_gear"):
         return RunningGear(
             table.elastic_modulus,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -38,16 +38,29 @@ class Knuckle:
 
     def motion(self, lib: Any, alpha: Any, bank: float) -> tuple[Any, Any, Any]:
         """Place with first and second derivative, in the plane of a cylinder at `bank` and its angle alpha (K11)."""
-        zero, lead = 0.0 * alpha, bank - self.master.bank
-        radius = zero + self.master.crank_radius
-        length = zero + self.master.rod_length
-        shape = (lib, alpha + lead, radius / length, self.master.offset / length)
-        rod = kinematics.cos_psi(*shape) - 1j * kinematics.sin_psi(*shape)
-        rate, swing = -kinematics.rod_rate(*shape), -kinematics.rod_acceleration(*shape)
-        turn = zero + (self.angle - lead)
-        arm = self.radius * rod * (lib.cos(turn) + 1j * lib.sin(turn))
-        pin = radius * (lib.cos(alpha) + 1j * lib.sin(alpha))
+        arm, rate, swing = self._arm(lib, alpha, bank)
+        pin = (0.0 * alpha + self.master.crank_radius) * (lib.cos(alpha) + 1j * lib.sin(alpha))
         return pin + arm, 1j * (pin + rate * arm), (1j * swing - rate * rate) * arm - pin
+
+    def _shape(self, lib: Any, alpha: Any, bank: float) -> tuple[Any, Any, Any, Any]:
+        """What tells how the master rod leans at an angle of a cylinder at `bank`."""
+        zero, length = 0.0 * alpha, 0.0 * alpha + self.master.rod_length
+        lead = bank - self.master.bank
+        return lib, alpha + lead, (zero + self.master.crank_radius) / length, self.master.offset / length
+
+    def _arm(self, lib: Any, alpha: Any, bank: float) -> tuple[Any, Any, Any]:
+        """From the crank pin to this one, and how it turns."""
+        shape = self._shape(lib, alpha, bank)
+        rod = kinematics.cos_psi(*shape) - 1j * kinematics.sin_psi(*shape)
+        turn = 0.0 * alpha + (self.angle - (bank - self.master.bank))
+        arm = self.radius * rod * (lib.cos(turn) + 1j * lib.sin(turn))
+        return arm, -kinematics.rod_rate(*shape), -kinematics.rod_acceleration(*shape)
+
+    def push(self, lib: Any, alpha: Any, bank: float, force: Any) -> Any:
+        """What the master's piston leans with so that its rod does not turn under `force` here (B11)."""
+        arm, _, _ = self._arm(lib, alpha, bank)
+        reach = (0.0 * alpha + self.master.rod_length) * kinematics.cos_psi(*self._shape(lib, alpha, bank))
+        return -(arm.conjugate() * force).imag / reach
 
     def length_to(self, reach: complex, bank: float) -> float:
         """Length of a rod whose piston pin comes as far as `reach` on its axis and no farther (K13)."""
@@ -70,7 +83,6 @@ class ArticulatedCrank(SliderCrank):
     """A cylinder whose rod works on a knuckle pin; `rotating_mass` is the rod's share there."""
 
     knuckle: Knuckle
-    has_pin_loads: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -130,6 +142,43 @@ class ArticulatedCrank(SliderCrank):
             velocity.real - length * rate * sine,
             acceleration.real - length * (swing * sine + rate * rate * cosine),
         ), (-rate, -swing)
+
+    def rod_lean(self, lib: Any, alpha: Any) -> tuple[Any, Any]:
+        """Sine and cosine of the angle chi between its rod and the cylinder axis (K12)."""
+        place, _, _ = self.knuckle.motion(lib, alpha, self.bank)
+        sine = (place.imag - self.offset) / (0.0 * alpha + self.rod_length)
+        return sine, lib.sqrt((1.0 - sine) * (1.0 + sine))
+
+    @property
+    def crank_pin_mass(self) -> float:
+        """Nothing: its rod's share is at the knuckle pin [kg]."""
+        return 0.0
+
+    @property
+    def master_bank(self) -> float:
+        """Of the master's cylinder [rad]."""
+        return self.knuckle.master.bank
+
+    def is_hinged_to(self, master: SliderCrank) -> bool:
+        """Whether this is its master's cylinder."""
+        place = master.shaft, master.x, master.bank
+        return not isinstance(master, ArticulatedCrank) and place == (self.shaft, self.x, self.master_bank)
+
+    def on_pin(self, lib: Any, alpha: Any, force: Any, with_masses: bool) -> Any:
+        """On the knuckle pin, with the pull of the mass there (B11)."""
+        if not with_masses:
+            return force
+        _, _, acceleration = self.knuckle.motion(lib, alpha, self.bank)
+        return force - self.rotating_mass * acceleration
+
+    def on_wall_of_master(self, lib: Any, alpha: Any, force: Any) -> Any:
+        """What holds the master rod against the moment of a force on the knuckle pin about the crank pin (B11)."""
+        return self.knuckle.push(lib, alpha, self.bank, force)
+
+    @property
+    def big_end_area(self) -> float:
+        """Not told of a knuckle pin."""
+        raise ModelError(f"{self.name} works on a knuckle pin, whose area is not told; ask for the crank-pin force")
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
         """Piston, rod and knuckle pin, less what is counted at the crank pin."""

@@ -307,8 +307,38 @@ class SliderCrank:
 
         In the plane turned to the cylinder axis: the rod leans on the wall.
         """
-        shape = lib, self.fires_at + self.shaft.ratio * angles, self.rod_ratio, self.offset_ratio
-        return 1.0 - 1j * kinematics.sin_psi(*shape) / kinematics.cos_psi(*shape)
+        sine, cosine = self.rod_lean(lib, self.fires_at + self.shaft.ratio * angles)
+        return 1.0 - 1j * sine / cosine
+
+    def rod_lean(self, lib: Any, alpha: Any) -> tuple[Any, Any]:
+        """Sine and cosine of the angle between rod and cylinder axis (K1, K2)."""
+        shape = lib, alpha, self.rod_ratio, self.offset_ratio
+        return kinematics.sin_psi(*shape), kinematics.cos_psi(*shape)
+
+    @property
+    def crank_pin_mass(self) -> float:
+        """What turns with its rod's end at the crank pin [kg]."""
+        return self.rotating_mass
+
+    @property
+    def master_bank(self) -> float | None:
+        """Bank angle of the cylinder whose rod carries its own [rad]; None of a rod on the crank pin."""
+        return None
+
+    def is_hinged_to(self, _master: SliderCrank) -> bool:
+        """Whether its rod works on a pin of another cylinder's rod."""
+        return False
+
+    def on_pin(self, _lib: Any, _alpha: Any, force: Any, _with_masses: bool) -> Any:
+        """Force on the pin that its rod works on, of one on its piston pin, in the plane turned to its axis (B11).
+
+        With the pull of what moves with that pin but does not turn with the crank, at unit speed of the crank.
+        """
+        return force
+
+    def on_wall_of_master(self, _lib: Any, alpha: Any, _force: Any) -> Any:
+        """By how much more the piston of its master rod leans on the wall for a force on its pin (B11)."""
+        return 0.0 * alpha
 
     def outlines(self, _alpha: float) -> tuple[Outline, ...]:
         """Bodies at an angle of its crank; of none a piston and a rod are drawn."""

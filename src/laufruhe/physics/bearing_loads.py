@@ -1,4 +1,4 @@
-"""Loads inside the crankcase: pistons on their walls, rods on their pins, crankshaft on its main bearings (B1-B7).
+"""Loads inside the crankcase: pistons on their walls, rods on their pins, crankshaft on its main bearings (B1-B11).
 
 Piston and small end are driven along the cylinder axis by gas and inertia, P; the rod leans on
 the cylinder wall with N, so that it turns as it does. Their sum is what the rod presses on its pin:
@@ -6,6 +6,9 @@ the cylinder wall with N, so that it turns as it does. Their sum is what the rod
     P = -m s'' - A (p - p_crankcase)                                        (B1; textbook eqs. 16, 17)
     N = -P tan psi - dTheta psi'' / (l cos psi)                             (B2; eq. 12)
     F_pin = (P + i N) e^{i beta} + m_rot r w^2 e^{i (phi + theta)}          (B3; example 3)
+
+A rod that is hinged to a master rod presses its knuckle pin so; the master's pin carries that as well, and the
+master's piston leans on its wall by as much more as turns the master rod back (B11).
 
 Pins, webs and counterweights load the crankshaft, each in its own plane; it is taken as cut in the
 middle of its journals, so that the two bearings beside a load share it by the lever rule (B4). Bearings
@@ -23,7 +26,7 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Bearing, Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank, kinematics
+from laufruhe.machine import Bearing, Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
 from laufruhe.numerics.turns import as_turn, cis, star_sum
@@ -34,6 +37,8 @@ from laufruhe.physics.shaking_loads import rotor_loads, rotor_wrench
 from laufruhe.physics.star_loads import order_index, spread
 
 OfPart: TypeAlias = Callable[[Cycle, SliderCrank, float, GasModel | None, Fidelity], Spectrum]
+Felt: TypeAlias = Callable[[SliderCrank, Array, ComplexArray, bool], tuple[Array, ...]]
+"""What is felt of the force at a piston pin, at some angles of the crank; whether masses at other pins count."""
 
 
 def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
@@ -42,7 +47,7 @@ def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
 
 
 def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Force of every rod on its crank pin (B1-B3).
+    """Force of every rod on its pin, of a hinged one on its knuckle pin (B1-B3, B11).
 
     Returns
     -------
@@ -51,13 +56,21 @@ def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
     Raises
     ------
     ModelError
-        If the crank turns unevenly, or a mechanism is no plain slider-crank.
+        If the crank turns unevenly, or a mechanism has no pin.
     """
-    return _of_parts(_of_rod, engine, point, fidelity)
+    own = _of_parts(_of_rod, engine, point, fidelity)
+    if (carried := _carried(engine.slider_cranks)) is None:
+        return own
+    return own + crank_forces(engine, point, fidelity).each(partial(np.einsum, "mk,nkd->nmd", carried))
+
+
+def crank_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """What every cylinder brings to its crank pin, a hinged one through the master rod, as `pin_forces` (B3, B11)."""
+    return _of_parts(_of_crank, engine, point, fidelity)
 
 
 def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """What drives every piston pin along its cylinder, and how its rod leans on the wall (B1, B2).
+    """What drives every piston pin along its cylinder, and how its rod leans on the wall (B1, B2, B11).
 
     Returns
     -------
@@ -71,7 +84,17 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
     for part in engine.slider_cranks:
         if not part.has_rod:
             raise ModelError(f"{part.name} has no rod that leans on a cylinder wall; ask for the crank-pin force")
-    return _of_parts(_of_piston_pin, engine, point, fidelity)
+    own = _of_parts(_of_piston_pin, engine, point, fidelity)
+    if (carried := _carried(engine.slider_cranks)) is None:
+        return own
+    across = np.multiply.outer(carried, np.array([[0.0, 1.0]]))
+    return own + _of_parts(_of_hinge, engine, point, fidelity).each(partial(np.einsum, "mkcd,nkc->nmd", across))
+
+
+def _carried(parts: Sequence[SliderCrank]) -> Array | None:
+    """Which rods are hinged to which, shape (masters, cylinders); None where none is."""
+    found = np.array([[part.is_hinged_to(master) for part in parts] for master in parts], dtype=float)
+    return found if found.any() else None
 
 
 def _of_parts(of: OfPart, engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -109,7 +132,7 @@ def _of_rods(
     fidelity: Fidelity,
 ) -> Spectrum:  # fmt: skip
     """What the rods bring to every main bearing: the same whatever is balanced."""
-    pins = _side_by_side(_of_rod, cycle, parts, speed, gas, fidelity)
+    pins = _side_by_side(_of_crank, cycle, parts, speed, gas, fidelity)
     shares = shares_of(bearings, tuple((part.shaft, part.x) for part in parts), fidelity.crankshaft)
     return pins.each(partial(np.einsum, "bp,npd->nbd", shares))
 
@@ -221,73 +244,108 @@ def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
     return rotor_loads((rotor,), speed, cycle).each(lambda wrench: wrench[:, :3])
 
 
-@lru_cache(maxsize=256)
 def _of_piston_pin(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
     """P and N of one cylinder, shape (n, 2) (B1, B2)."""
-    if not part.has_pin_loads:
-        raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
-    ratio = part.shaft.ratio
-    series = _inertia_orders(part, fidelity) * (ratio * speed) ** 2
-    moved = series * star_sum(np.ones((1, 1)), [part.star_turn], np.arange(len(series)))
-    moved = moved if ratio > 0.0 else moved.conj()
-    load = fidelity.kept(spread(moved, order_index(cycle, abs(ratio)), cycle))
-    if gas is not None:
-        load = load + fidelity.kept(_gas_orders(cycle, part, gas, fidelity))
-    load.coefficients.setflags(write=False)
-    return load
+    return _felt(cycle, part, speed, gas, fidelity, _at_piston)
+
+
+def _of_hinge(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
+    """By how much more the piston of the master rod leans on its wall, shape (n, 1) (B11)."""
+    return _felt(cycle, part, speed, gas, fidelity, _at_master)
 
 
 @lru_cache(maxsize=256)
 def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
     """Force of one rod on its pin, shape (n, 3) (B3)."""
-    load = _of_piston_pin(cycle, part, speed, gas, fidelity)
+    load = _felt(cycle, part, speed, gas, fidelity, _at_pin)
     y, z = cis(as_turn(part.bank)).imag, cis(as_turn(part.bank)).real
     turned = load.each(lambda own: own @ np.array([[0.0, y, z], [0.0, z, -y]]))
-    rod = Rotor("rod", part.x, part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
+    rod = Rotor("rod", part.x, part.crank_pin_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
     found = turned + _of_rotor(rod, speed, cycle)
     found.coefficients.setflags(write=False)
     return found
 
 
 @lru_cache(maxsize=256)
-def _inertia_orders(part: SliderCrank, fidelity: Fidelity) -> ComplexArray:
-    """P and N of the masses alone at unit speed of the crank, by order of its own angle, shape (n, 2) (B1, B2)."""
+def _of_crank(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
+    """What one cylinder brings to its crank pin, shape (n, 3) (B3, B11)."""
+    found = _of_rod(cycle, part, speed, gas, fidelity)
+    if part.master_bank is not None:
+        wall = 1j * cis(as_turn(part.master_bank))
+        leaning = _of_hinge(cycle, part, speed, gas, fidelity)
+        found = found + leaning.each(lambda own: own * np.array([0.0, wall.imag, wall.real]))
+        found.coefficients.setflags(write=False)
+    return found
 
-    def loads(alpha: Array) -> tuple[Array, Array]:
+
+def _at_piston(_: SliderCrank, __: Array, force: ComplexArray, ___: bool) -> tuple[Array, ...]:
+    return force.real, force.imag
+
+
+def _at_pin(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
+    own = part.on_pin(np, alpha, force, with_masses)
+    return own.real, own.imag
+
+
+def _at_master(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
+    own = part.on_pin(np, alpha, force, with_masses)
+    return (part.on_wall_of_master(np, alpha, own),)
+
+
+@lru_cache(maxsize=512)
+def _felt(
+    cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity, felt: Felt
+) -> Spectrum:
+    """What is felt of masses and gas of one cylinder, shape (n, d) (B1, B2)."""
+    if not part.has_pin_loads:
+        raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
+    ratio = part.shaft.ratio
+    series = _inertia_orders(part, fidelity, felt) * (ratio * speed) ** 2
+    moved = series * star_sum(np.ones((1, 1)), [part.star_turn], np.arange(len(series)))
+    moved = moved if ratio > 0.0 else moved.conj()
+    load = fidelity.kept(spread(moved, order_index(cycle, abs(ratio)), cycle))
+    if gas is not None:
+        load = load + fidelity.kept(_gas_orders(cycle, part, gas, fidelity, felt))
+    load.coefficients.setflags(write=False)
+    return load
+
+
+@lru_cache(maxsize=256)
+def _inertia_orders(part: SliderCrank, fidelity: Fidelity, felt: Felt) -> ComplexArray:
+    """What is felt of the masses at unit speed of the crank, by order of its own angle, shape (n, d) (B1, B2)."""
+    is_short = fidelity.kinematics == "two-order" and type(part) is SliderCrank
+
+    def loads(alpha: Array) -> tuple[Array, ...]:
         motion = part.motion(np, alpha)
-        ((mass, (_, _, acceleration)),) = motion.points
-        if fidelity.kinematics == "two-order":
+        mass, (_, _, acceleration) = motion.points[0]
+        if is_short:
             acceleration = -part.crank_radius * (np.cos(alpha) + part.rod_ratio * np.cos(2.0 * alpha))
+        sine, cosine = part.rod_lean(np, alpha)
         along = -mass * acceleration.real
-        across = -along * _tangent(part, alpha)
+        across = -along * sine / cosine
         for inertia, (_, turning) in motion.swings if fidelity.rod == "rigid" and part.rod_ratio > 0.0 else ():
-            across += inertia * turning / (part.rod_length * _cosine(part, alpha))
-        return along, across
+            across += inertia * turning / (part.rod_length * cosine)
+        return felt(part, alpha, along + 1j * across, True)
 
-    table = resolved_orders(loads, np.ones((2, 1)), part.name).T
+    width = len(loads(np.zeros(1)))
+    table = resolved_orders(loads, np.ones((width, 1)), part.name).T
     last = fidelity.local_orders(part.shaft.ratio)
     return table if last is None else table[: last + 1]
 
 
 @lru_cache(maxsize=256)
-def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity) -> Spectrum:
-    """P and N of the gas over the crank angle of the engine, shape (n, 2) (B1, B2)."""
+def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity, felt: Felt) -> Spectrum:
+    """What is felt of the gas over the crank angle of the engine, shape (n, d) (B1, B2)."""
 
     def loads(angles: Array) -> Array:
-        ago = [angles + lag for lag in part.swept.lags]
-        total = np.sum([thrust_at(gas, part, cycle, since) * part.lean(np, since) for since in ago], axis=0)
-        return np.stack([total.real, total.imag], axis=1)
+        total: Array | float = 0.0
+        for since in (angles + lag for lag in part.swept.lags):
+            thrust = thrust_at(gas, part, cycle, since) * part.lean(np, since)
+            total += np.stack(felt(part, part.fires_at + part.shaft.ratio * since, thrust, False), axis=1)
+        return np.asarray(total)
 
     from_firing = bent_spectrum(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))
     return fidelity.kept_of_gas(from_firing.later(as_turn(part.firing_angle) / cycle.turns, part.firing_angle))
-
-
-def _cosine(part: SliderCrank, alpha: Array) -> Array:
-    return np.asarray(kinematics.cos_psi(np, alpha, part.rod_ratio, part.offset_ratio))
-
-
-def _tangent(part: SliderCrank, alpha: Array) -> Array:
-    return np.asarray(kinematics.sin_psi(np, alpha, part.rod_ratio, part.offset_ratio) / _cosine(part, alpha))
 
 
 @lru_cache(maxsize=64)

@@ -16,6 +16,7 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.roots import rising_root
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.uneven_speed import gas_torque, moving_inertia, start_energy
 
@@ -67,6 +68,18 @@ class Swing:
         except ModelError:
             return np.inf
         return float((speeds.max() - speeds.min()) / self.speed)
+
+    def least_inertia(self, degree: float) -> float:
+        """Least inertia beside pistons and rods that keeps the degree of irregularity [kg m2] (T3).
+
+        Zero where none is needed. The degree falls as the inertia grows.
+        """
+        if self.irregularity(0.0) <= degree:
+            return 0.0
+        enough = float(np.ptp(self.work)) / (degree * self.speed**2) + float(np.ptp(self.inertia)) / degree
+        while self.irregularity(enough) > degree:
+            enough *= 2.0
+        return rising_root(lambda inertia: degree - self.irregularity(inertia), 0.0, enough)
 
 
 def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Swing:

@@ -31,7 +31,7 @@ from laufruhe.machine import (
 from laufruhe.machine.running_gear import ring_area, round_modulus
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.bearing_loads import pin_forces
+from laufruhe.physics.bearing_loads import crank_forces, pin_forces
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads
@@ -107,7 +107,7 @@ def _shared(
     if any(part.shaft != CRANKSHAFT for part in engine.slider_cranks):
         raise ModelError("sections are sized of engines with one crankshaft")
     by_rod = np.array([[share(part.x) for part in engine.slider_cranks] for share in shares])
-    total = pin_forces(engine, point, fidelity).each(partial(np.einsum, "kc,ncd->nkd", by_rod))
+    total = crank_forces(engine, point, fidelity).each(partial(np.einsum, "kc,ncd->nkd", by_rod))
     for rotor in engine.rotors:
         own = np.array([share(rotor.x) for share in shares])
         if rotor.shaft == CRANKSHAFT and rotor.unbalance and own.any():

@@ -14,7 +14,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from laufruhe.plots import style
 from laufruhe.plots.style import as_svg, heading, page, save, styled
@@ -119,6 +119,7 @@ def _axis(axes: Axes, name: Literal["x", "y"], axis: Axis) -> None:
         axes.set(**{f"{name}lim": axis.ends})
     if axis.ticks is not None:
         own.set_ticks([place for place, _ in axis.ticks], [text for _, text in axis.ticks])
+        own.set_minor_locator(NullLocator())
     if not axis.grid:
         axes.grid(axis=name, visible=False)
         if name == "y":

@@ -13,6 +13,8 @@ from laufruhe.units import readable
 
 # height of a row, and of what stands above and below all of them [inch]
 ROW, AROUND = 0.19, 0.9
+# panels side by side, and from which share of the largest on an axis is logarithmic
+MOST, SPREAD = 4, 200.0
 
 
 def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
@@ -27,7 +29,8 @@ def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
     unit, metric = data["objective"].attrs["units"], data.attrs["metric"]
     if unit and metric not in [name for name, *_ in told]:
         told.insert(0, (metric, *readable(unit), data["objective"].values[order]))
-    columns = min(len(told), 4)
+    # in rows of about as many
+    columns = -(-len(told) // -(-len(told) // MOST))
     panels = [
         _panel(f"{name}\n[{unit}]" if unit else f"{name}\n", factor * values, names if k % columns == 0 else [])
         for k, (name, unit, factor, values) in enumerate(told)
@@ -36,19 +39,32 @@ def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
     decided = "Each at its proven optimum" if proven == whole else f"{proven} of {whole} at a proven optimum"
     size = (p.WIDEST / columns, AROUND + ROW * len(names))
     said = f"{words} {decided}, the best first."
-    return p.Picture(
-        data.attrs["title"], said, panels, p.credit(data), size=size, columns=columns, gap=0.12
-    )  # fmt: skip
+    gap = 0.12 if len(told) == columns else 0.5
+    return p.Picture(data.attrs["title"], said, panels, p.credit(data), size=size, columns=columns, gap=gap)
 
 
 def _panel(title: str, values: np.ndarray, names: list[str]) -> p.Panel:
     most = float(np.nanmax(values, initial=0.0)) or 1.0
+    least = float(np.nanmin(values, initial=most))
+    # what spreads over decades would be lines of no length
+    low = 10.0 ** math.floor(math.log10(least)) if 0.0 < least < most / SPREAD else 0.0
+    span = math.log(most / low) if low else most
     known, places = np.isfinite(values), np.arange(len(values), dtype=float)
     marks: list[p.Mark] = [p.Bars(places[known], values[known], 0.62, upright=False)]
     for place, value in zip(places.tolist(), values.tolist(), strict=True):
         is_told = math.isfinite(value)
         shown = number(value, scale=most) if is_told else "not told"
-        marks.append(p.Words((value if is_told else 0.0) + 0.03 * most, place, shown))
+        at = value if is_told else low
+        marks.append(p.Words(at * math.exp(0.03 * span) if low else at + 0.03 * span, place, shown))
     ticks = [(float(row), each) for row, each in enumerate(names)]
     side = p.Axis(ends=(len(values) - 0.4, -0.6), ticks=ticks, grid=False)
-    return p.Panel(marks, p.Axis(ends=(0.0, 1.7 * most)), side, title)
+    end = low * math.exp(1.7 * span) if low else 1.7 * span
+    return p.Panel(marks, p.Axis(ends=(low, end), log=(1.0,) if low else (), ticks=_decades(low, end)), side, title)
+
+
+def _decades(low: float, high: float) -> list[tuple[float, str]] | None:
+    """A few ticks of a logarithmic axis, from its end on; None where it is none."""
+    if not low:
+        return None
+    first, last = round(math.log10(low)), math.floor(math.log10(high))
+    return [(10.0**k, f"{10.0**k:g}") for k in range(first, last + 1, max((last - first) // 2, 1))]

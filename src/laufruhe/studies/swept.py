@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -19,7 +19,6 @@ from laufruhe.files.study_tables import Axis, CaseTable, SweepTable, axis_of, ch
 from laufruhe.present.measures import limits_of, main_load, mount_orders, shaking_orders
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, measured
-from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve, state
 from laufruhe.solvers.result import Result
@@ -51,18 +50,24 @@ def decided(problem: Problem) -> tuple[Result, str, str]:
     return result, str(result.status), proof
 
 
-def solved(problem: Problem, further: Mapping[str, Measure] | None = None) -> Record:
+Further: TypeAlias = Callable[[Evaluation], float]
+"""A further quantity of a design; `ModelError` says why it has none."""
+
+
+def solved(problem: Problem, further: Mapping[str, Further] | None = None) -> Record:
     """What is kept of a scene [SI]; NaN for what it has not, as one without a design.
 
     Its metric and the unit of that, status and proof ("as given" where nothing was open), the
     objective as given, as decided, and what no design falls below; mean and maximum force by
     mount [N], means over the operating points by their weights; what was decided, and forces by
-    order; how limits stand, and their shadow prices, by name; and the design in further measures.
+    order; how limits stand, and their shadow prices, by name; and the design in further quantities,
+    or why it has none.
     """
     shown, status, proof = decided(problem)
     objective, bound = shown.objective, shown.certificate.lower_bound if shown.certificate else math.nan
     limits = limits_of(shown)
     designed = status not in (FAILED, "infeasible")
+    told = {name: _told(shown.final, of) if designed else (math.nan, "") for name, of in (further or {}).items()}
     nothing = dict.fromkeys(shown.initial.mount_names, (math.nan, math.nan))
     before, after = _on_mounts(problem, shown.initial), _on_mounts(problem, shown.final) if designed else nothing
     return {
@@ -84,16 +89,17 @@ def solved(problem: Problem, further: Mapping[str, Measure] | None = None) -> Re
         "limit_value": {limit.name: _finite(limit.value) for limit in limits},
         "shadow_price": {limit.name: limit.shadow_price for limit in limits if shown.certificate},
         "limit_units": {limit.name: limit.unit for limit in limits},
-        "further": {name: _told(shown.final, of) if designed else math.nan for name, of in (further or {}).items()},
+        "further": {name: value for name, (value, _) in told.items()},
+        "untold": {name: why for name, (_, why) in told.items()},
     }
 
 
-def _told(design: Evaluation, measure: Measure) -> float:
-    """NaN where a design does not tell it: the mass of a weight without a radius, or the pin of an articulated rod."""
+def _told(design: Evaluation, of: Further) -> tuple[float, str]:
+    """A quantity of a design; NaN and why where it has none, as the mass of a weight without a radius."""
     try:
-        return _finite(design.value(measure))
-    except ModelError:
-        return math.nan
+        return _finite(of(design)), ""
+    except ModelError as error:
+        return math.nan, str(error).partition("; ")[0]
 
 
 def _by_order(design: Evaluation) -> dict[str, float]:

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 from pydantic import Field
 
+from laufruhe.errors import InputError, ModelError
+from laufruhe.files import fields as f
 from laufruhe.files.asked import QuantityName
 from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.files.study_tables import CaseTable
+from laufruhe.physics.irregularity import swing_of
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
@@ -25,6 +30,7 @@ from laufruhe.studies.text import NOTHING, Rows, Text, number
 from laufruhe.units import readable
 
 _SAME, _NOTHING = 1e-9, 1e-7
+_LEAST_FLYWHEEL = "least flywheel"
 
 
 class LayoutComparison(SweptPart):
@@ -33,6 +39,9 @@ class LayoutComparison(SweptPart):
     kind: Literal["layout comparison"]
     further: list[QuantityName] = Field(
         default_factory=list, max_length=8, description="By which the designs decided are ranked beside the metric."
+    )
+    flywheel_for: f.Positive | None = f.told(
+        "Degree of irregularity for which the least inertia beside pistons and rods is told, and ranked."
     )
 
     def points(self, scenes: Scenes) -> list[Point]:
@@ -44,26 +53,36 @@ class LayoutComparison(SweptPart):
             rule = f"differs between cases '{self.cases[0].name}' and '{odd.name}'"
             raise scenes.refused(odd, "equal_power_to", rule, "give all cases the same, or none")
         self._check_cylinders(scenes)
-        for case in self.cases:
-            self._measures(scenes.problem(Point(case, self.combinations()[0], self.metric)), case, scenes)
+        at = self.combinations()[0]
+        told = [self._measures(scenes.problem(Point(case, at, self.metric)), case, scenes) for case in self.cases]
+        for name in self.further:
+            first, *others = (measures[name] for measures in told)
+            if isinstance(first, InputError) and all(isinstance(other, InputError) for other in others):
+                raise first
         return found
 
-    def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[str, Measure]:
-        """What each engine is ranked by beside the metric."""
-        scene, found = Scene(problem.engine, problem.points), {}
+    def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[str, Measure | InputError]:
+        """What each engine is ranked by beside the metric, or why it has no such quantity."""
+        scene, found = Scene(problem.engine, problem.points), dict[str, Measure | InputError]()
         for name in self.further:
-            with scenes.named(case):
-                # an engine without weights has none to add up, and is no worse for it
-                is_mass = name in MEASURES and MEASURES[name][0].is_mass
-                own = Measure(*MEASURES[name]) if is_mass else scene.measure(name, QuantityTable(), "study.further")
-                found[name] = own
+            # an engine without weights has none to add up, and is no worse for it
+            is_mass = name in MEASURES and MEASURES[name][0].is_mass
+            try:
+                with scenes.named(case):
+                    own = Measure(*MEASURES[name]) if is_mass else scene.measure(name, QuantityTable(), "study.further")
+                    found[name] = own
+            except InputError as error:
+                found[name] = error
         return found
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The proven optimum of one scene, and the same design in every further quantity."""
         with scenes.blamed(point):
             problem = scenes.problem(point)
-            return solved(problem, self._measures(problem, point.case, scenes))
+            further = {n: partial(_value, m) for n, m in self._measures(problem, point.case, scenes).items()}
+            if self.flywheel_for is not None:
+                further[_LEAST_FLYWHEEL] = partial(_least_flywheel, self.flywheel_for)
+            return solved(problem, further)
 
     def _check_cylinders(self, scenes: Scenes) -> None:
         """Layouts are compared from one cylinder: else size would pass for layout."""
@@ -86,13 +105,19 @@ class LayoutComparison(SweptPart):
         power = self.cases[0].equal_power_to
         at = "equal cylinders" if power is None else f"the power of {power} cylinders"
         found = super().dataset(points, records).assign_attrs(at=at)
-        if not self.further:
+        names = list(dict.fromkeys(name for record in records for name in record["further"]))
+        if not names:
             return found
-        values = np.array([[record["further"][name] for name in self.further] for record in records], dtype=float)
+        values = np.array([[record["further"][name] for name in names] for record in records], dtype=float)
+        why = [[record["untold"][name] for name in names] for record in records]
         told = {"long_name": "further quantity of the design decided, in quantity_unit"}
-        units = [MEASURES[name][0].unit for name in self.further]
-        return found.assign(further=(("point", "quantity"), values, told)).assign_coords(
-            quantity=self.further, quantity_unit=("quantity", units)
+        wheel = f"flywheel for 1/{number(1.0 / self.flywheel_for)}" if self.flywheel_for else ""
+        units = ["kg m^2" if name == _LEAST_FLYWHEEL else MEASURES[name][0].unit for name in names]
+        both = ("point", "quantity")
+        return found.assign(
+            further=(both, values, told), untold=(both, why, {"long_name": "why a design has no such quantity"})
+        ).assign_coords(
+            quantity=[wheel if name == _LEAST_FLYWHEEL else name for name in names], quantity_unit=("quantity", units)
         )
 
     @staticmethod
@@ -116,22 +141,34 @@ class LayoutComparison(SweptPart):
         return over_sweep(data, [], words)
 
 
+def _value(measure: Measure | InputError, design: Evaluation) -> float:
+    if isinstance(measure, InputError):
+        raise ModelError(measure.complaints[0].rule)
+    return design.value(measure)
+
+
+def _least_flywheel(degree: float, design: Evaluation) -> float:
+    """Least inertia beside pistons and rods that keeps a degree of irregularity at every operating point [kg m2]."""
+    return max(swing_of(design.engine, at.point, design.fidelity).least_inertia(degree) for at in design.loads)
+
+
 def _ranking(data: xr.Dataset) -> list[Text]:
     """Best first; places among those that tell a quantity, those that differ by nothing on one place."""
-    best = data["objective"].values
-    columns = [(data.attrs["metric"], data["objective"].attrs["units"], best)]
+    best, points = data["objective"].values, data.sizes["point"]
+    columns = [(data.attrs["metric"], data["objective"].attrs["units"], best, [""] * points)]
     for k, name in enumerate(data["quantity"].values.tolist()):
         values = data["further"].values[:, k]
         # what cancels leaves a rounding
         near = _NOTHING * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-        columns.append((name, str(data["quantity_unit"].values[k]), np.where(np.abs(values) < near, 0.0, values)))
+        values = np.where(np.abs(values) < near, 0.0, values)
+        columns.append((name, str(data["quantity_unit"].values[k]), values, data["untold"].values[:, k].tolist()))
     swept, rows = swept_names(data), []
-    scaled = [(name, *readable(unit), values, _places(values)) for name, unit, values in columns]
-    for k in sorted(range(len(best)), key=lambda k: (math.isnan(best[k]), best[k])):
+    scaled = [(name, *readable(unit), values, _places(values), why) for name, unit, values, why in columns]
+    for k in sorted(range(points), key=lambda k: (math.isnan(best[k]), best[k])):
         row = [str(data["case"].values[k]), *(str(data[name].values[k]) for name in swept)]
-        rows.append(row + [_placed(factor * values[k], places[k]) for _, _, factor, values, places in scaled])
-    head = ["case", *swept, *(f"{name} [{unit}]" if unit else name for name, unit, _, _, _ in scaled)]
-    words = "Ranked by the first quantity; in parentheses the place by each. A dash: not told by that problem."
+        rows.append(row + [_placed(factor * values[k], at[k], why[k]) for _, _, factor, values, at, why in scaled])
+    head = ["case", *swept, *(f"{name} [{unit}]" if unit else name for name, unit, *_ in scaled)]
+    words = "Ranked by the first quantity; in parentheses the place by each. A dash: why that engine has none."
     return [words, Rows(head, rows[:MOST_ROWS], len(rows))]
 
 
@@ -142,5 +179,5 @@ def _places(values: np.ndarray) -> list[int]:
     return [1 + int((told < value - near).sum()) if math.isfinite(value) else 0 for value in values]
 
 
-def _placed(value: float, place: int) -> str:
-    return f"{number(value)} ({place})" if place else NOTHING
+def _placed(value: float, place: int, why: str) -> str:
+    return f"{number(value)} ({place})" if place else f"{NOTHING} {why}".strip()
