@@ -24,7 +24,7 @@ from laufruhe.fidelity.knobs import KNOBS
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint, SliderCrank
-from laufruhe.machine.slider_crank import Motion
+from laufruhe.machine.bodies import Motion
 from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads

@@ -15,13 +15,12 @@ from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, Rod, Rotor,
 from laufruhe.machine.kinematics import piston_acceleration, rod_acceleration
 from laufruhe.numerics.turns import cis
 from laufruhe.physics.bearing_loads import (
-    beam_shares,
     crank_pin_factors,
-    lever_shares,
     main_bearing_forces,
     pin_forces,
     piston_pin_forces,
 )
+from laufruhe.physics.bearing_shares import beam_shares, lever_shares
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import cylinder_pressure

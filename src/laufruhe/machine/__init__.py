@@ -2,6 +2,7 @@
 
 from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block
+from laufruhe.machine.bodies import Rod
 from laufruhe.machine.chambers import Chamber, Chambers, GasModel, Pump, Steam
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.flywheel import Arms, Flywheel, Rim
@@ -11,7 +12,7 @@ from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.run import Run
 from laufruhe.machine.running_gear import Bolts, PistonPin, RunningGear, Shank, Webs
-from laufruhe.machine.slider_crank import Rod, SliderCrank
+from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.machine.torsion import Absorber, Disc, Section, Torsion
 
 __all__ = [

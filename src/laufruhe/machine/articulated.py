@@ -12,7 +12,8 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
-from laufruhe.machine.slider_crank import Motion, SliderCrank
+from laufruhe.machine.bodies import Motion
+from laufruhe.machine.slider_crank import SliderCrank
 
 _ROUNDS = 60
 _STEPS = 720

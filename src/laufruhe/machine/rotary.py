@@ -13,7 +13,8 @@ import numpy as np
 
 from laufruhe import units
 from laufruhe.errors import ModelError
-from laufruhe.machine.slider_crank import Motion, Outline, SliderCrank, Swept
+from laufruhe.machine.bodies import Motion, Outline
+from laufruhe.machine.slider_crank import SliderCrank, Swept
 
 FLANKS = 3
 _PACE = 2.0 / 3.0

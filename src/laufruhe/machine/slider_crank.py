@@ -10,85 +10,11 @@ from typing import Any, ClassVar, Protocol, Self
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
+from laufruhe.machine.bodies import Motion, Outline
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
 from laufruhe.numerics.turns import Turn, as_turn, cis
 
 _ON_ONE_AXIS = 1e-9
-
-
-@dataclass(frozen=True)
-class Rod:
-    """Connecting rod as a rigid body.
-
-    Attributes
-    ----------
-    length
-        Between the pins [m].
-    mass
-        [kg].
-    centre_of_gravity
-        Distance from the crank pin, on the line of the pins [m].
-    inertia
-        About the centre of gravity, across the plane of motion [kg m2].
-    """
-
-    length: float
-    mass: float
-    centre_of_gravity: float
-    inertia: float
-
-    @property
-    def reciprocating_mass(self) -> float:
-        """Share of the piston pin: two masses keep mass and centre of gravity (eq. 9)."""
-        return self.mass * self.centre_of_gravity / self.length
-
-    @property
-    def rotating_mass(self) -> float:
-        """Share of the crank pin."""
-        return self.mass - self.reciprocating_mass
-
-    @property
-    def inertia_deficit(self) -> float:
-        """Theta - m1 s1^2 - m2 s2^2 [kg m2], what two masses get wrong (eqs. 9, 10)."""
-        return self.inertia - self.mass * self.centre_of_gravity * (self.length - self.centre_of_gravity)
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Where a mechanism's masses are and how they move, by the crank's own angle alpha (C5).
-
-    The plane is turned so that the cylinder axis is real: zeta e^{-i beta} (C4). Momentum of all this is
-    the mechanism's load; the mass at the crank pin is a rotor and left out.
-
-    Attributes
-    ----------
-    points
-        Mass [kg], and its place [m] with first and second derivative. The piston comes first.
-    swings
-        Inertia that point masses leave out [kg m2], with first and second derivative of its angle.
-    """
-
-    points: tuple[tuple[float, tuple[Any, Any, Any]], ...]
-    swings: tuple[tuple[float, tuple[Any, Any]], ...] = ()
-
-
-@dataclass(frozen=True)
-class Outline:
-    """A body as it is drawn.
-
-    Attributes
-    ----------
-    points
-        Of a closed line about the shaft, in the plane turned to the cylinder axis [m].
-    width
-        Along the shaft [m].
-    moves
-        Else it is of the block.
-    """
-
-    points: Any
-    width: float
-    moves: bool
 
 
 @dataclass(frozen=True)

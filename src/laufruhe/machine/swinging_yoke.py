@@ -11,7 +11,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.slider_crank import Motion, Outline, SliderCrank
+from laufruhe.machine.bodies import Motion, Outline
+from laufruhe.machine.slider_crank import SliderCrank
 
 _THICKNESS = 0.15
 _WEIGHT = 7850.0 * _THICKNESS

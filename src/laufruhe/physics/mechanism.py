@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import SliderCrank
-from laufruhe.machine.slider_crank import Motion
+from laufruhe.machine.bodies import Motion
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.physics import order_coefficients
 from laufruhe.physics.fidelity import Fidelity

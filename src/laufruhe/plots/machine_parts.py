@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon, Rectangle
 
-from laufruhe.machine.slider_crank import Outline
+from laufruhe.machine.bodies import Outline
 from laufruhe.plots.style import GREY
 from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.poses import Pose

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.machine import Engine, Rotor, SliderCrank
-from laufruhe.machine.slider_crank import Outline
+from laufruhe.machine.bodies import Outline
 
 STEEL = 7850.0
 THICKNESS = 0.02

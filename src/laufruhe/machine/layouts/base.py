@@ -9,10 +9,11 @@ from typing import Any, ClassVar
 
 from laufruhe import units
 from laufruhe.errors import KeyedError
+from laufruhe.machine.bodies import Rod
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.build import Mechanism, Throw, build
 from laufruhe.machine.layouts.places import Layout
-from laufruhe.machine.slider_crank import Rod, SliderCrank
+from laufruhe.machine.slider_crank import SliderCrank
 
 
 @dataclass(frozen=True)
