@@ -17,10 +17,12 @@ from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound
+from laufruhe.prove.springs import orders as orders_
 from laufruhe.prove.springs import search
 from laufruhe.prove.springs.bound import Multipliers, Program, Proposed
 from laufruhe.prove.springs.conditions import conditions
 from laufruhe.prove.springs.lines import Felt
+from laufruhe.prove.springs.mirrored import mirrored_halves, mirrored_parts
 from laufruhe.prove.springs.open_mounts import OpenMounts, open_mounts
 from laufruhe.prove.springs.program import proposed
 from laufruhe.prove.springs.search import SpringBoxes, spring_bound
@@ -96,41 +98,57 @@ class Truth:
     stiffness: np.ndarray
 
 
-def truth(problem: Problem, mounts: OpenMounts, order: Any, line: Any, x: np.ndarray, u: np.ndarray) -> Truth:
-    """By solving for the motion anew."""
+def truth(
+    problem: Problem, whole: OpenMounts, mounts: OpenMounts, order: Any, line: Any, x: np.ndarray, u: np.ndarray
+) -> Truth:
+    """By solving for the motion anew, of all motions or of half of them."""
     mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
     stiffness, loss, damping = (
         mounts.root @ mounting.total(each) @ mounts.root.T
         for each in (mounting.springs, mounting.losses, mounting.dampers)
     )
-    whole = stiffness + 1j * (loss + order.omega * damping) - order.omega**2 * np.eye(6)
-    motion = np.linalg.solve(whole, order.loads[0] + u @ order.loads[1:])
+    impedance = stiffness + 1j * (loss + order.omega * damping) - order.omega**2 * np.eye(len(stiffness))
+    motion = np.linalg.solve(impedance, order.loads[0] + u @ order.loads[1:])
     travel = mounting.motions @ mounts.root.T @ motion
     elastic = np.einsum("mij,mj->mi", mounting.springs, travel)
     forces = elastic + 1j * np.einsum("mij,mj->mi", mounting.losses + order.omega * mounting.dampers, travel)
-    numbers, products = np.full(mounts.numbers, np.nan), []
+    numbers, products = numbers_of(whole, mounting), []
     for spring in mounts.springs:
-        added = spring.axes.T @ (mounting.springs[spring.mount] - mounts.middles[spring.mount]) @ spring.axes
-        products.append(added @ spring.axes.T @ travel[spring.mount])
+        m, times = mounts.members[spring.mount][0], mounts.times[spring.mount]
+        added = spring.axes.T @ (mounting.springs[m] - mounts.middles[spring.mount]) @ spring.axes
+        products.append(times * added @ spring.axes.T @ travel[m])
+    for place in mounts.places:
+        s = numbers[place.number]
+        products += [s * place.aside @ mounts.turns @ motion]
+        times = [(mounts.times[k] * h, elastic[mounts.members[k][0]]) for k, h in place.mounts]
+        products += [s * sum(h * place.arms @ force for h, force in times)]
+    rows = np.concatenate([added for _, added in line.springs] + [moved for _, moved in line.places])
+    first, count = 1 + line.columns, len(rows)
+    sizes = np.abs(rows[np.arange(count), first + np.arange(count)])
+    w = np.concatenate(products) / line.unit / sizes
+    first = [own[0] for own in mounts.members]
+    vector = np.concatenate([[1.0], u, w.real, w.imag])
+    return Truth(numbers, vector, motion, forces[first], travel[first], stiffness)
+
+
+def numbers_of(whole: OpenMounts, mounting: Any) -> np.ndarray:
+    """s of a design."""
+    numbers = np.full(whole.numbers, np.nan)
+    for spring in whole.springs:
+        added = spring.axes.T @ (mounting.springs[spring.mount] - whole.middles[spring.mount]) @ spring.axes
         terms = np.array([matrix.ravel() for _, matrix in spring.terms]).T
         for (j, _), value in zip(spring.terms, np.linalg.lstsq(terms, added.ravel(), rcond=None)[0], strict=True):
             # mirrored mounts have the same numbers
             assert np.isnan(numbers[j]) or numbers[j] == pytest.approx(value, abs=1e-7)
             numbers[j] = value
     centre = np.array(mounting.block.centre_of_gravity)
-    for place in mounts.places:
+    for place in whole.places:
         m, reach = place.mounts[0]
         here = np.array(mounting.mounts[m].position) - centre
-        middle = (mounts.motions[m] @ np.linalg.inv(mounts.root).T)[:, 3:]
+        middle = (whole.motions[m] @ np.linalg.inv(whole.root).T)[:, 3:]
         given = np.array([middle[1, 2], middle[2, 0], middle[0, 1]]) @ place.axis
-        s = numbers[place.number] = (here @ place.axis - given) / reach
-        products += [s * place.aside @ mounts.turns @ motion]
-        products += [s * sum(h * place.arms @ elastic[k] for k, h in place.mounts)]
-    rows = np.concatenate([added for _, added in line.springs] + [moved for _, moved in line.places])
-    first, count = 1 + line.columns, len(rows)
-    sizes = np.abs(rows[np.arange(count), first + np.arange(count)])
-    w = np.concatenate(products) / line.unit / sizes
-    return Truth(numbers, np.concatenate([[1.0], u, w.real, w.imag]), motion, forces, travel, stiffness)
+        numbers[place.number] = (here @ place.axis - given) / reach
+    return numbers
 
 
 def designs_in(generator: np.random.Generator, boxes: SpringBoxes, about: np.ndarray, count: int) -> Any:
@@ -138,30 +156,35 @@ def designs_in(generator: np.random.Generator, boxes: SpringBoxes, about: np.nda
     for _ in range(count):
         width = generator.choice([1.0, 0.3, 0.05]) * (boxes.upper - boxes.lower)
         low = np.clip(about - width * generator.random(len(about)), boxes.lower, boxes.upper - width)
-        columns = generator.uniform(-0.7, 0.7, len(boxes._columns[0]))
+        columns = generator.uniform(-0.7, 0.7, boxes.columns.count)
         yield low, low + width, low + generator.random(len(about)) ** 2 * width, columns
 
 
 @pytest.mark.parametrize("name", ["stiffness", "all"])
-def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path) -> None:
-    """E42, E43, E52, E53: motion, forces and travel by solving anew, and no condition broken, with turned and moved
-    mounts and unbalances open too."""
+def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """E42, E43, E52, E53, E57: motion, forces and travel by solving anew, and no condition broken, with turned and
+    moved mounts and unbalances open too; of all motions, and of both halves where mounts mirror each other."""
+    monkeypatch.setattr(orders_, "ASIDE", -1.0)
     plain = asked_for(tmp_path, ASKED["narrowed"], mounts=TURNED) if name == "stiffness" else None
     problem = plain or load(POWERTRAIN.with_name("tractor-four-elastic.toml"))
     boxes, generator = asked_of(problem), np.random.default_rng(4)
     about = np.array([d.start_number for d in problem.mount_decisions])
-    kept = 0
+    kept, halves = 0, set[int]()
     for low, high, x, u in designs_in(generator, boxes, about, 40):
-        mounts, orders = open_mounts(problem, low, high), boxes._terms[0][1].orders
-        order = orders[int(generator.integers(len(orders)))]
+        parts, orders = boxes.parts(low, high), boxes._terms[0][1].orders
+        order, k = orders[int(generator.integers(len(orders)))], int(generator.integers(len(parts)))
+        mounts = parts[k]
+        halves.add(k)
+        # of the load of all motions what half of them has
+        order = replace(order, loads=order.loads @ np.linalg.solve(parts[0].root.T, mounts.root.T))
         line = boxes.line(mounts, order, ANY, low, high)
-        told = truth(problem, mounts, order, line, x, u)
+        told = truth(problem, parts[0], mounts, order, line, x, u)
         for function, value in (
             (line.motion, told.motion), (line.forces, told.forces), (line.deflections, told.travel),
             (line.carried, told.stiffness @ told.motion),
         ):  # fmt: skip
             assert np.allclose(function @ told.vector * line.unit, value, rtol=1e-7, atol=1e-8 * np.abs(value).max())
-        assert float(told.vector[1:] @ told.vector[1:]) <= line.reach
+        assert np.all(told.vector[1:] ** 2 <= line.reaches * (1.0 + 1e-9))
         assert np.abs(told.numbers).max() <= 1.0 + 1e-9
         values = np.linalg.eigvalsh(told.stiffness)
         if not _is_allowed(mounts, told.stiffness):
@@ -174,6 +197,42 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path) -> None:
             whole = limit.constant + np.tensordot(told.numbers, limit.slopes, 1) + moments
             assert np.linalg.eigvalsh(whole)[0] >= -1e-9 * max(1.0, np.abs(whole).max())
     assert kept > 10
+    assert halves == {0, 1, 2}
+
+
+ASKEW = {
+    "block": (("centre_of_gravity = [\"-60 mm\", \"0 mm\"", "centre_of_gravity = [\"-60 mm\", \"1 mm\""),),
+    "stiffness": (("mirror_of = \"front left\"", "position = [\"300 mm\", \"-200 mm\", \"0 mm\"]\nstiffness = "
+                   "[\"200 N/mm\", \"200 N/mm\", \"700 N/mm\"]"),),
+    "place": (("mirror_of = \"rear left\"", "position = [\"-350 mm\", \"-200 mm\", \"0 mm\"]\nstiffness = "
+               "[\"200 N/mm\", \"200 N/mm\", \"700 N/mm\"]"),),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ASKEW)
+def test_mounts_that_do_not_mirror_each_other_are_bounded_whole(name: str, tmp_path: Path) -> None:
+    text = changed(POWERTRAIN.with_name("tractor-four-elastic.toml").read_text(encoding="utf-8"), *ASKEW[name])
+    path = tmp_path / "askew.toml"
+    path.write_text(text, encoding="utf-8")
+    problem = load(path)
+    boxes = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
+    assert mirrored_parts(open_mounts(problem, *boxes)) == ()
+
+
+def test_halves_in_the_mirror_add_up_and_no_norm_of_one_is_over_that_of_both() -> None:
+    """E57."""
+    generator = np.random.default_rng(2)
+    members = ((0, 2), (1,), (3, 4))
+    for _ in range(20):
+        felt = generator.normal(size=(5, 3)) + 1j * generator.normal(size=(5, 3))
+        halves = mirrored_halves(felt, members)
+        assert np.allclose(halves[0] + halves[1], felt)
+        angles = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 90))
+        for norm in (np.sum, np.max):
+            worth = [norm(np.linalg.norm((each[..., None] * angles).real, axis=1), axis=0) for each in (felt, *halves)]
+            assert max(each.mean() for each in worth[1:]) <= worth[0].mean() * (1.0 + 1e-12)
+        squares = [np.sum(np.abs(each) ** 2) for each in (felt, *halves)]
+        assert squares[0] == pytest.approx(squares[1] + squares[2])
 
 
 def _is_allowed(mounts: OpenMounts, stiffness: np.ndarray) -> bool:
@@ -275,7 +334,9 @@ def test_a_bound_holds_whatever_a_solver_proposes(tmp_path: Path, monkeypatch: p
 
             parts = ([bad(m) for m in own] for own in (told.caps, told.held, told.links))
             caps, held, links = parts
-            yield replace(found, multipliers=Multipliers(caps, held, bad(told.budgets), bad(told.sets), links))
+            along = [[bad(each) for each in own] for own in told.lengths]
+            roots = bad(told.lines), along
+            yield replace(found, multipliers=Multipliers(caps, held, bad(told.budgets), bad(told.sets), links, *roots))
 
         return wrong
 

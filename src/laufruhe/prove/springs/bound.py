@@ -70,6 +70,37 @@ class Budget:
 
 
 @dataclass(frozen=True, eq=False)
+class Root:
+    """The root of a head: not under the line between what it is at least and at most, nor under a sum of lengths (E58).
+
+    Attributes
+    ----------
+    price
+        Of the root.
+    least, most
+        Of the root.
+    rows
+        Number of an order, and vectors that are linear in the first row of its moments, shape (lengths, k, d): the sum
+        of their lengths.
+    """
+
+    price: float
+    least: float
+    most: float
+    rows: tuple[tuple[int, Array], ...]
+
+    @property
+    def slope(self) -> float:
+        """Of the line by the square."""
+        return 1.0 / (self.least + self.most)
+
+    @property
+    def offset(self) -> float:
+        """Of the line where the square is nothing."""
+        return self.least * self.most * self.slope
+
+
+@dataclass(frozen=True, eq=False)
 class Program:
     """What is minimised, and under what.
 
@@ -78,17 +109,19 @@ class Program:
     sizes
         d of every order.
     reaches
-        What |v|^2 of every order is not over.
+        Of every order squares that those of the entries of v are not over, shape (d - 1,).
     numbers, columns
         How many s there are, and columns of unbalances.
     prices
         Of the heads.
+    roots
+        Of the heads, where these are what is minimised, in place of their prices.
     sets
         Matrices C with <C, (1, u)(1, u)'> not over zero for unbalances allowed, shape (1 + columns, 1 + columns).
     """
 
     sizes: tuple[int, ...]
-    reaches: tuple[float, ...]
+    reaches: tuple[Array, ...]
     numbers: int
     columns: int
     prices: Array
@@ -96,17 +129,23 @@ class Program:
     held: Sequence[Held]
     budgets: Sequence[Budget] = ()
     sets: Sequence[Array] = ()
+    roots: Sequence[Root] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Of caps, conditions, budgets and sets, and of (1, u)(1, u)' being the same for all orders but the first."""
+    """Of caps, conditions, budgets and sets, and of (1, u)(1, u)' being the same for all orders but the first.
+
+    Of every root that of its line, and vectors for its lengths, of every order one for each.
+    """
 
     caps: Sequence[Array]
     held: Sequence[Array]
     budgets: Array
     sets: Array
     links: Sequence[Array]
+    lines: Array
+    lengths: Sequence[Sequence[Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +161,16 @@ class Proposed:
 def follows(program: Program, found: Multipliers) -> float:
     """What multipliers prove: the least value of the heads less all that they price (E44)."""
     left, slopes, bound = [np.zeros((d, d)) for d in program.sizes], np.zeros(program.numbers), 0.0
-    for cap, price in zip(program.caps, _shared(program, found.caps), strict=True):
+    prices = np.array(program.prices, dtype=float)
+    for number, (root, line, along) in enumerate(zip(program.roots, found.lines, found.lengths, strict=True)):
+        share, taken = _of_root(root, float(line), along)
+        prices[number] = share * root.slope
+        bound += share * root.offset
+        for (order, rows), vectors in zip(root.rows, taken, strict=True):
+            first = 0.5 * np.einsum("na,nad->d", vectors, rows)
+            left[order][0] += first
+            left[order][:, 0] += first
+    for cap, price in zip(program.caps, _shared(prices, program.caps, found.caps), strict=True):
         for order, rows in cap.rows:
             left[order] += np.einsum("pad,ab,pbe->de", rows, price, rows, optimize=True)
     for limit, multiplier in zip(program.held, found.held, strict=True):
@@ -145,14 +193,24 @@ def follows(program: Program, found: Multipliers) -> float:
     return bound - float(np.abs(slopes).sum()) + least
 
 
-def _shared(program: Program, multipliers: Sequence[Array]) -> list[Array]:
+def _of_root(root: Root, line: float, along: Sequence[Array]) -> tuple[float, list[Array]]:
+    """What of its price the line has, and vectors of its lengths, none longer than the rest of the price."""
+    line = max(line, 0.0)
+    longest = max((float(np.linalg.norm(each, axis=1).max()) for each in along), default=0.0)
+    if line + longest <= 0.0:
+        return root.price, [np.zeros_like(each) for each in along]
+    factor = root.price / (line + longest)
+    return factor * line, [factor * each for each in along]
+
+
+def _shared(prices: Array, caps: Sequence[Cap], multipliers: Sequence[Array]) -> list[Array]:
     """Multipliers of the caps that take of the price of each head what it has."""
     found = [_positive(multiplier) for multiplier in multipliers]
-    taken = np.zeros(len(program.prices))
-    for cap, price in zip(program.caps, found, strict=True):
+    taken = np.zeros(len(prices))
+    for cap, price in zip(caps, found, strict=True):
         taken[cap.head] += cap.share(price)
-    factors = np.where(taken > 0.0, program.prices / np.where(taken > 0.0, taken, 1.0), 0.0)
-    return [factors[cap.head] * price for cap, price in zip(program.caps, found, strict=True)]
+    factors = np.where(taken > 0.0, prices / np.where(taken > 0.0, taken, 1.0), 0.0)
+    return [factors[cap.head] * price for cap, price in zip(caps, found, strict=True)]
 
 
 def _positive(matrix: Array) -> Array:
@@ -161,8 +219,20 @@ def _positive(matrix: Array) -> Array:
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
 
 
-def _least(matrix: Array, reach: float) -> float:
-    """Least of (1, v) matrix (1, v)' over |v|^2 at most `reach`: a shift that makes it convex takes its share off."""
+def _least(matrix: Array, reaches: Array) -> float:
+    """Least of (1, v) matrix (1, v)' over v_i^2 at most `reaches`: a shift that makes it convex takes its share off.
+
+    The shift is the same for all entries, or for all in parts of what each is not over.
+    """
+    plain = _shifted(matrix, float(reaches.sum()))
+    if not np.all(np.isfinite(reaches)):
+        return plain
+    sizes = np.concatenate([[1.0], np.sqrt(np.maximum(reaches, _FLAT * reaches.max(initial=0.0)))])
+    return max(plain, _shifted(matrix * np.outer(sizes, sizes), float(len(reaches))))
+
+
+def _shifted(matrix: Array, reach: float) -> float:
+    """Least over |v|^2 at most `reach`."""
     whole = 0.5 * (matrix + matrix.T)
     values, vectors = np.linalg.eigh(whole[1:, 1:])
     along = (vectors.T @ whole[1:, 0]) ** 2

@@ -35,15 +35,17 @@ class Line:
     columns
         Of the unbalances in v.
     motion, carried
-        y, and A y in coordinates in which the mass is one, shape (6, d).
+        y, and A y in coordinates in which the mass is one, shape (k, d).
+    members
+        Of every mount the numbers of those of the problem that it stands for.
     deflections, forces
-        Of the mounts, shape (mounts, 3, d).
+        Of one of these, shape (mounts, 3, d).
     springs
         Of every spring u and t, shape (b, d) each.
     places
         Of every place turns and moments (4, d), and s times these.
-    reach
-        What |v|^2 is not over for any design of the box.
+    reaches
+        Squares that those of v are not over for any design of the box, shape (d - 1,).
     unit
         The motion that is counted as one.
     """
@@ -51,11 +53,12 @@ class Line:
     columns: int
     motion: ComplexArray
     carried: ComplexArray
+    members: tuple[tuple[int, ...], ...]
     deflections: ComplexArray
     forces: ComplexArray
     springs: tuple[tuple[ComplexArray, ComplexArray], ...]
     places: tuple[tuple[ComplexArray, ComplexArray], ...]
-    reach: float
+    reaches: Array
     unit: float
 
     @property
@@ -84,11 +87,13 @@ class Felt:
         """Deflections of springs that no such design goes over: a mount has its softest direction at least."""
         out = np.full(mounts.mounts, math.inf)
         soft = np.bincount(mounts.stands, mounts.softest, mounts.mounts)
-        for k in self.mounts:
+        for k, own in enumerate(mounts.members):
+            if own[0] not in self.mounts:
+                continue
             if self.is_travel:
-                out[k] = self.most
+                out[k] = self.most * mounts.times[k]
             elif soft[k] > 0.0 and not mounts.dynamic:
-                out[k] = self.most / soft[k]
+                out[k] = self.most * mounts.times[k] / soft[k]
         return np.asarray(out[mounts.stands])
 
 
@@ -98,11 +103,11 @@ def line_of(mounts: OpenMounts, loads: ComplexArray, omega: float, near: Complex
     Parameters
     ----------
     loads
-        r, and what one unit of every column of the unbalances adds, shape (1 + columns, 6).
+        r, and what one unit of every column of the unbalances adds, shape (1 + columns, k).
     omega
         Angular frequency [rad/s].
     near
-        Motions of a design, which say what is large, shape (6, n).
+        Motions of a design, which say what is large, shape (k, n).
     felt
         What forces or travel of designs that count are not over.
     """
@@ -111,17 +116,28 @@ def line_of(mounts: OpenMounts, loads: ComplexArray, omega: float, near: Complex
     products = _products(mounts, sizes, columns)
     turning = mounts.turning(omega)
     impedances = mounts.middles * turning[:, None, None] + 1j * omega * mounts.dampers
-    shifted, moments, held = _added(mounts, products, turning)
+    shifted, _, held = _added(mounts, products, turning)
     held[:, : 1 + columns] += loads.T / unit
     held -= np.einsum("mia,mij,mjd->ad", mounts.motions, impedances, shifted)
     whole = _impedance(mounts, impedances, omega)
     motion = np.asarray(np.linalg.solve(whole, held), dtype=np.complex128)
+    motion_at_most = _motion_at_most(mounts, loads, omega)
+    most = _most(mounts, motion_at_most, np.minimum(motion_at_most * _seen_at_most(mounts), felt.seen(mounts)))
+    reaches = np.concatenate([np.ones(columns), *([(most / (unit * sizes)) ** 2] * 2)])
+    return _line(mounts, products, omega, motion, (columns, reaches, unit))
+
+
+def _line(
+    mounts: OpenMounts, products: _Products, omega: float, motion: ComplexArray, known: tuple[int, Array, float]
+) -> Line:
+    """Of a motion, with columns, reaches and unit."""
+    turning = mounts.turning(omega)
+    shifted, moments, _ = _added(mounts, products, turning)
+    columns, reaches, unit = known
     deflections = mounts.motions @ motion + shifted
     elastic = mounts.middles @ deflections
     for spring, part in zip(mounts.springs, products.springs, strict=True):
         elastic[spring.mount] += spring.axes @ part
-    motion_at_most = _motion_at_most(mounts, loads, omega)
-    most = _most(mounts, motion_at_most, np.minimum(motion_at_most * _seen_at_most(mounts), felt.seen(mounts)))
     forces = elastic * turning[:, None, None] + 1j * omega * (mounts.dampers @ deflections)
     held_by = [spring.axes.T @ deflections[spring.mount] for spring in mounts.springs]
     return Line(
@@ -130,24 +146,25 @@ def line_of(mounts: OpenMounts, loads: ComplexArray, omega: float, near: Complex
         np.asarray(
             np.einsum("mia,mid->ad", mounts.motions, elastic) + moments + mounts.at_rest @ motion, dtype=np.complex128
         ),
-        deflections[[int(np.argmax(mounts.stands == k)) for k in range(mounts.mounts)]],
-        _of_mounts(mounts, forces, omega, motion),
+        mounts.members,
+        deflections[[int(np.argmax(mounts.stands == k)) for k in range(mounts.mounts)]] / mounts.times[:, None, None],
+        _of_mounts(mounts, forces, omega, motion) / mounts.times[:, None, None],
         tuple(zip(held_by, products.springs, strict=True)),
         tuple(zip(_moved(mounts, motion, elastic), products.places, strict=True)),
-        columns + float(np.sum((most / (unit * sizes)) ** 2)),
+        reaches,
         unit,
     )
 
 
 def _impedance(mounts: OpenMounts, impedances: ComplexArray, omega: float) -> ComplexArray:
-    """D(c) from those of the springs, shape (6, 6)."""
-    whole = sum(carried(g, z) for g, z in zip(mounts.motions, impedances, strict=True)) - omega**2 * np.eye(6)
+    """D(c) from those of the springs, shape (k, k)."""
+    whole = sum(carried(g, z) for g, z in zip(mounts.motions, impedances, strict=True))
     added = mounts.at_rest + mounts.dynamic.impedance(np.array([omega]), mounts.root.T)[0]
-    return np.asarray(whole + added, dtype=np.complex128)
+    return np.asarray(whole + added - omega**2 * np.eye(mounts.size), dtype=np.complex128)
 
 
 def _moved(mounts: OpenMounts, motion: ComplexArray, elastic: ComplexArray) -> list[ComplexArray]:
-    """What s of every place multiplies: turns, and moments of forces without loss, shape (4, d)."""
+    """What s of every place multiplies: turns, and moments of forces without loss, shape (2 n, d)."""
     out = []
     for place in mounts.places:
         moments = sum(h * place.arms @ elastic[m] for m, h in place.mounts)
@@ -179,7 +196,8 @@ def _products(mounts: OpenMounts, sizes: Array, columns: int) -> _Products:
     added = np.zeros((count, 1 + columns + 2 * count), dtype=complex)
     rows = np.arange(count)
     added[rows, 1 + columns + rows], added[rows, 1 + columns + count + rows] = sizes, 1j * sizes
-    ends = np.cumsum([spring.axes.shape[1] for spring in mounts.springs] + [4] * len(mounts.places))
+    counts = [spring.axes.shape[1] for spring in mounts.springs]
+    ends = np.cumsum(counts + [2 * len(place.aside) for place in mounts.places])
     parts = np.split(added, ends[:-1]) if len(ends) else []
     return _Products(parts[: len(mounts.springs)], parts[len(mounts.springs) :], added.shape[1])
 
@@ -189,11 +207,12 @@ def _added(
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """What products add to deflections, to what springs without loss do to the block, and to the load of the middle."""
     shifted = np.zeros((len(turning), 3, products.width), dtype=complex)
-    moments, held = (np.zeros((6, products.width), dtype=complex) for _ in range(2))
+    moments, held = (np.zeros((mounts.size, products.width), dtype=complex) for _ in range(2))
     for place, part in zip(mounts.places, products.places, strict=True):
+        turns, turning_moments = np.split(part, 2)
         for m, reach in place.mounts:
-            shifted[m] += reach * place.arms.T @ part[:2]
-        moment = mounts.root[:, 3:] @ place.aside.T @ part[2:]
+            shifted[m] += reach * place.arms.T @ turns
+        moment = mounts.root[:, 3:] @ place.aside.T @ turning_moments
         moments += moment
         # mounts of one place have one loss factor
         held -= moment * turning[place.mounts[0][0]]
@@ -227,7 +246,7 @@ def _most(mounts: OpenMounts, motion: float, seen: Array) -> Array:
     found = [np.full(spring.axes.shape[1], spring.most * seen[spring.mount]) for spring in mounts.springs]
     for place in mounts.places:
         moment = sum(abs(h) * stiff[m] * seen[m] for m, h in place.mounts)
-        found.append(np.array([turn, turn, moment, moment]))
+        found.append(np.repeat([turn, moment], len(place.aside)))
     return np.concatenate([np.zeros(0), *found])
 
 
@@ -253,10 +272,11 @@ def most_felt(mounts: OpenMounts, loads: ComplexArray, omega: float, travel: boo
 
     Columns are counted in what each unbalance is not over.
     """
-    sizes, counted = np.ones(len(mounts.losses)), np.isin(mounts.stands, list(chosen))
+    members = [k for k, own in enumerate(mounts.members) if own[0] in chosen]
+    sizes, counted = mounts.times[mounts.stands], np.isin(mounts.stands, members)
     if not travel:
         damping = np.linalg.norm(mounts.dampers, 2, axis=(1, 2))
-        sizes = _stiffness_at_most(mounts) * np.abs(mounts.turning(omega)) + omega * damping
+        sizes = sizes * (_stiffness_at_most(mounts) * np.abs(mounts.turning(omega)) + omega * damping)
     found = float((_seen_at_most(mounts) * sizes)[counted].sum())
     if not travel:
         found += math.sqrt(len(chosen)) * float(np.linalg.norm(_of_mounts_alone(mounts, omega)))
@@ -264,9 +284,9 @@ def most_felt(mounts: OpenMounts, loads: ComplexArray, omega: float, travel: boo
 
 
 def _of_mounts_alone(mounts: OpenMounts, omega: float) -> ComplexArray:
-    """What springs whose stiffness depends on frequency do to the mounts per motion, shape (mounts, 3, 6)."""
-    nothing = np.zeros((len(mounts.losses), 3, 6), dtype=np.complex128)
-    return _of_mounts(mounts, nothing, omega, np.eye(6, dtype=np.complex128))
+    """What springs whose stiffness depends on frequency do to the mounts per motion, shape (mounts, 3, k)."""
+    nothing = np.zeros((len(mounts.losses), 3, mounts.size), dtype=np.complex128)
+    return _of_mounts(mounts, nothing, omega, np.eye(mounts.size, dtype=np.complex128))
 
 
 def _motion_at_most(mounts: OpenMounts, loads: ComplexArray, omega: float) -> float:
@@ -275,7 +295,7 @@ def _motion_at_most(mounts: OpenMounts, loads: ComplexArray, omega: float) -> fl
     Columns are counted in what |u| is not over.
     """
     lost = mounts.lost(omega)
-    even = float((mounts.losses + omega * mounts.lags).min()) * max(mounts.lowest, 0.0) * np.eye(6)
+    even = float((mounts.losses + omega * mounts.lags).min()) * max(mounts.lowest, 0.0) * np.eye(mounts.size)
     if not mounts.dynamic:
         # all of A has the least loss of its springs
         lost = max(lost, even + omega * mounts.damping, key=lambda each: float(np.linalg.eigvalsh(each)[0]))

@@ -8,7 +8,7 @@ an axis is one number more.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,15 +35,17 @@ class OpenMounts:
     Attributes
     ----------
     root
-        From motion in coordinates in which the mass is one, transposed, shape (6, 6).
+        From motion in coordinates in which the mass is one, transposed, shape (k, 6); k is 6 where all motions count.
     motions
-        G at the middle of the box in these coordinates, shape (springs, 3, 6).
+        G at the middle of the box in these coordinates, shape (springs, 3, k).
     middles, dampers
         Stiffness at the middle and damping, shape (springs, 3, 3).
     losses, lags
         Loss factors, and viscous damping over stiffness [s], shape (springs,).
     stands
         Number of the mount that each belongs to, shape (springs,).
+    members
+        Of every mount the numbers of those of the problem that it stands for, one or two that mirror each other.
     dynamic
         Further springs whose stiffness depends on frequency.
     keys
@@ -52,10 +54,10 @@ class OpenMounts:
         Matrices that the stiffness A is not under and not over (E31, E43), less what a limit may be broken by.
     bands
         Squares of angular frequencies that none stands between.
-    lowest, highest
-        Every eigenvalue of A is between these.
+    least, most
+        What stiffness is not under and not over by the bounds of its numbers alone, shape (k, k).
     lossy, lagging, damping
-        What loss is not under, damping that follows stiffness per frequency, and viscous damping, shape (6, 6).
+        What loss is not under, damping that follows stiffness per frequency, and viscous damping, shape (k, k).
     softest
         Least stiffness of every spring in any direction, shape (springs,).
     """
@@ -67,6 +69,7 @@ class OpenMounts:
     losses: Array
     lags: Array
     stands: NDArray[np.intp]
+    members: tuple[tuple[int, ...], ...]
     dynamic: DynamicSprings
     springs: tuple[Spring, ...]
     places: tuple[Place, ...]
@@ -74,8 +77,8 @@ class OpenMounts:
     floors: tuple[Array, ...]
     ceilings: tuple[Array, ...]
     bands: tuple[tuple[float, float], ...]
-    lowest: float
-    highest: float
+    least: Array
+    most: Array
     lossy: Array
     lagging: Array
     damping: Array
@@ -87,38 +90,65 @@ class OpenMounts:
         return len(self.keys)
 
     @property
+    def size(self) -> int:
+        """k."""
+        return len(self.root)
+
+    @property
+    def lowest(self) -> float:
+        """No eigenvalue of A is under it."""
+        return max(float(np.linalg.eigvalsh(each)[0]) for each in (self.least + self.at_rest, *self.floors))
+
+    @property
+    def highest(self) -> float:
+        """No eigenvalue of A is over it."""
+        return min(float(np.linalg.eigvalsh(each)[-1]) for each in (self.most + self.at_rest, *self.ceilings))
+
+    @property
+    def times(self) -> Array:
+        """By what motion and force of every mount are longer than those of one of its members."""
+        return np.sqrt([len(own) for own in self.members])
+
+    @property
     def turns(self) -> Array:
-        """Turns of the block per motion, shape (3, 6)."""
+        """Turns of the block per motion, shape (3, k)."""
         return np.asarray(self.root.T[3:])
 
     @property
     def middle(self) -> Array:
-        """A where every s is zero, shape (6, 6)."""
+        """A where every s is zero, shape (k, k)."""
         return np.asarray(sum(carried(g, k) for g, k in zip(self.motions, self.middles, strict=True)) + self.at_rest)
 
     @property
     def at_rest(self) -> Array:
-        """What springs whose stiffness depends on frequency have of A, shape (6, 6)."""
+        """What springs whose stiffness depends on frequency have of A, shape (k, k)."""
         rows = self.dynamic.rows @ self.root.T
-        return np.asarray(rows.T @ np.diag([law.static for law in self.dynamic.laws]) @ rows).reshape(6, 6)
+        return np.asarray(rows.T @ np.diag([law.static for law in self.dynamic.laws]) @ rows).reshape(
+            self.size, self.size
+        )
 
     def turning(self, omega: float) -> NDArray[np.complex128]:
         """1 + i (eta + W lag) of every spring; 1 at rest."""
         return np.asarray(1.0 + 1j * (self.losses * (omega > 0.0) + omega * self.lags), dtype=np.complex128)
 
     def lost(self, omega: float) -> Array:
-        """What loss is not under, shape (6, 6)."""
+        """What loss is not under, shape (k, k)."""
         return self.lossy + omega * self.lagging + omega * self.damping
 
     @property
     def mounts(self) -> int:
         """How many there are."""
-        return int(self.stands.max()) + 1
+        return len(self.members)
+
+    @property
+    def products(self) -> int:
+        """Complex numbers that springs and places add to every order."""
+        return sum(len(s.axes.T) for s in self.springs) + sum(2 * len(place.aside) for place in self.places)
 
     @property
     def slopes(self) -> Array:
-        """A by every s, places left out, shape (numbers, 6, 6)."""
-        out = np.zeros((self.numbers, 6, 6))
+        """A by every s, places left out, shape (numbers, k, k)."""
+        out = np.zeros((self.numbers, self.size, self.size))
         for spring in self.springs:
             arms = spring.axes.T @ self.motions[spring.mount]
             for j, matrix in spring.terms:
@@ -155,19 +185,16 @@ def open_mounts(problem: Problem, lower: Array, upper: Array) -> OpenMounts:
     floors = [(1.0 - 2.0 * SLACK) * floor for floor in floors]
     ceilings = [(1.0 + SLACK) ** 2 * ceiling for ceiling in ceilings]
     low, high, lossy, lagging = _least_and_most(opened, motions, places, root)
-    mounts = OpenMounts(
+    stands = [k for k, _ in every_spring(mounting.mounts)]
+    members = tuple((k,) for k in sorted({*stands}))
+    return OpenMounts(
         root, motions, np.array([total for total, _ in found]), np.array(dampers),
-        opened.low[:, LOSS], opened.low[:, LAG], np.array([k for k, _ in every_spring(mounting.mounts)], dtype=np.intp),
+        opened.low[:, LOSS], opened.low[:, LAG], np.array(stands, dtype=np.intp), members,
         mounting.dynamic, tuple(s for _, own in found for s in own), places, opened.numbers.keys, tuple(floors),
-        tuple(ceilings), tuple(bands), 0.0, 0.0, lossy, lagging,
+        tuple(ceilings), tuple(bands), low, high, lossy, lagging,
         np.asarray(sum(carried(g, c) for g, c in zip(motions, dampers, strict=True))),
         opened.low[:, STIFFNESS].min(axis=1),
     )  # fmt: skip
-    return replace(
-        mounts,
-        lowest=max(float(np.linalg.eigvalsh(each)[0]) for each in (low + mounts.at_rest, *floors)),
-        highest=min(float(np.linalg.eigvalsh(each)[-1]) for each in (high + mounts.at_rest, *ceilings)),
-    )
 
 
 def _least_and_most(

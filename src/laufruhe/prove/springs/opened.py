@@ -71,20 +71,18 @@ class Place:
         Unit vector of C2.
     mounts
         Number and reach [m] of each spring that moves, all of one loss.
+    aside
+        Unit vectors across it about which turns count, shape (n, 3).
     """
 
     number: int
     axis: Array
     mounts: tuple[tuple[int, float], ...]
-
-    @property
-    def aside(self) -> Array:
-        """Two unit vectors across it, shape (2, 3)."""
-        return np.array([row for row in np.eye(3) if abs(row @ self.axis) < 0.5])
+    aside: Array
 
     @property
     def arms(self) -> Array:
-        """What a turn about each of these moves a mount by, and takes of its force as moment, shape (2, 3)."""
+        """What a turn about each of these moves a mount by, and takes of its force as moment, shape (n, 3)."""
         return np.cross(self.aside, self.axis)
 
 
@@ -209,7 +207,7 @@ class Opened:
                         key = j, k - POSITION.start, float(self.low[m, LOSS]), float(self.low[m, LAG])
                         found.setdefault(key, []).append((m, gain * self.half[j]))
         return tuple(
-            Place(self.numbers.of(("one", j), [j]), np.eye(3)[axis], tuple(mounts))
+            Place(self.numbers.of(("one", j), [j]), np.eye(3)[axis], tuple(mounts), np.delete(np.eye(3), axis, axis=0))
             for (j, axis, *_), mounts in found.items()
         )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,13 +19,17 @@ from laufruhe.problem.measure import Measure, selected
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import is_travel
 from laufruhe.prove.springs.bound import Cap
+from laufruhe.prove.springs.columns import Columns
 from laufruhe.prove.springs.lines import Felt, Line, in_parts, most_felt
+from laufruhe.prove.springs.mirrored import mirrored_halves
 from laufruhe.prove.springs.open_mounts import OpenMounts
 
 # share of the squares of the best design that orders left out have, and orders that are kept
 LEFT_OUT, MOST_ORDERS = 1e-6, 12
 # share of the strongest order that others may take of it before its shape is not relied upon
 SMALL = 0.03
+# share of a norm that may be left out with a half of the motions
+ASIDE = 0.005
 NOTHING = 1e-13
 
 
@@ -42,9 +46,11 @@ class Order:
     omega
         [rad/s].
     loads
-        r at the middle of the unbalances, and what the reach of each column adds, shape (1 + columns, 6) (E42).
+        r at the middle of the unbalances, and what the reach of each column adds, shape (1 + columns, k) (E42).
     felt
         What the best design has of it, shape (mounts, 3).
+    part
+        Number of the motions that it is of: all, or those of a half (E57).
     """
 
     point: int
@@ -52,6 +58,7 @@ class Order:
     omega: float
     loads: ComplexArray
     felt: ComplexArray
+    part: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +74,19 @@ class Asked:
     is_bent: bool
 
     def felt(self, line: Line) -> ComplexArray:
-        """What counts of an order, shape (mounts, 3, d)."""
+        """What counts of an order, of one of mounts that mirror each other, shape (mounts, 3, d)."""
         whole = line.deflections if self.is_travel else line.forces
-        return np.asarray(line.unit * whole[list(self.mounts)] * self.factors[:, None])
+        counted = [own[0] in self.mounts for own in line.members]
+        return np.asarray(line.unit * whole[counted] * self.factors[:, None])
+
+    def times(self, line: Line) -> Array:
+        """How often each of these counts, shape (mounts,)."""
+        return np.array([float(len(own)) for own in line.members if own[0] in self.mounts])
+
+    def of_columns(self, fewer: Array) -> Asked:
+        """With columns of unbalances that are sums of these, shape (fewer, columns)."""
+        orders = (replace(o, loads=np.concatenate([o.loads[:1], fewer @ o.loads[1:]])) for o in self.orders)
+        return replace(self, orders=tuple(orders))
 
     @property
     def is_travel(self) -> bool:
@@ -103,38 +120,42 @@ class Asked:
 
 
 def asked(
-    problem: Problem, measure: Measure, model: AffineModel, near: Evaluation, columns: tuple[Array, Array]
-) -> Asked:
+    problem: Problem, measure: Measure, model: AffineModel, near: Evaluation, columns: tuple[Columns, Array],
+    parts: Sequence[OpenMounts],
+) -> Asked:  # fmt: skip
     """Orders of a measure, sorted by what the best design has of them.
 
     Parameters
     ----------
     columns
-        Middles of the columns of unbalances, and their reaches about these.
+        Those of unbalances, and their middles.
+    parts
+        The mounts for all motions, and for both halves of them where there are such.
     """
-    mounting = mounting_in(problem.engine)
-    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
-    moved = root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity)
+    moved = moved_wrench(NUMBERS, mounting_in(problem.engine).block.centre_of_gravity)
     base = problem.engine.cycle.base_order
     signals = over(base, near.signals(measure.load))
     chosen = measure.places([mount.name for mount in problem.engine.mounts])
-    shares, orders = measure.shares(problem.points), []
+    shares, found = measure.shares(problem.points), []
     for p, (point, (bare, slopes)) in enumerate(zip(problem.points, model.wrenches(), strict=True)):
         if shares[p] == 0.0:
             continue
         felt, step = selected(measure, signals[p], near.engine).coefficients, common_base([base, bare.base])
         step = common_base([step, *(slope.base for slope in slopes)])
-        parts = [spectrum.rebased(step).coefficients for spectrum in (bare, *slopes)]
-        whole = max(map(len, parts))
-        loads = np.array([np.pad(part, ((0, whole - len(part)), (0, 0))) for part in parts]) @ moved.T
-        loads[0] += np.einsum("q,qki->ki", columns[0], loads[1:])
-        loads[1:] *= columns[1][:, None, None]
-        size = np.abs(loads).sum(axis=0).max(axis=1)
+        series = [spectrum.rebased(step).coefficients for spectrum in (bare, *slopes)]
+        whole = max(map(len, series))
+        loads = np.array([np.pad(part, ((0, whole - len(part)), (0, 0))) for part in series]) @ moved.T
+        loads[0] += np.einsum("q,qki->ki", columns[1], loads[1:])
+        loads[1:] = np.einsum("cq,qki->cki", columns[0].of_domains, loads[1:])
+        size = np.abs(loads @ parts[0].root.T).sum(axis=0).max(axis=1)
         numbers = np.asarray(float(step) * np.arange(whole), dtype=np.float64)
+        alone = []
         for k in np.flatnonzero((size > NOTHING * size.max(initial=0.0)) & (numbers > 0.0) & measure.counted(numbers)):
             place = numbers[k] / float(signals[p].base)
             own = felt[round(place)] if round(place) < len(felt) else np.zeros_like(felt[0])
-            orders.append(Order(p, round(place), float(numbers[k]) * point.speed, loads[:, k], own))
+            alone.append(Order(p, round(place), float(numbers[k]) * point.speed, loads[:, k], own, 0))
+        found += [alone] if alone else []
+    orders = _of_parts(found, shares, parts, chosen, measure.norm.is_euclidean)
     orders.sort(key=lambda order: -float(np.linalg.norm(order.felt)))
     whole_cycle = all(signal.base == base for signal in signals)
     return Asked(
@@ -142,6 +163,41 @@ def asked(
         near.samples if whole_cycle else 0,
         measure.norm.refinement > 1 and any(len(signal.bends) for signal in signals),
     )  # fmt: skip
+
+
+def _of_parts(
+    points: Sequence[Sequence[Order]], shares: Array, parts: Sequence[OpenMounts], chosen: Sequence[int], adds: bool
+) -> list[Order]:
+    """Orders of all points, their loads in the motions of a part (E57).
+
+    Parameters
+    ----------
+    adds
+        Whether squares of both halves of the motions add up. Otherwise that half of a point counts of which the best
+        design has nearly all.
+    """
+    members = [own for own in parts[-1].members if set(own) <= set(chosen)]
+    if len(parts) == 1 or sum(map(len, members)) < len(chosen):
+        return [replace(order, loads=order.loads @ parts[0].root.T) for orders in points for order in orders]
+    places = [tuple(list(chosen).index(k) for k in own) for own in members]
+    halves = [[mirrored_halves(order.felt, places) for order in orders] for orders in points]
+    sizes = [_sizes(*pair) * shares[pair[0][0].point] for pair in zip(points, halves, strict=True)]
+    aside, found = ASIDE * sum(size[0] for size in sizes), []
+    for own, orders, size in zip(halves, points, sizes, strict=True):
+        least = size[0] - size[1:].max() <= aside
+        kept = [1, 2] if adds else [1 + int(np.argmax(size[1:]))] if least else [0]
+        for order, half in zip(orders, own, strict=True):
+            for k in kept:
+                loads, felt = order.loads @ parts[k].root.T, (order.felt, *half)[k]
+                if np.abs(loads).max() > NOTHING * np.abs(order.loads @ parts[0].root.T).max():
+                    found.append(replace(order, loads=loads, felt=felt, part=k))
+    return found
+
+
+def _sizes(orders: Sequence[Order], halves: Sequence[tuple[ComplexArray, ComplexArray]]) -> Array:
+    """Of the strongest order the sum of lengths of all, and of both halves."""
+    k = max(range(len(orders)), key=lambda k: float(np.linalg.norm(orders[k].felt)))
+    return np.array([np.linalg.norm(each, axis=1).sum() for each in (orders[k].felt, *halves[k])])
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,10 +225,11 @@ class Head:
         """Over the lines of its orders, whose numbers are told."""
         norm, mounts = asked.measure.norm, len(asked.mounts)
         felt = [asked.felt(line) * (self.factor / self.unit) for line in lines]
+        given = list(zip(self.orders, lines, strict=True))
         if norm.is_euclidean:
+            times = [np.sqrt(0.5 * asked.shares[o.point] / mounts * asked.times(line)) for o, line in given]
             rows = tuple(
-                (k, in_parts(each * math.sqrt(0.5 * asked.shares[order.point] / mounts))[:, None])
-                for k, order, each in zip(at, self.orders, felt, strict=True)
+                (k, in_parts(each * own[:, None, None])[:, None]) for k, each, own in zip(at, felt, times, strict=True)
             )
             return [Cap(number, rows)]
         if self.whole:
@@ -181,16 +238,28 @@ class Head:
                 for k, each in zip(at, felt, strict=True)
                 for mount in each
             ]
-        stacked = [np.concatenate([in_parts(mount) for mount in each]) / mounts for each in felt]
-        return [Cap(number, ((k, rows[None]),), (6,) * mounts) for k, rows in zip(at, stacked, strict=True)]
+        found = []
+        for k, line, each in zip(at, lines, felt, strict=True):
+            stacked = np.concatenate([in_parts(own * n) for own, n in zip(each, asked.times(line), strict=True)])
+            found.append(Cap(number, ((k, stacked[None] / mounts),), (6,) * len(each)))
+        return found
 
 
-def heads_of(asked: Asked, mounts: OpenMounts) -> list[Head]:
+def lengths_of(head: Head, asked: Asked, lines: Sequence[Line], at: Sequence[int]) -> tuple[tuple[int, Array], ...]:
+    """Vectors whose lengths add up to the root of a mean that is shown by one order, in its unit (E58)."""
+    found = []
+    for k, line in zip(at, lines, strict=True):
+        felt = asked.felt(line) * (head.factor / head.unit / len(asked.mounts))
+        found.append((k, np.array([in_parts(own * n) for own, n in zip(felt, asked.times(line), strict=True)])))
+    return tuple(found)
+
+
+def heads_of(asked: Asked, parts: Sequence[OpenMounts]) -> list[Head]:
     """What a norm is at least: one head, or one for every operating point, joined by their shares (E34, E45)."""
     norm = asked.measure.norm
     if norm.is_euclidean:
         return [_root(asked)] if asked.orders else []
-    strongest = [_strongest(asked, p, mounts) for p in asked.points]
+    strongest = [_strongest(asked, p, parts) for p in asked.points]
     if norm.sums_lengths and not norm.joins_points:
         return strongest
     if not strongest:
@@ -211,7 +280,7 @@ def _root(asked: Asked) -> Head:
     return Head(tuple(asked.orders[k] for k in kept), 1.0, math.sqrt(float(size.sum())) or 1.0, 0.0, True, 1.0)
 
 
-def _strongest(asked: Asked, p: int, mounts: OpenMounts) -> Head:
+def _strongest(asked: Asked, p: int, parts: Sequence[OpenMounts]) -> Head:
     """The strongest order of an operating point, and what it makes of a norm of lengths (E45).
 
     Averaged over half turns of the order, with signs, all but its odd multiples vanish; averaged with its own
@@ -224,7 +293,12 @@ def _strongest(asked: Asked, p: int, mounts: OpenMounts) -> Head:
     odd = [other for other in own[1:] if other.place % (2 * order.place) == order.place]
     phases = asked.samples // math.gcd(asked.samples, order.place) if asked.samples else 0
     stays = bool(phases) and asked.samples % (2 * order.place) == 0 and not asked.is_bent
-    loss = sum(most_felt(mounts, other.loads, other.omega, asked.is_travel, asked.mounts) for other in odd)
+    loss = sum(
+        most_felt(parts[other.part], other.loads, other.omega, asked.is_travel, asked.mounts)
+        # of a square wave that is sampled
+        * (2.0 / phases / math.sin(math.pi * (other.place // order.place) / phases) if mean and stays else 1.0)
+        for other in odd
+    )
     loss *= float(asked.factors.max()) / (len(asked.mounts) if mean else 1)
     if mean:
         factor, size = (2.0 / phases / math.tan(math.pi / phases) if stays else 0.5), float(lengths.mean())
@@ -233,6 +307,6 @@ def _strongest(asked: Asked, p: int, mounts: OpenMounts) -> Head:
         fine = phases * norm.refinement
         factor, size = (swing * math.cos(math.pi / fine) if stays else 0.0), float(lengths.max())
         plain = swing * (phases * math.sin(math.pi / phases) / 4.0 if phases > 1 else math.sqrt(0.125))
-    if not stays or loss > SMALL * factor * size or (factor * size - loss) < plain * size:
+    if not stays or (loss > SMALL * factor * size and not mean) or (factor * size - loss) < plain * size:
         factor, loss = plain, 0.0
     return Head((order,), float(asked.shares[p]), factor * size or 1.0, loss * swing, not mean, factor)

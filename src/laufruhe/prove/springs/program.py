@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.prove.quadratics import answered, column, triangle
-from laufruhe.prove.springs.bound import Cap, Multipliers, Program, Proposed
+from laufruhe.prove.springs.bound import Cap, Multipliers, Program, Proposed, Root
 from laufruhe.prove.springs.conditions import Held
 
 # what a solver leaves of a price of one for every square, so that what its multipliers leave over is convex
@@ -27,12 +28,12 @@ _SETTINGS = {
 def proposed(program: Program) -> Iterator[Proposed]:
     """Multipliers of all conditions, s and moments, whatever the solver says of them; first and, where asked, again."""
     stated = _Stated(program)
-    for scaled in (False, True):
+    for scaled in (True, False):
         yield stated.answer({**_SETTINGS, "equilibrate_enable": scaled})
 
 
 class _Stated:
-    """Variables: heads, blocks of the caps, s, the moments of every order."""
+    """Variables: heads, blocks of the caps, roots and their lengths, s, the moments of every order."""
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -42,7 +43,9 @@ class _Stated:
         blocks = [_entries(size) for cap in program.caps for size in cap.blocks]
         heads = len(program.prices)
         self.blocks = np.cumsum([heads, *blocks])
-        self.first = int(self.blocks[-1])
+        counts = [1 + sum(len(rows) for _, rows in root.rows) for root in program.roots]
+        self.roots = np.cumsum([self.blocks[-1], *counts])
+        self.first = int(self.roots[-1])
         self.ends = np.cumsum([self.first + program.numbers, *map(_entries, program.sizes)])
         self._whole()
         self._linked()
@@ -54,6 +57,8 @@ class _Stated:
             at += len(cap.blocks)
         for limit in program.held:
             self._held(limit)
+        for number, root in enumerate(program.roots):
+            self._root(number, root)
 
     def _add(self, block: Array, columns: Indices, right: Array, cone: Any) -> None:
         """Rows with entries in these columns alone."""
@@ -146,6 +151,28 @@ class _Stated:
         whole = np.concatenate(blocks, axis=1)
         self._add(whole, np.concatenate(columns), np.zeros(len(i)), clarabel.PSDTriangleConeT(cap.size))
 
+    def _root(self, number: int, root: Root) -> None:
+        """Over its line, and over the sum of lengths, each over that of its vector."""
+        import clarabel
+
+        at, end = int(self.roots[number]), int(self.roots[number + 1])
+        ends = np.array([number, at])
+        self._add(np.array([[root.slope, -1.0]]), ends, np.array([-root.offset]), clarabel.NonnegativeConeT(1))
+        own = np.arange(at, end)
+        sums = np.concatenate([[-1.0], np.ones(end - at - 1)])[None]
+        self._add(sums, own, np.zeros(1), clarabel.NonnegativeConeT(1))
+        for order, rows in root.rows:
+            for vector in rows:
+                at, (count, size) = at + 1, vector.shape
+                block = np.zeros((1 + count, 1 + size))
+                block[0, 0], block[1:, 1:] = -1.0, -vector
+                # of a triangle column by column the first row
+                first = self.ends[order] + np.cumsum(np.arange(size))
+                # off the diagonal an entry counts by the root of two
+                block[1:, 2:] *= math.sqrt(0.5)
+                columns = np.concatenate([[at], first])
+                self._add(block, columns, np.zeros(1 + count), clarabel.SecondOrderConeT(1 + count))
+
     def _held(self, limit: Held) -> None:
         """E43."""
         import clarabel
@@ -163,6 +190,8 @@ class _Stated:
         program, first = self.program, self.first
         cost = np.zeros(int(self.ends[-1]))
         cost[: len(program.prices)] = program.prices
+        for at, root in zip(self.roots, program.roots, strict=False):
+            cost[at] = root.price
         for order, size in enumerate(program.sizes):
             cost[self._moment(order)] = -ASIDE * _diagonal(size)
         found = answered(cost, csc_array(vstack(self.rows)), np.concatenate(self.right), self.cones, settings)
@@ -174,13 +203,28 @@ class _Stated:
         after = parts[3 + links :]
         sets, after = after[: len(program.sets)], after[len(program.sets) :]
         budgets, after = after[: len(program.budgets)], after[len(program.budgets) :]
+        counts = [2 + sum(len(rows) for _, rows in root.rows) for root in program.roots]
+        starts = len(after) - sum(counts) + np.cumsum([0, *counts])
+        along = [after[start : start + count] for start, count in zip(starts, counts, strict=False)]
+        after = after[: starts[0]]
         last = after[len(after) - len(program.caps) - len(program.held) :]
         caps = [_matrix(part, cap.size) for part, cap in zip(last, program.caps, strict=False)]
         rest = last[len(program.caps) :]
         held = [_matrix(part, limit.size) for part, limit in zip(rest, program.held, strict=True)]
-        multipliers = Multipliers(caps, held, _numbers(budgets), _numbers(sets), linked)
+        lines = _numbers([parts[0] for parts in along])
+        lengths = [_lengths(root, parts[2:]) for root, parts in zip(program.roots, along, strict=True)]
+        multipliers = Multipliers(caps, held, _numbers(budgets), _numbers(sets), linked, lines, lengths)
         moments = [_matrix(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
         return Proposed(multipliers, np.clip(x[first : first + program.numbers], -1.0, 1.0), moments, float(cost @ x))
+
+
+def _lengths(root: Root, parts: Sequence[Array]) -> list[Array]:
+    """Of the vectors of its lengths, order by order: what the cones have beside their first number."""
+    found, at = [], 0
+    for _, rows in root.rows:
+        found.append(-np.array([part[1:] for part in parts[at : at + len(rows)]]))
+        at += len(rows)
+    return found
 
 
 def _numbers(parts: Sequence[Array]) -> Array:

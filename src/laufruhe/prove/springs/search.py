@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
@@ -18,11 +17,13 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY, Divided, divide
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
-from laufruhe.prove.springs.bound import Cap, Program, Proposed, follows
+from laufruhe.prove.springs.bound import Cap, Program, Proposed, Root, follows
+from laufruhe.prove.springs.columns import columns_of
 from laufruhe.prove.springs.conditions import Held, conditions
 from laufruhe.prove.springs.lines import Felt, Line, line_of, squared
+from laufruhe.prove.springs.mirrored import mirrored_parts
 from laufruhe.prove.springs.open_mounts import OpenMounts, is_lifted, open_mounts
-from laufruhe.prove.springs.orders import Asked, Head, Order, asked, heads_of
+from laufruhe.prove.springs.orders import Asked, Head, Order, asked, heads_of, lengths_of
 from laufruhe.prove.springs.program import proposed
 
 # what all relaxations may cost together, a number of moments squared being one, and how many they may be
@@ -87,48 +88,24 @@ class SpringBoxes:
         self._plain = StiffnessBoxes(problem, 0.05 * room) if divides(problem) else None
         self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
         self._model = AffineModel(off_resonance(problem))
-        middles, reaches = self._columns
-        columns = [np.zeros(0)]
         held = [value for value, d in zip(near, problem.decisions, strict=True) if d.is_affine]
-        columns += [d.columns_of(value) for d, value in zip(self._model.domains, held, strict=True)]
-        self._unbalances = (np.concatenate(columns) - middles) / np.where(reaches > 0.0, reaches, 1.0)
+        columns = columns_of(self._model.domains, held)
         known = evaluate(problem, problem.design(list(near)))
         terms = [term for term in problem.load_terms if term.measure.on_mounts]
         # loads of the block are those of all mounts, and known where no unbalance is open
         rest = [] if problem.unbalances else [t for t in problem.load_terms if not t.measure.on_mounts]
         self._constant = sum(t.weight * known.value(t.measure) for t in rest)
-        self._terms = [(t.weight, asked(problem, t.measure, self._model, known, self._columns)) for t in terms]
-        self._whole = open_mounts(problem, self.lower, self.upper)
-        self._heads = [heads_of(each, self._whole) for _, each in self._terms]
+        self._parts = self.parts(self.lower, self.upper)
+        told = [(t.weight, asked(problem, t.measure, self._model, known, columns, self._parts)) for t in terms]
+        self.columns, fewer = columns[0].seen_by([order.loads[1:] for _, each in told for order in each.orders])
+        self._terms = [(weight, each.of_columns(fewer)) for weight, each in told]
+        self._heads = [heads_of(each, self._parts) for _, each in self._terms]
         self._least = [np.zeros(len(heads)) for heads in self._heads]
 
-    @cached_property
-    def _columns(self) -> tuple[Array, Array]:
-        """Middle and reach of every column of the unbalances."""
-        middles, reaches = [np.zeros(0)], [np.zeros(0)]
-        for domain in self._model.domains:
-            low, high = (domain.set.lower, domain.set.upper) if domain.width == 1 else (-domain.scale, domain.scale)
-            middles.append(np.full(domain.width, 0.5 * (low + high)))
-            reaches.append(np.full(domain.width, 0.5 * (high - low)))
-        return np.concatenate(middles), np.concatenate(reaches)
-
-    @cached_property
-    def sets(self) -> list[Array]:
-        """Every unbalance within its bounds: an interval, a disc, and the sides of a sector."""
-        found, size = [], 1 + len(self._columns[0])
-        for domain in self._model.domains:
-            own = np.arange(size - 1)[domain.columns] + 1
-            matrix = np.zeros((size, size))
-            matrix[0, 0], matrix[own, own] = -1.0, 1.0
-            found.append(matrix)
-            low, high = domain.set.angles
-            if domain.width == 2 and len(domain.set.edges) and high - low < math.pi:
-                for along, sign in zip(domain.set.edges, (1.0, -1.0), strict=True):
-                    side = np.zeros((size, size))
-                    # v lies to the left of the first side and to the right of the second
-                    side[0, own] = side[own, 0] = 0.5 * sign * np.array([along[1], -along[0]])
-                    found.append(side)
-        return found
+    def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
+        """The mounts of a box for all motions, and where they mirror each other for both halves of them (E57)."""
+        whole = open_mounts(self.problem, lower, upper)
+        return (whole, *mirrored_parts(whole))
 
     @property
     def stiffness_alone(self) -> bool:
@@ -149,9 +126,8 @@ class SpringBoxes:
     @property
     def most_boxes(self) -> int:
         """As many as some tens of seconds allow."""
-        sizes = sum(spring.axes.shape[1] for spring in self._whole.springs) + 4 * len(self._whole.places)
-        lines = sum(len(head.orders) for heads in self._heads for head in heads)
-        cost = lines * (1 + len(self._columns[0]) + 2 * sizes) ** EFFORT
+        parts = [order.part for heads in self._heads for head in heads for order in head.orders]
+        cost = sum((1 + self.columns.count + 2 * self._parts[k].products) ** EFFORT for k in parts)
         asked_for = self.problem.search.boxes
         return int(min(WORK / max(cost, 1), MOST_BOXES)) if asked_for is None else asked_for
 
@@ -193,9 +169,9 @@ class SpringBoxes:
         moving = order.omega > 0.0
         parts = (mounting.springs, mounting.losses * moving, mounting.dampers * order.omega)
         k, h, c = (mounts.root @ mounting.total(each) @ mounts.root.T for each in parts)
-        load = order.loads[0] + self._unbalances @ order.loads[1:]
+        load = order.loads[0] + self.columns.near @ order.loads[1:]
         loads = np.column_stack([load, WIDE * order.loads[1:].T])
-        near = np.linalg.solve(k + 1j * (h + c) - order.omega**2 * np.eye(6), loads)
+        near = np.linalg.solve(k + 1j * (h + c) - order.omega**2 * np.eye(mounts.size), loads)
         return line_of(mounts, order.loads, order.omega, near, felt)
 
 
@@ -204,7 +180,8 @@ class _Box:
 
     def __init__(self, search: SpringBoxes, each: Asked, most: float, lower: Array, upper: Array) -> None:
         self.search, self.each, self.most, self.lower, self.upper = search, each, most, lower, upper
-        self.mounts = open_mounts(search.problem, lower, upper)
+        self.parts = search.parts(lower, upper)
+        self.mounts = self.parts[0]
         self._stated: dict[int, tuple[Line, list[Held]]] = {}
 
     def least(self, heads: Sequence[Head], known: Array) -> tuple[float, Array, Array | None]:
@@ -230,10 +207,8 @@ class _Box:
         units = np.array([h.unit for h in heads])
         highest = (most - (floor - shares * np.maximum(alone - losses, 0.0))) / shares + losses
         least, top = alone / units, highest / units
-        # a root is not under the line between its ends: (square + least top) / (least + top)
-        prices = shares * units / (least + top)
-        bound, pull, middle = self._together(heads, prices)
-        total = bound + float(prices @ (least * top)) - float(shares @ losses)
+        bound, pull, middle = self._together(heads, shares * units, (least, top))
+        total = bound - float(shares @ losses)
         return max(min(total, most), floor), pull, middle
 
     def _alone(self, heads: Sequence[Head]) -> Array:
@@ -245,29 +220,38 @@ class _Box:
         """Of an order, and what it has to keep."""
         if id(order) not in self._stated:
             felt = self.each.at_most(order, head, self.most)
-            line = self.search.line(self.mounts, order, felt, self.lower, self.upper)
-            self._stated[id(order)] = line, conditions(0, self.mounts, line)
+            mounts = self.parts[order.part]
+            line = self.search.line(mounts, order, felt, self.lower, self.upper)
+            self._stated[id(order)] = line, conditions(0, mounts, line)
         return self._stated[id(order)]
 
-    def _together(self, heads: Sequence[Head], prices: Array) -> tuple[float, Array, Array | None]:
-        """Least sum of the squares of heads at these prices."""
+    def _together(
+        self, heads: Sequence[Head], prices: Array, ends: tuple[Array, Array] | None = None
+    ) -> tuple[float, Array, Array | None]:
+        """Least sum of the squares of heads at these prices, or of their roots between ends."""
         caps: list[Cap] = []
         lines: list[Line] = []
         held: list[Held] = []
+        roots: list[Root] = []
+        # a solver works best where what it minimises is of size one
+        size = float(prices.sum())
         for number, head in enumerate(heads):
             first, stated = len(lines), [self._line(head, order) for order in head.orders]
             lines += [line for line, _ in stated]
             held += [replace(limit, order=k) for k, (_, limits) in enumerate(stated, first) for limit in limits]
-            caps += head.caps(number, self.each, lines[first:], range(first, len(lines)))
-        # a solver works best where what it minimises is of size one
-        size = float(prices.sum())
+            at = range(first, len(lines))
+            caps += head.caps(number, self.each, lines[first:], at)
+            if ends is not None:
+                own = lengths_of(head, self.each, lines[first:], at)
+                roots.append(Root(prices[number] / size, float(ends[0][number]), float(ends[1][number]), own))
         program = Program(
-            tuple(line.size for line in lines), tuple(line.reach for line in lines), self.mounts.numbers,
-            lines[0].columns, prices / size, caps, held, (), self.search.sets,
+            tuple(line.size for line in lines), tuple(line.reaches for line in lines), self.mounts.numbers,
+            lines[0].columns, 0.0 * prices if roots else prices / size, caps, held, (), self.search.columns.sets, roots,
         )  # fmt: skip
         bound, found = _best(program)
         middle = self._design(found.middle) if self.search.stiffness_alone else None
-        return size * bound, self._pull(lines, found), middle
+        parts = [order.part for head in heads for order in head.orders]
+        return size * bound, self._pull(parts, lines, found), middle
 
     def _design(self, s: Array) -> Array:
         """Open numbers at s, where every number is one of them."""
@@ -276,17 +260,18 @@ class _Box:
             out[follows_[0]] += 0.5 * (self.upper - self.lower)[follows_[0]] * s[j]
         return out
 
-    def _pull(self, lines: Sequence[Line], found: Proposed) -> Array:
+    def _pull(self, parts: Sequence[int], lines: Sequence[Line], found: Proposed) -> Array:
         """By decision, what of the products is not that of s, in forces that count."""
         pull, s = np.zeros(len(self.lower)), found.middle
-        for line, moments in zip(lines, found.moments, strict=True):
+        for part, line, moments in zip(parts, lines, found.moments, strict=True):
             size = float(np.sum(squared(self.each.felt(line) / line.unit) * moments)) or 1.0
-            for spring, (seen, added) in zip(self.mounts.springs, line.springs, strict=True):
+            mounts = self.parts[part]
+            for spring, (seen, added) in zip(mounts.springs, line.springs, strict=True):
                 apart = added - np.tensordot(s, spring.slopes(len(s)), 1) @ seen
                 share = max(float(np.sum(squared(apart) * moments)), 0.0) / size
                 self._spread(pull, [j for j, _ in spring.terms], share)
-            for place, (seen, moved) in zip(self.mounts.places, line.places, strict=True):
-                apart = (moved - s[place.number] * seen)[2:]
+            for place, (seen, moved) in zip(mounts.places, line.places, strict=True):
+                apart = np.split(moved - s[place.number] * seen, 2)[1]
                 self._spread(pull, [place.number], max(float(np.sum(squared(apart) * moments)), 0.0) / size)
         return pull
 
