@@ -260,6 +260,16 @@ def test_bound_and_design_enclose_the_best_of_a_grid(tmp_path, rest):
 
 
 @pytest.mark.slow
+def test_steps_over_the_cycle_do_not_hold_a_bound_back(tmp_path):
+    """One throw and gas: the first 96 steps alone cost 4 % of the mean force, and the bound comes nearer than that."""
+    engine = BOUNDED.replace("{ between = [60, 180] }", "120")
+    rest = engines.MOUNTS + GAS + engines.MOUNT_FORCE
+    result = solve(engines.problem(tmp_path, 3, "two-stroke", engine, "", rest, samples=96))
+    assert result.certificate.gap < 3e-3
+    assert "boxes" in result.certificate.method
+
+
+@pytest.mark.slow
 def test_a_limit_that_no_crank_keeps_is_named(tmp_path):
     """Just under the proven least couple nothing is allowed, and that is proven; just above it is."""
     limit = LIMIT % ("rms rocking couple", "{:.6f} N m") + 'orders = [1, 2]\nname = "couple"\n'

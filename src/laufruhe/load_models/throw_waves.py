@@ -86,7 +86,7 @@ class ThrowWaves:
     share_left_out: ClassVar[float] = 1e-4
     """Of the moving parts' root mean square, that the orders left out may hold, of the first few next to nothing;
     bounds are lowered by it."""
-    followed: ClassVar[float] = 3e-3
+    followed: ClassVar[float] = 1e-4
     """Of the heaviest order, that one is followed along an arc; others count as their size."""
 
     def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:

@@ -111,6 +111,8 @@ def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
     """Whether some design may break a limit; a triangle of norms tells."""
     most = norm.norm.value(norm.grid, norm.constant)
     for column, scale in enumerate(problem.scales):
+        if most > maximum * (1.0 + FEASIBLE):
+            return True
         most += scale * norm.norm.value(norm.grid, norm.slope[..., column])
     return most > maximum * (1.0 + FEASIBLE)
 

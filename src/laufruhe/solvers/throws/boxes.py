@@ -60,9 +60,10 @@ class ThrowBox:
 
 @dataclass(frozen=True, eq=False)
 class _Turned:
-    """Norms with the whole turns of every cylinder, and how much orders and unbalances weigh in them."""
+    """Norms with the whole turns of every cylinder, of all orders and of the heavy ones, and what weighs in them."""
 
     rows: AffineProblem
+    heavy: AffineProblem
     weights: Array
     pulls: Array
 
@@ -121,9 +122,19 @@ class ThrowPrograms:
         own = self._turned[window.laps]
         names = tuple(limit.name for limit, _ in self._limits)
         if not window.order:
-            return Program(window, own.rows, names, own.weights, own.pulls)
-        rows = replace(own.rows, limits=(*own.rows.limits, (1.0, self._intervals(window))))
-        return Program(window, rows, (*names, ""), own.weights, own.pulls)
+            return Program(window, own.rows, own.heavy, names, own.weights, own.pulls)
+        intervals = self._intervals(window)
+        rows = replace(own.rows, limits=(*own.rows.limits, (1.0, intervals)))
+        heavy = replace(own.heavy, limits=(*own.heavy.limits, (1.0, self._heavy(intervals))))
+        return Program(window, rows, heavy, (*names, ""), own.weights, own.pulls)
+
+    def _heavy(self, norm: AffineNorm) -> AffineNorm:
+        """Without the columns of orders that are next to nothing."""
+        count, kept = len(self.waves.orders), np.arange(self._low)
+        own = np.concatenate([kept, count + kept, [2 * count]])
+        throws = self._riders.size + (2 * count + 1) * np.arange(self.waves.throws)
+        columns = np.concatenate([np.arange(self._riders.size), np.add.outer(throws, own).ravel()])
+        return replace(norm, slope=norm.slope[..., columns])
 
     def _with_laps(self, laps: tuple[int, ...]) -> _Turned:
         """Rows of all orders of firing that share these whole turns."""
@@ -137,7 +148,11 @@ class ThrowPrograms:
             own = np.hypot(own[:, :count], own[:, count : 2 * count])
             weights += own / (float(own.max()) or 1.0)
             pulls += size[: self._riders.size] / (float(own.max()) or 1.0)
-        return _Turned(AffineProblem(terms, limits, (), 1), weights, pulls)
+        heavy = AffineProblem(
+            tuple((weight, self._heavy(norm)) for weight, norm in terms),
+            tuple((most, self._heavy(norm)) for most, norm in limits), (), 1,
+        )  # fmt: skip
+        return _Turned(AffineProblem(terms, limits, (), 1), heavy, weights, pulls)
 
     def _rows(self, norm: WaveNorm, laps: tuple[int, ...]) -> AffineNorm:
         """With whole turns, in columns."""
@@ -190,7 +205,7 @@ class ThrowPrograms:
         columns, arcs_of = self._riders.columns(lower, upper), ArcBox(self.waves.numbers[: self._low], lower, upper)
         if is_new and self._is_known(program, columns, arcs_of, cut):
             return None
-        mixed = Mixed(program, columns, lower, upper, self.waves.numbers)
+        mixed = Mixed(program, columns, lower, upper, self.waves.numbers[: self._low])
         solution = solve_cones(mixed.problem)
         found = solution.multipliers
         if solution.x is None:

@@ -30,6 +30,8 @@ class Program:
     ----------
     rows
         Columns: those of unbalances, then of every throw cos(h theta), sin(h theta) of all orders, and theta.
+    heavy
+        The same without the columns of orders that are next to nothing, for who proposes multipliers.
     names
         Of the limits; empty for the firing intervals.
     weights, pulls
@@ -38,6 +40,7 @@ class Program:
 
     window: FiringWindow
     rows: AffineProblem
+    heavy: AffineProblem
     names: tuple[str, ...]
     weights: Array
     pulls: Array
@@ -48,9 +51,9 @@ class Mixed:
 
     def __init__(self, program: Program, columns: BoxColumns, lower: Array, upper: Array, orders: Array) -> None:
         self.unbalances = columns.matrix.shape[1]
-        rows = program.rows
-        self._weights, self._orders = program.weights, orders
-        heavy = program.weights > _FAINT * program.weights.max()
+        rows = program.heavy
+        self._weights, self._orders = program.weights[:, : len(orders)], orders
+        heavy = self._weights > _FAINT * self._weights.max()
         self.angles = []
         for p, (low, high) in enumerate(zip(lower, upper, strict=True)):
             reach = float(np.where(heavy[p], orders, 0.0).max()) * (high - low)

@@ -28,7 +28,7 @@ from laufruhe.solvers.throws.windows import amid, firing_of, nearest, windows_of
 Improve = Callable[[Candidate], StarDesign | None]
 """The best design near a candidate, and only the allowed one."""
 
-MOST_BOXES = 300
+MOST_BOXES = 1500
 FEWEST_SAMPLES, MOST_SAMPLES = 96, 384
 # of the best design, that steps over the period may cost
 STEPS_COST = 1e-3
@@ -129,6 +129,10 @@ class _Stage:
                 return self.next
         return None
 
+    def tells_all(self, bound: float, value: float, box: ThrowBox) -> bool:
+        """Whether steps cost more than what a smaller box could tell."""
+        return bound > value * (1.0 - _FINER * self.cost) or float(box.spread.sum()) < self.cost
+
     @property
     def last(self) -> _Stage:
         """With the most."""
@@ -186,7 +190,7 @@ def found_by(
         return None
     most = len(search.roots) + (MOST_BOXES if problem.search.boxes is None else problem.search.boxes)
     found, bound, boxes = divided(
-        search, _Part(floor), _Best(best), nothing_of(problem), problem.tolerance + search.cost, most,
+        search, _Part(floor), _Best(best), nothing_of(problem), search.reached, most,
         what,
     )  # fmt: skip
     return Searched(min(bound, search.cut(found.value)), found.design, boxes, search.conflict, what)
@@ -236,6 +240,11 @@ class ThrowSearch:
     def cost(self) -> float:
         """Share of the best design that no bound gets back."""
         return max(stage.last.cost for stage in {id(stage): stage for stage, _, _ in self.roots}.values())
+
+    @property
+    def reached(self) -> float:
+        """Gap at which dividing ends: the tolerance, or what no bound gets back beside it."""
+        return max(self._problem.tolerance, min(self._problem.tolerance, self.cost) + self.cost)
 
     def _steps_cost(self, best: StarDesign | None, samples: int) -> float:
         """Of a design's value, that means averaged about the steps lose (P7)."""
@@ -309,7 +318,7 @@ class ThrowSearch:
                 programs = first.programs
                 found = programs.box(programs.program(window), *window.box, part.bound, cut, is_new=True)
                 yield self._looked(first, found, left_out)
-        elif part.bound > value * (1.0 - _FINER * stage.cost) and stage.finer is not None:
+        elif stage.tells_all(part.bound, value, box) and stage.finer is not None:
             # more steps tell more than smaller boxes
             programs = stage.finer.programs
             finer = programs.box(programs.program(box.program.window), box.lower, box.upper, part.bound, cut)
