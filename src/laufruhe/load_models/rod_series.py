@@ -36,9 +36,9 @@ class RodSeries:
     low, high
         Lengths between which it is known [m].
     constant, slope
-        Rows at the nodes, shapes (n, k, d) and (n, k, d, 4).
+        Rows at the nodes, shapes (n, k, d) and (n, k, d, columns).
     rest
-        No less than the norm of what the series leave out: of the constant, then for each unit of a mass, shape (5,).
+        No less than the norm of what the series leave out: of the constant, then for each unit of a column.
     """
 
     piece: Piece
@@ -57,13 +57,14 @@ class RodSeries:
     def scaled(self, factors: Sequence[Array]) -> RodSeries:
         """With other factors of its rows."""
         by = self.piece.by(factors)
-        return replace(self, constant=self.constant * by, slope=self.slope * by[..., None])
+        rest = self.rest * float(np.abs(by).max(initial=0.0))
+        return replace(self, constant=self.constant * by, slope=self.slope * by[..., None], rest=rest)
 
     def pulled(self, z: Array) -> Array:
-        """<Z, V> at the nodes: of the constant, then of each mass, shape (n, 5)."""
+        """<Z, V> at the nodes: of the constant, then of each column, shape (n, 1 + columns)."""
         flat, count = z.ravel(), len(self.constant)
-        masses = np.einsum("i,nij->nj", flat, self.slope.reshape(count, z.size, -1))
-        return np.concatenate([(self.constant.reshape(count, -1) @ flat)[:, None], masses], axis=1)
+        columns = np.einsum("i,nij->nj", flat, self.slope.reshape(count, z.size, -1))
+        return np.concatenate([(self.constant.reshape(count, -1) @ flat)[:, None], columns], axis=1)
 
     def terms(self, low: float, high: float) -> Array:
         """What makes the terms of a series between two lengths of values at the nodes, shape (n, n)."""

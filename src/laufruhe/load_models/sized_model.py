@@ -1,7 +1,8 @@
-"""Measures as functions of sizes: loads affine in four masses, times factors of the sizes (Z1, Z12).
+"""Measures as functions of sizes and unbalances: loads affine in masses and these, times factors of the sizes (Z12).
 
-The masses are those that running gear adds: to what reciprocates, to what turns with the rod, to the inertia of the
-rod, and to the throw. Loads are affine in them at a given length of the rod: the exact model is asked five times.
+Four masses are what running gear adds: to what reciprocates, to what turns with the rod, to the inertia of the rod, and
+to the throw. Loads are affine in them, and in unbalances, together at a given length of the rod: the exact model is
+asked once without any, and once for each. The columns of a measure are the masses, then those of the unbalances.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.decision import SizeDrive
+from laufruhe.problem.decision import Decision, Kind, SizeDrive, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
-from laufruhe.problem.measure import Measure, bends_of, load_rows
+from laufruhe.problem.measure import Measure, Rows, bends_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
 MASSES, MOST_KEPT = 4, 4096
@@ -35,7 +36,7 @@ class Piece:
     Attributes
     ----------
     affine
-        Of the masses, shape (4,); rows at the sizes that the problem starts from.
+        Of the columns; rows at the sizes that the problem starts from.
     at
         Of every operating point in it, its index, its places (all when None) and the rows of each.
     given
@@ -62,13 +63,13 @@ class Piece:
         parts = zip(factors, self.given, self.at, strict=True)
         return np.concatenate([np.repeat(new / old, rows, axis=0) for new, old, (_, _, rows) in parts])
 
-    def value(self, factors: Sequence[Array], masses: Array) -> float:
+    def value(self, factors: Sequence[Array], columns: Array) -> float:
         """The norm."""
         ratio = self.ratio(factors)
-        return self.scaled(factors).value(masses) if ratio is None else ratio * self.affine.value(masses)
+        return self.scaled(factors).value(columns) if ratio is None else ratio * self.affine.value(columns)
 
     def pruned(self, low: Array, high: Array) -> Piece:
-        """Of a largest length with one factor: without rows that are not the longest for any masses between two."""
+        """Of a largest length with one factor: without rows that are not the longest for any columns between two."""
         own, reach = self.affine, 0.5 * (high - low)
         size = lengths(own.rows(low + reach))
         moved = np.sqrt(np.square(own.slope).sum(axis=1)) @ reach
@@ -87,14 +88,23 @@ class SizeModel:
     Parameters
     ----------
     problem
-        That leaves nothing open but sizes, at an even speed of the crank.
+        That leaves nothing open but sizes and unbalances, at an even speed of the crank.
+
+    Attributes
+    ----------
+    sizes
+        Decisions about sizes.
+    domains
+        Of the unbalances, in the columns behind the masses.
     """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.names = [drive.size for d in problem.decisions for drive in d.drives if isinstance(drive, SizeDrive)]
-        self.lower = np.array([d.lower for d in problem.decisions])
-        self.upper = np.array([d.upper for d in problem.decisions])
+        self.sizes = tuple(d for d in problem.decisions if d.kind is Kind.SIZE)
+        self.domains = domains_of(problem.unbalances)
+        self.names = [drive.size for d in self.sizes for drive in d.drives if isinstance(drive, SizeDrive)]
+        self.lower = np.array([d.lower for d in self.sizes])
+        self.upper = np.array([d.upper for d in self.sizes])
         given = problem.engine.moving
         self._given = given.sizes
         self._engines, self._masses = dict[bytes, Engine](), dict[bytes, Array]()
@@ -147,20 +157,22 @@ class SizeModel:
         """Of the sizes of an engine, for the rows of a piece."""
         return _factors(measure, engine, self.problem, piece.at)
 
-    def value(self, measure: Measure, x: Array) -> float:
-        """Of a design [SI]."""
+    def value(self, measure: Measure, x: Array, unbalances: Array | None = None) -> float:
+        """Of a design [SI], its unbalances as given unless their columns are told."""
         engine = self.engine(x)
         if measure.channel.of_engine is not None:
             return measure.channel.of_engine(engine)
-        masses = self.masses(x)
+        columns = np.append(self.masses(x), self.start if unbalances is None else unbalances)
         pieces = self.pieces(measure, engine.slider_cranks[0].rod_length)
-        return max(piece.value(self.factors(piece, measure, engine), masses) for piece in pieces)
+        return max(piece.value(self.factors(piece, measure, engine), columns) for piece in pieces)
 
     def whole_pieces(self, measure: Measure) -> Callable[[float], tuple[Piece, ...]]:
         """The pieces of a measure at any length of the rod, with the same rows at each."""
         length = self._given[ROD_LENGTH]
+        if not measure.is_load:
+            return lambda at: self._cut_up(measure, at)
         base = self.problem.engine.cycle.base_order
-        own = over(base, self._with_masses(length)[0].signals(measure.load))
+        own = over(base, self._each_alone(length)[0].signals(measure.load))
         bends = bends_of(measure, own, self.problem.engine)
         return lambda at: self._cut_up(measure, at, bends)
 
@@ -173,6 +185,19 @@ class SizeModel:
         return known[measure]
 
     @cached_property
+    def start(self) -> Array:
+        """Columns of the unbalances as given."""
+        return np.concatenate([np.zeros(0), *(d.columns_of(d.decision.start) for d in self.domains)])
+
+    @cached_property
+    def _span(self) -> tuple[Array, Array]:
+        """Least and most of every column within the bounds."""
+        wide = [(d.set.lower, d.set.upper) if d.width == 1 else (-d.scale, d.scale) for d in self.domains]
+        ends = [pair for pair, d in zip(wide, self.domains, strict=True) for _ in range(d.width)]
+        low, high = (np.array([pair[k] for pair in ends]) for k in (0, 1))
+        return np.append(self.mass_box[0], low), np.append(self.mass_box[1], high)
+
+    @cached_property
     def mass_box(self) -> tuple[Array, Array]:
         """Least and most of the masses within the bounds: they go one way with each size."""
         ends = zip(self.lower, self.upper, strict=True)
@@ -183,41 +208,33 @@ class SizeModel:
     def _evaluations(self) -> dict[float, list[Evaluation]]:
         return {}
 
-    def _with_masses(self, length: float) -> list[Evaluation]:
-        """Loads without the masses of the running gear, and with one unit of each."""
+    def _each_alone(self, length: float) -> list[Evaluation]:
+        """Loads without masses of the running gear and unbalances, and with one unit of each column."""
         if length not in self._evaluations:
-            given = self.problem.engine
+            problem, unbalances = self.problem, self.problem.unbalances
+            given = problem.design([0.0] * len(unbalances), unbalances)
             sizes = given.moving.sizes
             given = given if length == sizes[ROD_LENGTH] else given.resized({**sizes, ROD_LENGTH: length})
             bare = given.moving.weighed(-1.0)
-            engines = []
-            for unit in (np.zeros(MASSES), *np.eye(MASSES)):
-                gear, parts, rotors = given.gear, bare.parts, bare.rotors
-                parts = tuple(
-                    replace(
-                        part, reciprocating_mass=part.reciprocating_mass + unit[0],
-                        rotating_mass=part.rotating_mass + unit[1],
-                        rod_inertia_deficit=part.rod_inertia_deficit + unit[2],
-                    )
-                    for part in parts
-                )  # fmt: skip
-                ways = dict(gear.throws) if gear else {}
-                rotors = tuple(replace(r, unbalance=r.unbalance + unit[3] * ways.get(r.name, 0.0)) for r in rotors)
-                engines.append(replace(given, slider_cranks=parts, rotors=rotors))
-            self._evaluations[length] = [evaluate(self.problem, engine) for engine in engines]
+            weightless = replace(given, slider_cranks=bare.parts, rotors=bare.rotors)
+            engines = [weightless, *(_heavier(weightless, unit) for unit in np.eye(MASSES))]
+            engines += [_moved(weightless, d, direction) for d in unbalances for direction in d.set.directions]
+            self._evaluations[length] = [evaluate(problem, engine) for engine in engines]
         return self._evaluations[length]
 
     def _cut_up(self, measure: Measure, length: float, told: Sequence[Array] | None = None) -> tuple[Piece, ...]:
         """Pieces at a length, of all rows where the angles of bends are told."""
-        found, problem, channel = self._with_masses(length), self.problem, measure.load
+        found, problem = self._each_alone(length), self.problem
+        if not measure.is_load:
+            masses = [mass_rows(measure, each.engine.rotors, each.engine.slider_cranks) for each in found]
+            return (Piece(_affine(masses), (), ()),)
+        channel = measure.load
         base = problem.engine.cycle.base_order
         steps = measure.norm.refinement * problem.fidelity.samples
         signals: list[list[Spectrum]] = [over(base, each.signals(channel)) for each in found]
         bends = bends_of(measure, signals[0], problem.engine) if told is None else told
         rows = [load_rows(measure, problem.points, own, problem.engine, steps, bends) for own in signals]
-        slopes = [own.vectors - rows[0].vectors for own in rows[1:]]
-        whole = AffineNorm(rows[0].norm, rows[0].vectors, np.stack(slopes, axis=-1), rows[0].grid)
-        each = steps + len(bends[0])
+        whole, each = _affine(rows), steps + len(bends[0])
         points = [k for k, share in enumerate(measure.shares(problem.points)) if share > 0.0]
         if not measure.norm.is_largest or len(whole.constant) % (each * len(points)):
             every = tuple((k, None, each) for k in points)
@@ -230,14 +247,44 @@ class SizeModel:
             at = ((k, place, each),)
             piece = Piece(affine, at, tuple(_factors(measure, found[0].engine, problem, at)))
             scalar = told is None and (not piece.given or piece.given[0].size == 1)
-            pieces.append(piece.pruned(*self.mass_box) if scalar else piece)
+            pieces.append(piece.pruned(*self._span) if scalar else piece)
         return tuple(pieces)
+
+
+def _heavier(engine: Engine, masses: Array) -> Engine:
+    """With these masses of the running gear beside its own."""
+    parts = tuple(
+        replace(
+            part, reciprocating_mass=part.reciprocating_mass + masses[0],
+            rotating_mass=part.rotating_mass + masses[1],
+            rod_inertia_deficit=part.rod_inertia_deficit + masses[2],
+        )
+        for part in engine.slider_cranks
+    )  # fmt: skip
+    ways = dict(engine.gear.throws) if engine.gear else {}
+    rotors = (replace(r, unbalance=r.unbalance + masses[3] * ways.get(r.name, 0.0)) for r in engine.rotors)
+    return replace(engine, slider_cranks=parts, rotors=tuple(rotors))
+
+
+def _moved(engine: Engine, decision: Decision, direction: complex) -> Engine:
+    """With one unit of a column of an unbalance."""
+    by = {drive.rotor: drive.of(direction) for drive in decision.rotor_drives}
+    rotors = (replace(r, unbalance=r.unbalance + by.get(r.name, 0.0)) for r in engine.rotors)
+    return replace(engine, rotors=tuple(rotors))
+
+
+def _affine(rows: Sequence[Rows]) -> AffineNorm:
+    """Of rows without any column, and with one unit of each."""
+    slopes = [own.vectors - rows[0].vectors for own in rows[1:]]
+    return AffineNorm(rows[0].norm, rows[0].vectors, np.stack(slopes, axis=-1), rows[0].grid)
 
 
 def _factors(
     measure: Measure, engine: Engine, problem: Problem, at: Sequence[tuple[int, int | None, int]]
 ) -> list[Array]:  # fmt: skip
-    """Of the places that count, shape (places, 1 or d), at every operating point."""
+    """Of the places that count, shape (places, 1 or d), at every operating point; none of what stands nowhere."""
+    if not at:
+        return []
     counted, found = measure.places(measure.load.places(engine)), []
     for k, place, _ in at:
         factors = measure.load.factors_of(engine, problem.points[k])

@@ -63,6 +63,10 @@ class Interval:
         """The nearest point of the set."""
         return np.clip(v, self.lower, self.upper)
 
+    def rooms(self, _: Array) -> tuple[float, ...]:
+        """Relative distances inside edges that are no bounds of a column: there are none."""
+        return ()
+
     def inside(self, v: Array) -> Array:
         """Directions in which a point of the set is not at its bounds, shape (1, m)."""
         at = float(v[0])
@@ -125,6 +129,12 @@ class Sector:
             v = along[best] * self.edges[best]
         size = float(np.hypot(*v))
         return v * (self.upper / size) if size > self.upper else v
+
+    def rooms(self, v: Array) -> tuple[float, ...]:
+        """Relative distances of a point inside the arc, and inside both sides where these are less than half a turn."""
+        arc = 0.5 * (1.0 - float(v @ v) / self.scale**2)
+        sides = zip(self.edges, (1.0, -1.0), strict=False)
+        return arc, *(sense * float(a * v[1] - b * v[0]) / self.scale for (a, b), sense in sides)
 
     def inside(self, v: Array) -> Array:
         """Directions in which a point of the set is not at its bounds, shape (2, m)."""

@@ -113,10 +113,15 @@ def _sizes(problem: Problem) -> Result:
 
 
 def _asks_sizes(problem: Problem) -> bool:
-    """Whether all that is asked is of loads that are affine in masses at an even speed, or of sizes alone."""
+    """Whether all that is asked is of loads that are affine in masses at an even speed, of sizes alone, or masses."""
     felt = [m.channel for m in problem.measures]
-    return not problem.fidelity.is_uneven and all(
-        channel.of_engine is not None or (channel.is_load and not channel.feels_inertia) for channel in felt
+    return (
+        Kind.SIZE in kinds_of(problem)
+        and not problem.fidelity.is_uneven
+        and all(
+            channel.of_engine is not None or channel.is_mass or (channel.is_load and not channel.feels_inertia)
+            for channel in felt
+        )
     )
 
 
@@ -178,7 +183,7 @@ METHODS: tuple[Method, ...] = (
     Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, state),
     Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
     Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, _torsion),
-    Method("boxes of sizes", frozenset({Kind.SIZE}), _asks_sizes, Reach.WHOLE, _sizes),
+    Method("boxes of sizes", frozenset({Kind.SIZE, _U}), _asks_sizes, Reach.WHOLE, _sizes),
     Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_sharply)),
     Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,

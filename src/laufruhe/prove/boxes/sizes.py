@@ -1,10 +1,11 @@
-"""Bounds of what sizes can reach, on boxes of them (Z12).
+"""Bounds of what sizes can reach, and unbalances with them, on boxes of sizes (Z12, Z14).
 
 In a box every factor of a load is least at one corner, for it goes one way with each size; the masses lie between those
-of two corners, for so do they. A norm of rows that are affine in the masses is nowhere under <Z, V>, Z its subgradient
-at any masses: its least value over that interval bounds the norm. Over lengths of the rod <Z, V> is a short
-series (Z13). Sides of a box on which a limit is broken everywhere, or nothing is better than a design known, are cut
-off; what is left is halved.
+of two corners, for so do they. A norm of rows that are affine in masses and unbalances is nowhere under <Z, V>, Z its
+subgradient anywhere: its least value over that interval, and over the sets of the unbalances, bounds the norm. Over
+lengths of the rod <Z, V> is a short series (Z13). Where unbalances are open a cone program with the masses as decisions
+proposes dual rows of all that is asked together, which bound the box and every part of it (Z14). Sides of a box on
+which a limit is broken everywhere, or nothing is better than a design known, are cut off; what is left is halved.
 """
 
 from __future__ import annotations
@@ -12,121 +13,38 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
-from laufruhe.load_models.affine import AffineNorm
-from laufruhe.load_models.rod_series import TERMS, RodSeries, rod_series
-from laufruhe.load_models.sized_model import MASSES, Piece, SizeModel
+from laufruhe.load_models.rod_series import rod_series
+from laufruhe.load_models.sized_model import SizeModel
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.best_first import Box, Divided, Halving, halves, widest
-
-Ways: TypeAlias = Array
+from laufruhe.prove.boxes.size_bundles import Bundle, Number, Reach, Still, Ways, corner
+from laufruhe.prove.boxes.size_programs import Ask, SizePrograms, Together
 
 MOST_BOXES = 3000
 # a limit counts as broken beyond so much of it; halvings of a side that is cut, rounds of that, and bounds of a load
 SLACK, HALVINGS, ROUNDS, MOST_TOUCHED = 1e-9, 10, 3, 200
+# of a load by itself, where dual rows of all together tell more
+FEW_TOUCHED = 4
+# dual rows of the last boxes that are kept, and the share of what is to be shown that halving a side has to gain
+KEPT, TOLD = 2, 0.1
+# share of what is to be shown from which dual rows are asked for at all angles
+NEAR = 2e-3
 
 
-class _Reach(NamedTuple):
-    """Least and most of the masses, and of the length of the rod, on a box."""
+class Cut(NamedTuple):
+    """What is left of a box, what no design in it goes under, the side worth halving, and the dual rows that told."""
 
-    low: Array
-    high: Array
-    rod: tuple[float, float]
-
-    @property
-    def middle(self) -> tuple[Array, float]:
-        """Masses and length."""
-        return 0.5 * (self.low + self.high), 0.5 * (self.rod[0] + self.rod[1])
-
-
-class _Bundle:
-    """Affine functions of the masses that a norm is nowhere under, as many as were asked for (P4)."""
-
-    def __init__(self, piece: Piece, affine: AffineNorm | None = None) -> None:
-        self.piece, self.affine = piece, piece.affine if affine is None else affine
-        self.constants, self.slopes = np.zeros(0), np.zeros((0, MASSES))
-
-    @property
-    def count(self) -> int:
-        """How many there are."""
-        return len(self.constants)
-
-    def touch(self, masses: Array, _: float) -> None:
-        """One more that the norm meets at these masses."""
-        z = self.affine.subgradient(masses)
-        self.constants = np.append(self.constants, float(np.vdot(z, self.affine.constant)))
-        self.slopes = np.vstack([self.slopes, self.affine.pulled(z)])
-
-    def scaled(self, factors: Sequence[Array]) -> _Bundle:
-        """Of other factors of its rows, which nothing has been asked of yet."""
-        return _Bundle(self.piece, self.piece.scaled(factors))
-
-    def least(self, reach: _Reach) -> float:
-        """On a box."""
-        ends = np.where(self.slopes > 0.0, self.slopes * reach.low, self.slopes * reach.high).sum(axis=1)
-        return max(float((self.constants + ends).max(initial=0.0)), 0.0)
-
-
-class _RodBundle:
-    """The same over lengths of the rod: of each function the series of what it is at any length (Z13)."""
-
-    def __init__(self, series: RodSeries) -> None:
-        self.piece, self.series = series.piece, series
-        self.nodes = np.zeros((0, TERMS, 1 + MASSES))
-
-    @property
-    def count(self) -> int:
-        """How many there are."""
-        return len(self.nodes)
-
-    def touch(self, masses: Array, length: float) -> None:
-        """One more that the norm meets at these masses and this length."""
-        z = self.series.at(length).subgradient(masses)
-        self.nodes = np.concatenate([self.nodes, self.series.pulled(z)[None]])
-
-    def scaled(self, factors: Sequence[Array]) -> _RodBundle:
-        """Of other factors of its rows."""
-        return _RodBundle(self.series.scaled(factors))
-
-    def least(self, reach: _Reach) -> float:
-        """Its first two terms at the ends of the box, what the others can take from them, and the rest."""
-        terms = np.einsum("mn,tnj->mtj", self.series.terms(*reach.rod), self.nodes)
-        most = np.maximum(np.abs(reach.low), np.abs(reach.high))
-        further = np.abs(terms[2:]).sum(axis=0) @ np.append(1.0, most)
-        found = np.full(self.count, math.inf)
-        for end in (-1.0, 1.0):
-            at = terms[0] + end * terms[1]
-            slopes = at[:, 1:]
-            ends = np.where(slopes > 0.0, slopes * reach.low, slopes * reach.high).sum(axis=1)
-            found = np.minimum(found, at[:, 0] + ends)
-        rest = float(self.series.rest @ np.append(1.0, most))
-        return max(float((found - further).max(initial=0.0)) - rest, 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class _Number:
-    """A measure, or less than nothing of it, as boxes see it.
-
-    Attributes
-    ----------
-    sense
-        1, or -1 where it is to be large.
-    ways
-        For each size whether its factors grow with it (1) or fall (-1).
-    pieces
-        Of a load, each with what bounds it.
-    """
-
-    measure: Measure
-    sense: float
-    ways: Ways
-    pieces: tuple[_Bundle | _RodBundle, ...] = ()
+    lower: Array
+    upper: Array
+    bound: float
+    side: int
+    known: tuple[Together, ...]
 
 
 class SizeBoxes:
@@ -136,24 +54,37 @@ class SizeBoxes:
     ------
     ValueError
         If a measure does not go one way with a size, or a bend of a load moves with the length of the rod.
+
+    Parameters
+    ----------
+    ask
+        Who proposes dual rows where unbalances are open.
     """
 
-    def __init__(self, model: SizeModel) -> None:
+    def __init__(self, model: SizeModel, ask: Ask | None = None) -> None:
         self.model, problem = model, model.problem
         # for each size whether masses grow with it or fall
         self._light = self._ways(lambda x: np.abs(self.model.masses(x)))
         self.terms = [(term.weight, self._number(term.measure, 1.0)) for term in problem.objective]
-        self.limits: list[tuple[float, _Number, Limit]] = []
+        self.limits: list[tuple[float, Number, Limit]] = []
         for limit in problem.limits:
             for edge, sense in ((limit.maximum, 1.0), (limit.minimum, -1.0)):
                 if math.isfinite(edge):
                     most = sense * edge + SLACK * abs(edge)
                     self.limits.append((most, self._number(limit.measure, sense), limit))
+        self._asked, self._together = ask, self._programs(ask)
         self.touch(model.lower, model.upper)
 
-    def _number(self, measure: Measure, sense: float) -> _Number:
+    def _programs(self, ask: Ask | None) -> SizePrograms | None:
+        """Of boxes; none where sizes alone are open."""
+        if ask is None or not self.model.domains:
+            return None
+        terms = [(weight, number) for weight, number in self.terms if number.pieces]
+        return SizePrograms(self.model, terms, [x[:2] for x in self.limits if x[1].pieces], ask)
+
+    def _number(self, measure: Measure, sense: float) -> Number:
         if measure.channel.of_engine is not None:
-            return _Number(measure, sense, self._ways(lambda x: np.array([sense * self.model.value(measure, x)])))
+            return Number(measure, sense, self._ways(lambda x: np.array([sense * self.model.value(measure, x)])))
         if not measure.norm.of_row_lengths or measure.norm.joins_points or sense < 0.0:
             raise ValueError(f"{measure.name} is not bounded on boxes of sizes")
         pieces = self.model.pieces(measure)
@@ -164,10 +95,11 @@ class SizeBoxes:
             return np.concatenate(found) if found else np.zeros(1)
 
         if not self.model.moves_rod:
-            return _Number(measure, sense, self._ways(factors), tuple(map(_Bundle, pieces)))
+            still = tuple(Bundle(Still(piece, piece.affine)) for piece in pieces)
+            return Number(measure, sense, self._ways(factors), still)
         start = self.model.problem.engine.slider_cranks[0].rod_length
         series = rod_series(self.model.whole_pieces(measure), start, *self.model.rod_span)
-        return _Number(measure, sense, self._ways(factors), tuple(map(_RodBundle, series)))
+        return Number(measure, sense, self._ways(factors), tuple(map(Bundle, series)))
 
     def _ways(self, numbers: Callable[[Array], Array]) -> Ways:
         """Of numbers that go one way with each size: which way each of them takes all of them, zero where none."""
@@ -188,25 +120,26 @@ class SizeBoxes:
         """The same with some of the limits alone, and nothing wanted."""
         other = copy.copy(self)
         other.terms, other.limits = [], [each for each in self.limits if each[2] in limits]
+        other._together = other._programs(self._asked)
         return other
 
-    def reach(self, lower: Array, upper: Array) -> _Reach:
+    def reach(self, lower: Array, upper: Array) -> Reach:
         """Of a box."""
         ends = (self.model.masses(corner(way * self._light, lower, upper)) for way in (1.0, -1.0))
         light, heavy = ends
         rod = self.model.rod_length(lower), self.model.rod_length(upper)
-        return _Reach(np.minimum(light, heavy), np.maximum(light, heavy), rod)
+        return Reach(np.minimum(light, heavy), np.maximum(light, heavy), rod, self.model.domains)
 
     def touch(self, lower: Array, upper: Array) -> None:
         """Bounds that loads meet at masses of a box."""
-        reach = self.reach(lower, upper)
-        middle, length = reach.middle
+        reach, most = self.reach(lower, upper), MOST_TOUCHED if self._together is None else FEW_TOUCHED
+        (middle, length), given = reach.middle, self.model.start
         for number in (*(number for _, number in self.terms), *(number for _, number, _ in self.limits)):
             for bundle in number.pieces:
-                for masses in (reach.low, middle) if bundle.count < MOST_TOUCHED else ():
-                    bundle.touch(masses, length)
+                for masses in (reach.low, middle) if bundle.count < most else ():
+                    bundle.touch(np.append(masses, given), length)
 
-    def least(self, number: _Number, lower: Array, upper: Array, reach: _Reach) -> float:
+    def least(self, number: Number, lower: Array, upper: Array, reach: Reach) -> float:
         """Of a measure on a box."""
         at = corner(number.ways, lower, upper)
         if not number.pieces:
@@ -214,19 +147,24 @@ class SizeBoxes:
         engine = self.model.engine(at) if np.any(number.ways) else self.model.problem.engine
         return max(self._piece(bundle, number.measure, engine, reach) for bundle in number.pieces)
 
-    def _piece(self, bundle: _Bundle | _RodBundle, measure: Measure, engine: Engine, reach: _Reach) -> float:
+    def _piece(self, bundle: Bundle, measure: Measure, engine: Engine, reach: Reach) -> float:
         factors = self.model.factors(bundle.piece, measure, engine)
         ratio = bundle.piece.ratio(factors)
         if ratio is not None:
             return ratio * bundle.least(reach)
-        own = bundle.scaled(factors)
-        own.touch(*reach.middle)
+        own, (masses, length) = bundle.scaled(factors), reach.middle
+        own.touch(np.append(masses, self.model.start), length)
         return own.least(reach)
 
-    def objective(self, lower: Array, upper: Array) -> float:
-        """Least on a box."""
+    def objective(self, lower: Array, upper: Array, known: Sequence[Together] = ()) -> float:
+        """Least on a box, infinite where dual rows known exclude it."""
         reach = self.reach(lower, upper)
-        return sum(weight * self.least(number, lower, upper, reach) for weight, number in self.terms)
+        # what is known of all loads together is no less than what each tells
+        numbers = [(w, number) for w, number in self.terms if not (known and number.pieces)]
+        apart = sum(weight * self.least(number, lower, upper, reach) for weight, number in numbers)
+        if self._together is None or not known:
+            return apart
+        return apart + max(*(self._together.least(each, lower, upper, reach) for each in known), 0.0)
 
     def breaks(self, lower: Array, upper: Array, k: int | None = None, way: float = 0.0) -> bool:
         """Whether a limit is broken all over a box; of those limits that go one way with size k, where that is told."""
@@ -237,33 +175,60 @@ class SizeBoxes:
             if k is None or number.ways[k] == way
         )
 
-    def cut(self, lower: Array, upper: Array, enough: float) -> tuple[Array, Array, float] | None:
-        """A box without sides that hold no better design, and its least objective; None where nothing is left."""
+    def cut(self, lower: Array, upper: Array, enough: float, known: tuple[Together, ...] = ()) -> Cut | None:
+        """A box without sides that hold no better design; None where nothing is left."""
         self.touch(lower, upper)
-        if self.breaks(lower, upper) or self.objective(lower, upper) >= enough:
+        if self.breaks(lower, upper) or self.objective(lower, upper, known) >= enough:
             return None
         for _ in range(ROUNDS):
             before = (upper - lower).sum()
+            known = self._learned(lower, upper, enough, known)
+            if self.objective(lower, upper, known) >= enough:
+                return None
             for k in range(len(lower)):
-                lower, upper = self._shaved(lower, upper, k, enough)
+                lower, upper = self._shaved(lower, upper, k, enough, known)
             if (upper - lower).sum() > 0.9 * before:
                 break
-        bound = self.objective(lower, upper)
-        return None if bound >= enough else (lower, upper, bound)
+        bound = self.objective(lower, upper, known)
+        if bound >= enough:
+            return None
+        return Cut(lower, upper, bound, self._side(lower, upper, known, bound, enough), known)
 
-    def _shaved(self, lower: Array, upper: Array, k: int, enough: float) -> tuple[Array, Array]:
+    def _learned(self, lower: Array, upper: Array, enough: float, known: tuple[Together, ...]) -> tuple[Together, ...]:
+        """What dual rows of the box tell, and those of the last one; exact ones where little is to be shown."""
+        if self._together is None:
+            return ()
+        near = bool(known) and self.objective(lower, upper, known) >= (1.0 - NEAR) * enough
+        found = self._together.learned(lower, upper, self.reach(lower, upper), near)
+        return known if found is None else (found, *known[: KEPT - 1])
+
+    def _side(self, lower: Array, upper: Array, known: Sequence[Together], bound: float, enough: float) -> int:
+        """The side whose halving tells most; the longest beside that of all that is open where none tells much."""
+        middle, gained = 0.5 * (lower + upper), np.zeros(len(lower))
+        for k, here in enumerate(np.eye(len(lower), dtype=bool) if known and enough < math.inf else ()):
+            first = self.objective(lower, np.where(here, middle, upper), known)
+            second = self.objective(np.where(here, middle, lower), upper, known)
+            gained[k] = min(first, enough) + min(second, enough) - 2.0 * bound
+        if gained.max() > TOLD * (enough - bound):
+            return int(np.argmax(gained))
+        return widest(lower, upper, self.model.upper - self.model.lower)
+
+    def _shaved(
+        self, lower: Array, upper: Array, k: int, enough: float, known: Sequence[Together]
+    ) -> tuple[Array, Array]:
         """Without as much of the ends of one side as is shown to hold nothing."""
         here = np.arange(len(lower)) == k
 
         def low_empty(edge: float) -> bool:
-            return self.breaks(lower, np.where(here, edge, upper), k, -1.0)
+            part = lower, np.where(here, edge, upper)
+            return self.breaks(*part, k, -1.0) or (bool(known) and self.objective(*part, known) >= enough)
 
         first = _last_empty(low_empty, lower[k], upper[k])
         lower = np.where(here, first, lower)
 
         def high_empty(edge: float) -> bool:
             part = np.where(here, edge, lower), upper
-            return self.objective(*part) >= enough or self.breaks(*part, k, 1.0)
+            return self.objective(*part, known) >= enough or self.breaks(*part, k, 1.0)
 
         return lower, np.where(here, _last_empty(high_empty, upper[k], lower[k]), upper)
 
@@ -282,28 +247,33 @@ def _last_empty(empty: Callable[[float], bool], start: float, end: float) -> flo
     return done
 
 
-def corner(ways: Ways, lower: Array, upper: Array) -> Array:
-    """Where numbers that go these ways are least."""
-    return np.where(ways >= 0.0, lower, upper)
+class _SizeBox(Box):
+    """A box, and the dual rows that told of it."""
+
+    known: tuple[Together, ...] = ()
 
 
 class _Sizes(Halving):
-    """Halves of the longest side, each cut."""
+    """Halves of a side, each cut."""
 
     what = "boxes of sizes"
 
     def __init__(self, boxes: SizeBoxes, value: float, room: float) -> None:
         super().__init__(value, room)
-        self._boxes, self._whole = boxes, boxes.model.upper - boxes.model.lower
+        self._boxes = boxes
 
-    def bounded(self, lower: Array, upper: Array) -> tuple[float, Box] | None:
+    def bounded(self, lower: Array, upper: Array, known: tuple[Together, ...] = ()) -> tuple[float, Box] | None:
         """A box without what is cut off."""
-        kept = self._boxes.cut(lower, upper, self.enough)
-        return None if kept is None else (kept[2], Box(*kept[:2], widest(*kept[:2], self._whole)))
+        found = self._boxes.cut(lower, upper, self.enough, known)
+        if found is None:
+            return None
+        box = _SizeBox(found.lower, found.upper, found.side)
+        box.known = found.known
+        return found.bound, box
 
     def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
         """Each half by itself."""
-        return [self.bounded(*half) for box in boxes for half in halves(box)]
+        return [self.bounded(*half, getattr(box, "known", ())) for box in boxes for half in halves(box)]
 
 
 def divided_sizes(boxes: SizeBoxes, value: float, room: float, most: int = MOST_BOXES) -> Divided:

@@ -1,49 +1,119 @@
-"""Deciding sizes of the running gear: local programs find a design, boxes of sizes prove it (Z12)."""
+"""Deciding sizes of the running gear, and unbalances with them: local programs propose, boxes prove (Z12, Z14)."""
 
 from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from laufruhe.errors import ModelError
+from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.load_models.sized_model import SizeModel
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.norms import Grid
+from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.boxes.sizes import MOST_BOXES, SizeBoxes, divided_sizes
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import Multipliers, Reach
+from laufruhe.solvers.boxes.held_designs import HeldDesigns
 from laufruhe.solvers.conclusion import concluded, none_within
+from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, searched, shown
 
-MOST_WITH_ROD = 300
-"""Boxes where the length of the rod is open, which take ten times as long."""
+MOST_WITH_ROD, MOST_PROGRAMS = 300, 400
+"""Boxes where the length of the rod is open, which take ten times as long, and where each has cone programs."""
 STARTS = 3
+# part of the angles at which programs of boxes stand, of no fewer than so many
+THIN, LEAST_STEPS = 4, 48
 # relative room that local programs leave inside limits, a part of what counts as kept
 INSIDE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class _SizeProgram(LocalProgram):
-    """Objective and rooms by the model of sizes, which is the exact one at the angles of the results."""
+    """Objective and rooms by the model of sizes, which is the exact one at the angles of the results.
+
+    Shares are those of every column of a decision; a column of an unbalance lies between its sizes in both senses.
+    """
 
     model: SizeModel
 
+    @classmethod
+    def of_sizes(cls, model: SizeModel) -> _SizeProgram:
+        """Over the bounds of all that is open."""
+        domains = domains_of(model.problem.decisions)
+        ends = [(d.set.lower, d.set.upper) if d.width == 1 else (-d.scale, d.scale) for d in domains]
+        lower, upper = (
+            np.concatenate([np.full(d.width, pair[k]) for d, pair in zip(domains, ends, strict=True)]) for k in (0, 1)
+        )
+        return cls(model.problem, lower, upper, model)
+
+    @cached_property
+    def domains(self) -> tuple[Domain, ...]:
+        """Of all decisions."""
+        return domains_of(self.problem.decisions)
+
+    @cached_property
+    def sized(self) -> Mask:
+        """Which columns are sizes."""
+        return np.concatenate([np.full(d.width, d.decision in self.model.sizes, dtype=bool) for d in self.domains])
+
+    def columns(self, shares: Array) -> Array:
+        """Of all decisions."""
+        return np.asarray(self.lower + np.clip(shares, 0.0, 1.0) * (self.upper - self.lower))
+
+    def values(self, shares: Array) -> list[Value]:
+        """Decisions, inside their sets."""
+        own = self.columns(shares)
+        inside = np.concatenate([domain.project(own) for domain in self.domains])
+        return [
+            float(inside[d.start]) if d.decision in self.model.sizes else d.complex_value(inside) for d in self.domains
+        ]
+
+    def shares(self, values: Sequence[Value] | Array) -> Array:
+        """Of the bounds, where decisions have these values."""
+        own = np.concatenate([d.columns_of(value) for d, value in zip(self.domains, values, strict=True)])
+        return np.asarray(np.clip((own - self.lower) / (self.upper - self.lower), 0.0, 1.0))
+
+    def by_decision(self, values: Array) -> dict[str, Array]:
+        """What stands for every share, by the name of its decision."""
+        return {domain.decision.name: values[domain.columns] for domain in self.domains}
+
     def numbers(self, shares: Array) -> Array:
-        """The objective, then the relative room inside each limit."""
-        x, problem = np.array(self.values(shares)), self.problem
-        value = sum(term.weight * self.model.value(term.measure, x) for term in problem.objective)
-        rooms = [limit.room(self.model.value(limit.measure, x))[0] - INSIDE for limit in problem.limits]
-        return np.array([value, *rooms])
+        """The objective, then the relative room inside each limit, and inside each sector."""
+        own, problem = self.columns(shares), self.problem
+        x, u = own[self.sized], own[~self.sized]
+        value = sum(term.weight * self.model.value(term.measure, x, u) for term in problem.objective)
+        rooms = [limit.room(self.model.value(limit.measure, x, u))[0] - INSIDE for limit in problem.limits]
+        edges = [room for domain in self.domains for room in domain.set.rooms(own[domain.columns])]
+        return np.array([value, *rooms, *edges])
+
+    def place(self, values: Array) -> Array:
+        """The best unbalances with sizes given."""
+        return self.balanced(values)
+
+    def balanced(self, sizes: Array) -> Array:
+        """Shares with these sizes and the best unbalances there."""
+        problem, named = self.problem, self.model.sizes
+        if not self.model.domains:
+            return self.shares(sizes)
+        given = [float(x) for x in sizes]
+        held = replace(problem, engine=problem.design(given, named), decisions=problem.unbalances)
+        where: dict[str, Value] = dict(zip((d.name for d in named), given, strict=True))
+        return self.shares(HeldDesigns(problem).best_with(held, where).design.values)
 
 
 def solve_sizes(problem: Problem) -> Result:
-    """The best sizes, proven where the length of the rod is given; or the limits that no sizes keep.
+    """The best sizes and unbalances, proven where bounds of boxes close; or the limits that no sizes keep.
 
     Raises
     ------
@@ -53,14 +123,12 @@ def solve_sizes(problem: Problem) -> Result:
     started = time.perf_counter()
     initial, model = evaluate(problem), SizeModel(problem)
     _check_acts(model)
-    program = _SizeProgram(problem, model.lower, model.upper, model)
-    given = program.shares(problem.start)
-    starts = [given, np.ones(len(given)), *looks(problem)]
-    best = searched(program, starts, min(problem.search.starts, STARTS))
+    program = _SizeProgram.of_sizes(model)
+    best = _proposed(program)
     boxes = _boxes(model)
 
     def bounded(value: float, room: float) -> Divided:
-        usual = MOST_WITH_ROD if model.moves_rod else MOST_BOXES
+        usual = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
         most = usual if problem.search.boxes is None else problem.search.boxes
         return Divided(0.0, 0) if boxes is None else divided_sizes(boxes, value, room, most)
 
@@ -72,10 +140,45 @@ def solve_sizes(problem: Problem) -> Result:
     return concluded(found.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
+def _proposed(program: _SizeProgram) -> Array:
+    """The best design of local programs, its unbalances the best with its sizes."""
+    problem = program.problem
+    given = program.shares(problem.start)
+    starts = [given, np.ones(len(given)), *looks(problem)]
+    if program.model.domains:
+        sizes = [program.columns(start)[program.sized] for start in starts[:2]]
+        starts = [*(program.balanced(each) for each in sizes), *starts]
+    best = searched(program, starts, min(problem.search.starts, STARTS))
+    return min(best, program.balanced(program.columns(best)[program.sized]), key=program.rank)
+
+
+def ask_cones(program: AffineProblem, exactly: bool = False) -> tuple[Array | None, Multipliers]:
+    """A program's decision vector and dual rows, at fewer angles unless all are wanted."""
+    if not exactly:
+        program = replace(
+            program,
+            terms=tuple((weight, _thinned(norm)) for weight, norm in program.terms),
+            limits=tuple((most, _thinned(norm)) for most, norm in program.limits),
+        )
+    found = solve_cones(program)
+    return found.x, found.multipliers
+
+
+def _thinned(norm: AffineNorm) -> AffineNorm:
+    """Every so many rows of a mean over equal steps; all of those of others."""
+    grid = norm.grid
+    if not norm.norm.averages or grid.bends or grid.steps % THIN or grid.steps < THIN * LEAST_STEPS:
+        return norm
+    weights = THIN * grid.weights[::THIN]
+    return replace(
+        norm, constant=norm.constant[::THIN], slope=norm.slope[::THIN], grid=Grid(weights, grid.steps // THIN)
+    )
+
+
 def _boxes(model: SizeModel) -> SizeBoxes | None:
     """Boxes that bound what is asked; None where nothing bounds it."""
     try:
-        return SizeBoxes(model)
+        return SizeBoxes(model, ask_cones)
     except ValueError:
         return None
 
@@ -90,7 +193,7 @@ def _conflict(problem: Problem, boxes: SizeBoxes) -> tuple[str, ...]:
 def _check_acts(model: SizeModel) -> None:
     """Refuse a size that nothing asked hangs on."""
     measures = dict.fromkeys(model.problem.measures)
-    for k, decision in enumerate(model.problem.decisions):
+    for k, decision in enumerate(model.sizes):
         middle = 0.5 * (model.lower + model.upper)
         ends = [np.where(np.arange(len(middle)) == k, edge, middle) for edge in (model.lower, model.upper)]
         if all(model.value(measure, ends[0]) == model.value(measure, ends[1]) for measure in measures):

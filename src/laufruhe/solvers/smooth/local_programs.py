@@ -46,18 +46,29 @@ class LocalProgram:
         """Of the bounds, where decisions have these values."""
         return np.asarray(np.clip((np.real(values) - self.lower) / (self.upper - self.lower), 0.0, 1.0))
 
-    def values(self, shares: Array) -> list[float]:
+    def values(self, shares: Array) -> list[Value]:
         """Decisions."""
         return list(np.clip(self.lower + shares * (self.upper - self.lower), self.lower, self.upper).tolist())
 
     def numbers(self, shares: Array) -> Array:
-        """The objective, then the least relative room inside each limit; an objective far off on a resonance."""
+        """The objective, then the least relative room inside each limit, and inside each set that is no interval.
+
+        On a resonance the objective is far off.
+        """
         try:
             evaluation = evaluate(self.problem, self.problem.design(self.values(shares)))
             rooms = [-evaluation.standing(limit).excess for limit in self.problem.limits]
             return np.array([objective_value(self.problem, evaluation), *rooms])
         except ModelError:
             return np.array([math.inf, *(-1.0 for _ in self.problem.limits)])
+
+    def place(self, values: Array) -> Array:
+        """Shares to seek a design from where boxes are least."""
+        return self.shares(values)
+
+    def by_decision(self, values: Array) -> dict[str, Array]:
+        """What stands for every share, by the name of its decision."""
+        return {d.name: values[[k]] for k, d in enumerate(self.problem.decisions)}
 
     def slopes(self, shares: Array) -> Array:
         """Of these numbers, by central differences inside the bounds, shape (1 + limits, n)."""
@@ -75,10 +86,10 @@ class LocalProgram:
 
 
 def looks(problem: Problem) -> list[Array]:
-    """Designs spread evenly over the bounds."""
+    """Designs spread evenly over the bounds of every column."""
     rng, many = np.random.default_rng(problem.search.seed), LOOKS * problem.search.starts
     # of each number one in every share of its bounds
-    columns = [(rng.permutation(many) + rng.random(many)) / many for _ in problem.decisions]
+    columns = [(rng.permutation(many) + rng.random(many)) / many for d in problem.decisions for _ in range(d.set.width)]
     return list(np.array(columns).T)
 
 
@@ -111,7 +122,7 @@ def _local(program: LocalProgram, place: Array) -> Array:
         found[0] /= unit
         return np.nan_to_num(found, posinf=FAR, neginf=-FAR)
 
-    limits = len(program.problem.limits)
+    limits = len(first) - 1
     inside: Any = [{"type": "ineq", "fun": lambda x: numbers(x)[1:], "jac": lambda x: slopes(x)[1:]}] if limits else []
     run: Any = minimize
     found = run(
@@ -156,7 +167,7 @@ def proven(program: LocalProgram, best: Array, bounded: Bounded) -> Proven:
             value = found.design.value
             room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine))
         found = replace(found, divided=bounded(value, room))
-        places = [program.shares(x) for x in found.divided.places]
+        places = [program.place(x) for x in found.divided.places]
         if not places or found.divided.bound >= value - room:
             break
         again = searched(program, [found.shares, *places], len(places) + 1)
@@ -181,6 +192,9 @@ def shown(program: LocalProgram, design: Design, bound: float, reach: Reach, met
     prices: dict[Side, float] = {}
     left = slopes[0].copy()
     for k, share in zip(held, shares, strict=False):
+        if k >= len(problem.limits):
+            # a set's own edge, which its decision has a price for
+            continue
         limit = problem.limits[k]
         steep = float(np.abs(slopes[1 + k]).max()) or 1.0
         _, edge, side = limit.room(design.evaluation.standing(limit).value)
@@ -188,5 +202,4 @@ def shown(program: LocalProgram, design: Design, bound: float, reach: Reach, met
         prices[limit, side] = float(share) * scale / (steep * (abs(edge) or 1.0))
         left = left - float(share) * scale / steep * slopes[1 + k]
     widths = program.upper - program.lower
-    by_name = {d.name: np.array([left[k] / widths[k]]) for k, d in enumerate(problem.decisions)}
-    return Shown(bound, reach, float(rest), method, prices, by_name)
+    return Shown(bound, reach, float(rest), method, prices, program.by_decision(left / widths))

@@ -1,0 +1,151 @@
+"""Sizes and unbalances together: proven against random designs, cone programs at given sizes, and less freedom."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.errors import ModelError
+from laufruhe.load_models.sized_model import SizeModel
+from laufruhe.problem.decision import domains_of
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.boxes.sizes import SizeBoxes
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import Status
+from laufruhe.solvers.boxes.sizes import ask_cones
+from laufruhe.solvers.cones.unbalances import solve_unbalances
+from laufruhe.solvers.result import Result
+from problem_files import changed
+from solvers.test_sizes import TEXT
+
+WEIGHT = """
+[[counterweights]]
+name = "w"
+x = "10 mm"
+radius = "60 mm"
+unbalance = { between = ["0 kg m", "0.03 kg m"] }
+angle = { between = [0, 360] }
+[[balancer_shafts]]
+name = "shaft"
+ratio = -1
+position = ["80 mm", "20 mm"]
+unbalances = [{ x = "0 mm", unbalance = { between = ["0 kg m", "0.01 kg m"] }, angle = 180 }]
+"""
+FEWER = changed(
+    changed(TEXT, '{ between = ["20 mm", "40 mm"], start = "35 mm" }', '"36 mm"'), "samples = 360", "samples = 180"
+)
+TOGETHER = changed(FEWER, "[objective]", f"{WEIGHT}[objective]")
+TOLERANCE = 1e-3
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return laufruhe.load(TOGETHER).changed(tolerance=TOLERANCE)
+
+
+@pytest.fixture(scope="module")
+def solved(problem: Problem) -> Result:
+    return laufruhe.solve(problem)
+
+
+def held(problem: Problem, sizes: np.ndarray) -> Problem:
+    """With these sizes, unbalances open."""
+    named = tuple(d for d in problem.decisions if d not in problem.unbalances)
+    engine = problem.design(sizes.tolist(), named)
+    return replace(problem, engine=engine, decisions=problem.unbalances)
+
+
+def test_the_best_sizes_with_the_best_weights_are_proven(solved: Result) -> None:
+    assert solved.status is Status.OPTIMAL
+    assert solved.certificate.kind is Proof.GLOBAL
+    assert solved.certificate.kkt_residual < 1e-4
+    assert "boxes of sizes" in solved.certificate.method
+
+
+def test_at_its_sizes_the_cone_program_finds_the_same(solved: Result, problem: Problem) -> None:
+    found = {entry.name: entry.value for entry in solved.decisions}
+    sizes = np.array([found[d.name] for d in problem.decisions if d not in problem.unbalances])
+    own = solve_unbalances(held(problem, sizes))
+    assert own.objective.value == pytest.approx(solved.objective.value, rel=1e-6)
+    # and no box around them alone has a bound beyond it
+    model = SizeModel(problem)
+    boxes = SizeBoxes(model, ask_cones)
+    point = boxes.cut(sizes, sizes, np.inf)
+    assert point.bound <= solved.objective.value * (1.0 + 1e-9)
+    assert point.bound == pytest.approx(solved.objective.value, rel=1e-6)
+
+
+def test_weights_beside_sizes_are_never_worse_and_neither_are_sizes_beside_weights(
+    solved: Result, problem: Problem
+) -> None:
+    sizes = laufruhe.solve(FEWER)
+    weights = solve_unbalances(held(problem, np.array([entry.value for entry in sizes.decisions])))
+    for less in (weights, sizes):
+        assert solved.certificate.lower_bound <= less.objective.value
+        assert solved.objective.value <= less.objective.value * (1.0 + TOLERANCE)
+    assert solved.objective.value < 0.5 * sizes.objective.value
+
+
+def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
+    """Random boxes, designs and dual rows: none allowed lies under a bound, or in what was cut off."""
+    model = SizeModel(problem)
+    boxes, rng, kept = SizeBoxes(model, ask_cones), np.random.default_rng(5), 0
+    domains = domains_of(problem.unbalances)
+    measure = problem.objective[0].measure
+    known: tuple = ()
+    for _ in range(20):
+        low, high = np.sort(model.lower + rng.random((2, 3)) * (model.upper - model.lower), axis=0)
+        # what dual rows of the box before say, too
+        bound, cut = boxes.objective(low, high, known), boxes.cut(low, high, np.inf)
+        for _ in range(20):
+            x = low + rng.random(3) * (high - low)
+            wild = np.concatenate([d.scale * rng.uniform(-1.0, 1.0, d.width) for d in domains]) * rng.random()
+            u = np.concatenate([domain.project(wild) for domain in domains])
+            values = iter([domain.complex_value(u) for domain in domains])
+            sizes = iter(x.tolist())
+            design = [next(values) if d in problem.unbalances else next(sizes) for d in problem.decisions]
+            evaluation = evaluate(problem, problem.design(design))
+            assert model.value(measure, x, u) == pytest.approx(evaluation.value(measure), rel=1e-9)
+            if evaluation.excess(problem.limits) <= 0.0:
+                kept += 1
+                assert evaluation.value(measure) >= bound * (1.0 - 1e-9)
+                assert cut is not None
+                assert evaluation.value(measure) >= cut.bound * (1.0 - 1e-9)
+                assert np.all(cut.lower <= x)
+                assert np.all(x <= cut.upper)
+        known = cut.known if cut is not None else known
+    assert kept > 5
+
+
+def test_stresses_that_no_sizes_and_weights_meet_are_named() -> None:
+    result = laufruhe.solve(changed(TOGETHER, 'max = "50 N/mm^2"', 'max = "0.5 N/mm^2"'))
+    assert result.status is Status.INFEASIBLE
+    assert result.conflict == ("maximum web stress",)
+
+
+def test_masses_of_weights_are_limited_beside_sizes(solved: Result) -> None:
+    limited = changed(
+        TOGETHER, "[fidelity]", '[[constraints]]\nlimit = "added mass"\nof = ["w"]\nmax = "0.2 kg"\n[fidelity]'
+    )
+    result = laufruhe.solve(laufruhe.load(limited).changed(tolerance=TOLERANCE))
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.limits[-1].value <= 0.2 * (1.0 + 1e-5)
+    assert result.objective.value >= solved.certificate.lower_bound
+    assert result.limits[-1].active
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        (changed(TOGETHER, '"0.5 kg"', '{ between = ["0.1 kg", "1 kg"] }'), "no method decides .*piston.* together"),
+        (changed(TOGETHER, "samples = 180", 'crank_inertia = "1 kg m^2"'), "even crank speed|no method"),
+    ],
+)
+def test_what_is_not_decided_is_refused_in_a_line(text: str, rule: str) -> None:
+    with pytest.raises(ModelError, match=rule) as refused:
+        laufruhe.solve(text)
+    assert "\n" not in str(refused.value)
