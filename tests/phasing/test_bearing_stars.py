@@ -11,7 +11,6 @@ from typing import Any
 import pytest
 
 import laufruhe
-from laufruhe.errors import ModelError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
@@ -140,12 +139,6 @@ def test_throws_given_and_their_firing_order_open() -> None:
     given = {order: value_of(each) for order, each in one_by_one(tables(4, bearing("mean"), {"mass": "1 kg"})).items()}
     flat = [value for order, value in given.items() if {order[0], order[2]} == {1, 3}]
     assert result.objective.value == pytest.approx(min(flat), rel=1e-6)
-
-
-def test_uneven_throws_are_refused_by_name() -> None:
-    whole = tables(4, bearing("mean"), OPEN, phasing={"intervals": {"largest_deviation": "20 deg"}})
-    with pytest.raises(ModelError, match="loads inside the crankcase are decided with even firing"):
-        laufruhe.solve(problem_of(whole))
 
 
 VEE = {"layout": "vee", "bank_angle": 60, "split_pin_angle": 60}

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.errors import ModelError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.firing_model import FiringModel
 from laufruhe.load_models.pair_tables import PairObjective
@@ -244,12 +243,6 @@ def test_bearings_limit_what_twists() -> None:
     assert result.objective.value == pytest.approx(expected, rel=1e-9)
     assert result.status is Status.OPTIMAL
     assert expected > min(twists.values()) * (1.0 + 1e-6) or loads[min(twists, key=twists.get)] <= allowed
-
-
-def test_what_is_not_decided_says_so() -> None:
-    uneven = tables(phasing={"intervals": {"largest_deviation": "10 deg"}})
-    with pytest.raises(ModelError, match=r"even firing or with throws that are given; leave phasing\.intervals"):
-        laufruhe.solve(problem_of(uneven))
 
 
 def test_banks_that_share_throws_are_decided_order_by_order() -> None:

@@ -243,8 +243,14 @@ class AffineModel:
         own = self.bare.signals(channel)
         return [(bare, tuple(map(channel.signal, by))) for bare, by in zip(own, self._slopes, strict=True)]
 
-    def norm(self, measure: Measure, samples: int, averaged: bool = False) -> AffineNorm:
-        """A measure at `samples` steps over the common period, a mean averaged about them where asked."""
+    def norm(self, measure: Measure, samples: int, averaged: bool = False, peaks: int = 0) -> AffineNorm:
+        """A measure at `samples` steps over the common period, a mean averaged about them if asked.
+
+        Parameters
+        ----------
+        peaks
+            Parts of a step about which a peak is averaged beside means; zero where it is not.
+        """
         channel, known = measure.channel, self.problem.known_rows.get(measure)
         if known is not None:
             grid = Grid(np.ones(len(known.constant)), len(known.constant))
@@ -261,7 +267,7 @@ class AffineModel:
                 for change in self._changes
             ]
             return _stacked(bare, slopes, self._keep_all)
-        averaged = averaged and measure.norm.averages
+        parts = peaks if averaged and not measure.norm.averages else int(averaged)
         pairs = self.spectra(channel)
         own = [bare for bare, _ in pairs]
         alone = [[by[k] for _, by in pairs] for k in range(len(self._changes))]
@@ -270,11 +276,11 @@ class AffineModel:
         # what is open does not bend, but has to be known at the same angles
         lead = [signal.over(base) for signal in (own if self.lead is None else self.lead.bare.signals(channel))]
         bends = bends_of(measure, lead, self.problem.engine)
-        bare = self._rows(measure, own, base, samples, averaged, bends)
+        bare = self._rows(measure, own, base, samples, parts, bends)
         if bare.vectors.size * len(self._changes) > MOST_NUMBERS:
             size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"
             raise ModelError(f"{size} are needed; give fewer operating points, open numbers or samples", "problem")
-        slopes = [self._rows(measure, by, base, samples, averaged, bends).vectors for by in alone]
+        slopes = [self._rows(measure, by, base, samples, parts, bends).vectors for by in alone]
         return _stacked(bare, slopes, self._keep_all)
 
     def _own_base(self, signals: Sequence[Spectrum], samples: int) -> Fraction:
@@ -284,12 +290,12 @@ class AffineModel:
         return own if whole else self.base
 
     def _rows(
-        self, measure: Measure, signals: Sequence[Spectrum], base: Fraction, samples: int, averaged: bool,
+        self, measure: Measure, signals: Sequence[Spectrum], base: Fraction, samples: int, parts: int,
         bends: Sequence[Array],
     ) -> Rows:  # fmt: skip
         period = [signal.over(base) for signal in signals]
-        if averaged:
-            period = [signal.averaged(signal.period / samples) for signal in period]
+        if parts:
+            period = [signal.averaged(signal.period / (parts * samples)) for signal in period]
         return load_rows(measure, self.problem.points, period, self.problem.engine, samples, bends)
 
 

@@ -14,7 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
+from laufruhe.load_models.lone_parts import lone, working
+from laufruhe.load_models.throw_waves import PEAK_STEPS, ThrowWaves, WaveNorm, averages
 from laufruhe.machine import Engine
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import ComplexArray
@@ -40,13 +41,16 @@ class AngleWaves(ThrowWaves):
     """
 
     # one angle is cheap to follow
-    share_left_out: ClassVar[float] = 1e-6
-    followed: ClassVar[float] = 1e-9
+    share_left_out: ClassVar[tuple[float, float]] = 1e-6, 1e-6
+    _followed: ClassVar[tuple[float, float]] = 1e-9, 1e-9
 
     def __init__(self, problem: Problem, layout: Layout, laps: Sequence[int], of_bank: bool) -> None:
         super().__init__(problem, layout, {})
         self._laps, self._of_bank = laps, of_bank
-        self._at = [[evaluate(problem, self._turned_to(k, bank)) for bank in self._banks(k)] for k in range(len(laps))]
+        acting = [working(problem, part.name) for part in problem.engine.slider_cranks]
+        self._at = [
+            [evaluate(acting[k], self._turned_to(k, bank)) for bank in self._banks(k)] for k in range(len(laps))
+        ]
         around = (-1, 0, 1) if of_bank else (0,)
         self.orders = tuple(sorted({abs(order + step) for order in self.times for step in around}))
         self.numbers = np.array([float(order) for order in self.orders])
@@ -58,8 +62,9 @@ class AngleWaves(ThrowWaves):
 
     def _turned_to(self, k: int, bank: float) -> Engine:
         """A cylinder alone, at its firing dead centre when phi = 0."""
-        part = replace(self.problem.engine.slider_cranks[k], bank=bank, throw=bank, firing_angle=0.0)
-        return replace(self.problem.engine, slider_cranks=(part,), rotors=())
+        engine = self.problem.engine
+        part = replace(engine.slider_cranks[k], bank=bank, throw=bank, firing_angle=0.0)
+        return lone(engine, k, any(measure.is_inside for measure in self.problem.measures), part)
 
     def _components(self, spectra: Sequence[Spectrum]) -> list[ComplexArray]:
         """Of forward and backward waves and of what does not lean, from the banks of `_banks`."""
@@ -73,7 +78,9 @@ class AngleWaves(ThrowWaves):
 
     def norm(self, measure: Measure, samples: int) -> WaveNorm:
         """As of throws (S26), with waves of the one angle."""
-        fixed = self.rest.norm(measure, samples, averaged=True)
+        fixed = self.rest.norm(
+            measure, samples, averaged=True, peaks=PEAK_STEPS if averages(self.problem, measure) else 0
+        )
         waves = np.zeros((1, len(self.orders), *fixed.constant.shape), complex)
         if not measure.is_load:
             return WaveNorm(fixed, waves, 0.0)
@@ -91,19 +98,19 @@ class AngleWaves(ThrowWaves):
                     turned = row * np.exp(1j * float(order) * (throw + still - math.tau * self._laps[k]))
                     backwards = sign * float(order + step) > 0.0
                     waves[0, self.orders.index(abs(order + step))] += turned.conj() if backwards else turned
-        return WaveNorm(fixed, waves, self.left_out(measure))
+        return WaveNorm(fixed, waves, self.left_out(measure, samples))
 
-    def left_out(self, measure: Measure) -> float:
+    def left_out(self, measure: Measure, samples: int) -> float:
         """What the orders that are left out amount to at most, whatever the angle."""
-        return sum(self._left_out(measure, k) for k in range(len(self._at))) if measure.is_load else 0.0
+        return sum(self._left_out(measure, k, samples) for k in range(len(self._at))) if measure.is_load else 0.0
 
-    def _left_out(self, measure: Measure, k: int) -> float:
+    def _left_out(self, measure: Measure, k: int, samples: int) -> float:
         """Of one cylinder, wherever its bank: no more than of all three of its own together."""
         total, mine = 0.0, self._alone[k]
         try:
             for found in self._at[k]:
                 self._alone[k] = found
-                total += super()._left_out(measure, k)
+                total += super()._left_out(measure, k, samples)
         finally:
             self._alone[k] = mine
         # |A cos b + B sin b + C|, with A, B and C of the three

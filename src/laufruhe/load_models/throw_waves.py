@@ -17,15 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.load_models.lone_parts import lone, motored, only_rotors, working
 from laufruhe.machine import Engine
 from laufruhe.machine.firing_windows import lateness
 from laufruhe.machine.layouts import Layout
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base, orders_equal
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure, load_rows, mass_rows, selected
 from laufruhe.problem.problem import Problem
 
 _NOTHING, _FEW = 1e-10, 24
+_MANY = 96
+PEAK_STEPS = 2
+"""Parts of a step about which peaks are averaged: none is more than the peak, however short."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +73,19 @@ class WaveNorm:
     left_out: float
 
 
+def averages(problem: Problem, measure: Measure) -> bool:
+    """Whether its rows are averages about angles: of means (P7), and of peaks that gas bends, which are no less."""
+    bends = problem.has_gas and measure.feels_gas and measure.norm.refinement > 1
+    return measure.is_load and (measure.norm.averages or bends)
+
+
+def averaged(problem: Problem, measure: Measure, signal: Spectrum, samples: int) -> Spectrum:
+    """A signal as its rows are taken at so many steps of its period."""
+    if not averages(problem, measure):
+        return signal
+    return signal.averaged(signal.period / (samples if measure.norm.averages else PEAK_STEPS * samples))
+
+
 class ThrowWaves:
     """Norms of a problem as waves of its throws.
 
@@ -83,25 +101,39 @@ class ThrowWaves:
         Throw that every rotor turns with; rotors left out stand still.
     """
 
-    share_left_out: ClassVar[float] = 1e-4
-    """Of the moving parts' root mean square, that the orders left out may hold, of the first few next to nothing;
-    bounds are lowered by it."""
-    followed: ClassVar[float] = 1e-4
-    """Of the heaviest order, that one is followed along an arc; others count as their size."""
+    share_left_out: ClassVar[tuple[float, float]] = 1e-4, 1e-3
+    """Of the moving parts' root mean square, that the orders left out may hold, of the first few next to nothing; bounds are
+    lowered by it. Of many orders more: inside the crankcase a pressure that jumps has no end of them."""
+    _followed: ClassVar[tuple[float, float]] = 1e-4, 3e-5
 
     def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
         self.problem, self.layout = problem, layout
         engine = problem.engine
         self.throws = len(layout.throw_positions)
         still = tuple(replace(rotor, unbalance=0.0j) if rotor.name in rides else rotor for rotor in engine.rotors)
-        self.parts = _moving(engine, layout, rides)
-        self._alone = [evaluate(problem, part.engine) for part in self.parts]
-        self.rest = AffineModel(replace(problem, engine=replace(engine, slider_cranks=(), rotors=still)), keep_all=True)
+        inside = any(measure.is_inside for measure in problem.measures)
+        self.parts = _moving(engine, layout, rides, inside)
+        self._alone = [evaluate(self._acting(part), part.engine) for part in self.parts]
+        self.rest = AffineModel(replace(motored(problem), engine=only_rotors(engine, still, inside)), keep_all=True)
         self.times = self.orders = self._kept()
         self.numbers = np.array([float(order) for order in self.orders])
         self._turning = [as_order(abs(rotor.shaft.ratio)) for rotor in still]
         self.base = common_base([order for order in (*self.orders, *self._turning, Fraction(1)) if order])
         self.rest.base = self.base
+
+    def _acting(self, part: Moving) -> Problem:
+        """What acts on a part alone."""
+        if part.cylinder is None:
+            return motored(self.problem)
+        return working(self.problem, self.problem.engine.slider_cranks[part.cylinder].name)
+
+    @property
+    def followed(self) -> float:
+        """Of the heaviest order, that one is followed along an arc; others count as their size, more so in peaks."""
+        return self._followed[any(map(self._is_bent_peak, self.problem.measures))]
+
+    def _is_bent_peak(self, measure: Measure) -> bool:
+        return averages(self.problem, measure) and not measure.norm.averages
 
     @property
     def _loads(self) -> list[Measure]:
@@ -112,7 +144,7 @@ class ThrowWaves:
         found, engine = self._alone[k], self.problem.engine
         shares = measure.shares(self.problem.points)
         return [
-            selected(measure, signal.series, engine)
+            selected(measure, signal, engine)
             for signal, share in zip(found.signals(measure.load), shares, strict=True)
             if share > 0.0
         ]
@@ -130,31 +162,39 @@ class ThrowWaves:
                     squares[order] = squares.get(order, 0.0) + float(sizes[j])
             ordered = sorted(squares)
             tail = np.cumsum([squares[order] for order in ordered[::-1]])[::-1]
-            shares = [_NOTHING if k < _FEW else self.share_left_out for k in range(len(ordered))]
+            few, many = self.share_left_out
+            many = many if measure.is_inside and not self._is_bent_peak(measure) else few
+            shares = [_NOTHING if k < _FEW else few if k < _MANY else many for k in range(len(ordered))]
             told = zip(ordered, tail, shares, strict=True)
             kept |= {order for order, rest, share in told if rest > share**2 * tail[0]}
         return tuple(sorted(kept))
 
-    def left_out(self, measure: Measure) -> float:
+    def left_out(self, measure: Measure, samples: int) -> float:
         """What the orders that are left out amount to at most, wherever the throws stand."""
-        return sum(self._left_out(measure, k) for k in range(len(self.parts))) if measure.is_load else 0.0
+        return sum(self._left_out(measure, k, samples) for k in range(len(self.parts))) if measure.is_load else 0.0
 
-    def _left_out(self, measure: Measure, k: int) -> float:
+    def _left_out(self, measure: Measure, k: int, samples: int) -> float:
         """Of one part."""
         total, kept = 0.0, np.array([float(order) for order in self.times])
         for signal in self._signals(measure, k):
-            sizes = np.linalg.norm(signal.coefficients[~orders_equal(signal.orders, kept)], axis=-1)
+            out = ~orders_equal(signal.orders, kept)
+            sizes = np.linalg.norm(signal.coefficients[out], axis=-1)
             if measure.norm.is_euclidean or measure.norm.averages:
                 # neither is more than the root mean square, at the place where that is largest
                 total = max(total, float(np.sqrt(np.square(sizes).sum(axis=0)).max(initial=0.0)))
-            else:
-                # no peak, nor any peak to peak, is more than twice the sum of the lengths
-                total = max(total, 2.0 * float(sizes.sum(axis=0).max(initial=0.0)))
+                continue
+            whole = sizes.sum(axis=0)
+            if averages(self.problem, measure):
+                whole = _averaged(signal, out, PEAK_STEPS * samples * float(self.base))
+            # no peak, nor any peak to peak, is more than twice the sum of the lengths
+            total = max(total, 2.0 * float(whole.max(initial=0.0)))
         return total
 
     def norm(self, measure: Measure, samples: int) -> WaveNorm:
         """A measure at equal steps over the period, means averaged about them so that bounds hold between (P7)."""
-        fixed = self.rest.norm(measure, samples, averaged=True)
+        fixed = self.rest.norm(
+            measure, samples, averaged=True, peaks=PEAK_STEPS if averages(self.problem, measure) else 0
+        )
         waves = np.zeros((len(self.parts), len(self.orders), *fixed.constant.shape), complex)
         for k, part in enumerate(self.parts):
             if measure.is_mass and part.cylinder is None:
@@ -163,7 +203,7 @@ class ThrowWaves:
             if not measure.is_load:
                 continue
             waves[k] = self._waves(measure, self._alone[k].signals(measure.load), samples) * self._turned(part)
-        return WaveNorm(fixed, waves, self.left_out(measure))
+        return WaveNorm(fixed, waves, self.left_out(measure, samples))
 
     def _weights(self, measure: Measure, part: Moving) -> NDArray[np.complex128]:
         """Rows of the masses that ride on a throw, which turn with it."""
@@ -197,7 +237,7 @@ class ThrowWaves:
                     coefficients = np.zeros((j + 1, *values.shape[1:]), complex)
                     coefficients[j] = turn * values[h]
                     one = Spectrum(self.base, coefficients)
-                    alone.append(one.averaged(one.period / samples) if measure.norm.averages else one)
+                    alone.append(averaged(self.problem, measure, one, samples))
                 engine = self.problem.engine
                 rows.append(load_rows(measure, self.problem.points, alone, engine, samples, nowhere).vectors)
             found.append(rows[0] + 1j * rows[1])
@@ -214,15 +254,26 @@ class ThrowWaves:
         return 2 * int(highest / self.base) + 2 if measure.norm.is_euclidean else wanted
 
 
-def _moving(engine: Engine, layout: Layout, rides: dict[str, int]) -> list[Moving]:
-    """Every cylinder, and what rides on every throw."""
+def _averaged(signal: Spectrum, out: Mask, steps: float) -> Array:
+    """What averages, about so many angles a turn, have at most of some orders and of those beyond all listed."""
+    sizes = np.linalg.norm(signal.coefficients[out], axis=-1)
+    whole = np.sinc(signal.orders[out] / steps) ** 2 @ sizes
+    if signal.corners is None:
+        return np.asarray(whole)
+    count, base = len(signal.coefficients), float(signal.base)
+    further = signal.corners.beyond_averaged(count, base, steps / base)
+    return np.asarray(whole + np.linalg.norm(further, axis=-1))
+
+
+def _moving(engine: Engine, layout: Layout, rides: dict[str, int], inside: bool) -> list[Moving]:
+    """Every cylinder, and what rides on every throw; for loads inside the crankcase with the places of the others."""
     out, angles, late = [], {}, lateness(layout)
     for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
         angles[pin] = part.throw - layout.pin_offsets[k]
         lap = round((part.firing_angle + late[k] + angles[pin]) / math.tau)
-        out.append(Moving(pin, k, replace(engine, slider_cranks=(part,), rotors=()), angles[pin], lap))
+        out.append(Moving(pin, k, lone(engine, k, inside), angles[pin], lap))
     for pin in sorted(set(rides.values())):
         riding = tuple(rotor for rotor in engine.rotors if rides.get(rotor.name) == pin and rotor.unbalance)
         if riding:
-            out.append(Moving(pin, None, replace(engine, slider_cranks=(), rotors=riding), angles[pin], 0))
+            out.append(Moving(pin, None, only_rotors(engine, riding, inside), angles[pin], 0))
     return out

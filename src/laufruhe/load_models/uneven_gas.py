@@ -58,7 +58,7 @@ class GasMoments:
             series = self._series(gas, k)
             if gain is not None:
                 series = _felt(series, gain, self._left_out)
-            found.append(turned(series.orders, series.coefficients, star - math.tau * _turns(part)))
+            found.append(turned(series.orders, series.coefficients, star - math.tau * turns_of(part)))
         return found
 
     def _series(self, gas: GasModel, k: int) -> Spectrum:
@@ -78,6 +78,6 @@ def _felt(series: Spectrum, gain: Callable[[float], float], left_out: float) -> 
     return Spectrum(series.base, series.coefficients[: max(int((tail > left_out * tail[0]).sum()), 1)])
 
 
-def _turns(part: SliderCrank) -> int:
+def turns_of(part: SliderCrank) -> int:
     """Turns from the dead centre at -(theta + o - beta) to the one that fires."""
     return round((part.firing_angle + part.throw - part.bank) / math.tau)

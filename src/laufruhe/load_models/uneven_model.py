@@ -8,6 +8,7 @@ number from the exact model.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -20,7 +21,8 @@ from numpy.typing import NDArray
 from laufruhe.load_models.lines import Lines, summed, turned
 from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
 from laufruhe.load_models.mount_symbols import waves
-from laufruhe.load_models.uneven_gas import LEFT_OUT, GasMoments
+from laufruhe.load_models.turned_loads import TurnedLoads
+from laufruhe.load_models.uneven_gas import LEFT_OUT, GasMoments, turns_of
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
@@ -38,6 +40,8 @@ from laufruhe.problem.problem import Phasing, Problem
 
 LEAST_SAMPLES = 72
 NEGLIGIBLE = 1e-9
+INSIDE_LEFT_OUT = 1e-2
+"""Share of a load inside the crankcase, that orders left out of the smooth program may hold together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,12 +124,22 @@ class UnevenModel:
         return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps, points=len(chosen))
 
     def _signal(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
-        """What a channel has of each mount, or of the block."""
+        """What a channel has of each mount, of the block, or of each place inside the crankcase."""
+        if quantity.is_inside:
+            return self._inside(quantity, point, at)
         counted = self._counted(quantity, point, at)
         if isinstance(quantity.channel, LoadChannel) and quantity.channel.part is not None:
             return [counted.mapped(np.eye(6)[quantity.channel.part])]
         by_order = [self._maps(quantity, float(h), point) for h in counted.orders]
         return [counted.mapped_each([maps[m] for maps in by_order]) for m in range(len(by_order[0]))]
+
+    def _inside(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
+        """Of places inside the crankcase (S37)."""
+        parts, banks = self.problem.engine.slider_cranks, isinstance(at.bank, ca.MX)
+        turned = TurnedLoads(self.problem, quantity, self.problem.points.index(point), banks, INSIDE_LEFT_OUT)
+        placed = [self._place(k, part, at) for k, part in enumerate(parts)]
+        stars = [a - b - math.tau * turns_of(part) for (a, b), part in zip(placed, parts, strict=True)]
+        return turned.lines(stars, [bank for _, bank in placed], lambda rotor: self._unbalance(rotor, at))
 
     def _counted(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> Lines:
         """Wrench of the orders that count."""

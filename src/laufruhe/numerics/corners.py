@@ -107,6 +107,14 @@ class Corners:
             power = power + unit / math.sqrt((4 * m + 2) * last ** (2 * m + 1))
         return total, power
 
+    def beyond_averaged(self, count: int, base: float, steps: float) -> Array:
+        """What averages about so many angles in a period (P7) have at most of all orders from `count` b on."""
+        total, last = np.zeros(self.jumps.shape[2:]), max(count - 1, 0.5)
+        for m, jumps in enumerate(np.abs(self.jumps).sum(axis=0)):
+            # sinc^2 leaves of order j no more than (steps / (pi j))^2
+            total = total + jumps / (math.pi * base**m) * (steps / math.pi) ** 2 / ((m + 2) * last ** (m + 2))
+        return np.minimum(total, self.beyond(count, base)[0])
+
     def curvature(self, period: float) -> Array:
         """The second derivative over one period, on both sides of every corner and at steps between, shape (n, ...)."""
         steps = period * np.arange(_STEPS) / _STEPS

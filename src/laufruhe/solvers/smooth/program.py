@@ -141,8 +141,13 @@ class SmoothProgram:
             objective_scale=self.unit,
             parameters=self._e,
             stages=tuple((share,) for share in (*SOFTNESS, self._softest)),
-            expand=True,
+            expand=not self._is_wide,
         )
+
+    @property
+    def _is_wide(self) -> bool:
+        """Whether thousands of rows are waves of a few angles: whole arrays have their second derivatives sooner."""
+        return self.moves is not None and any(measure.is_inside for measure in self.problem.measures)
 
     def _bounds(self) -> tuple[Array, Array]:
         low = self._inner([d.lower for d in self._decisions]).tolist()

@@ -20,7 +20,7 @@ from laufruhe.problem.sets import Sector
 from laufruhe.solvers.stars.design import StarDesign
 from laufruhe.solvers.throws.boxes import ThrowPrograms
 from laufruhe.solvers.throws.riders import Riders
-from laufruhe.solvers.throws.search import Improve, Searched, ThrowSearch, found_by, knows
+from laufruhe.solvers.throws.search import Improve, Programs, Searched, ThrowSearch, found_by, knows, loss_of
 from laufruhe.solvers.throws.windows import firing_of
 
 
@@ -52,7 +52,7 @@ def search_angle(
     improve
         Told of angles that look good.
     """
-    own = _open_angle(problem, phasing)
+    own = _open_angle(phasing)
     if own is None or not knows(problem):
         return None
     windows = list(_windows(phasing, own))
@@ -65,14 +65,14 @@ def search_angle(
     return found_by(search, problem, best, floor, "boxes of angles")
 
 
-def _open_angle(problem: Problem, phasing: Phasing) -> _Open | None:
+def _open_angle(phasing: Phasing) -> _Open | None:
     """The one angle that is open of a crank with one throw, where all else turns with it."""
     if phasing.bank is None or phasing.throws is not None or phasing.throw_bounds is not None:
         return None
     split = phasing.split or (0.0, 0.0)
     is_open = phasing.bank[0] < phasing.bank[1], split[0] < split[1]
     layout = phasing.layout(*phasing.least_geometry)
-    if is_open[0] == is_open[1] or len(layout.throw_positions) != 1 or any(m.is_inside for m in problem.measures):
+    if is_open[0] == is_open[1] or len(layout.throw_positions) != 1:
         return None
     if phasing.shafts.optional or not _turns_freely(phasing):
         return None
@@ -126,23 +126,20 @@ def _windows(phasing: Phasing, own: _Open) -> Iterator[FiringWindow]:
 class _AngleSearch(ThrowSearch):
     """Boxes of the angle, for every whole turn by which cylinder 2 fires later."""
 
-    def _programs(
-        self, windows: Sequence[FiringWindow], _left_out: tuple[str, ...]
-    ) -> Iterator[tuple[partial[ThrowPrograms], float, Sequence[FiringWindow]]]:
-        own = _open_angle(self._problem, self._phasing)
+    def _programs(self, windows: Sequence[FiringWindow], _left_out: tuple[str, ...]) -> Iterator[Programs]:
+        own = _open_angle(self._phasing)
         assert own is not None
         for window in windows:
             candidate = self.candidate(window, 0.5 * (window.box[0] + window.box[1]))
             problem = replace(self._phasing.realise(candidate), phasing=None)
-            riders = Riders(self.known(problem), {}, candidate.throws)
+            riders = Riders(problem, {}, candidate.throws)
             waves = AngleWaves(riders.problem, self._phasing.layout_of(candidate), window.laps, own.of_bank)
-            loss = sum(term.weight * waves.left_out(term.measure) for term in problem.objective)
             # all laps are in the waves
-            yield partial(ThrowPrograms, waves, riders, firing_of(self._phasing)), loss, [window]
+            yield partial(ThrowPrograms, waves, riders, firing_of(self._phasing)), loss_of(waves, problem), [window]
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
         """A design at half of this angle, cylinder 1 at its dead centre when phi = 0."""
-        own = _open_angle(self._problem, self._phasing)
+        own = _open_angle(self._phasing)
         assert own is not None
         geometry = own.geometry(float(np.clip(2.0 * throws[0], own.lower, own.upper)))
         layout = self._phasing.layout(*geometry)

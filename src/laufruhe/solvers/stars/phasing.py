@@ -55,9 +55,6 @@ def solve_phasing(problem: Problem) -> Result:
     phasing = problem.phasing
     if phasing is None:
         raise SolverError("nothing of the phasing is open")
-    if phasing.continuous and any(measure.is_inside for measure in problem.measures):
-        rule = "loads inside the crankcase are decided with even firing or with throws that are given"
-        raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out")
     wheel = of_wheel(problem)
     if phasing.continuous and wheel:
         rule = f"{wheel[0].name} is decided with even firing or with throws that are given"
@@ -81,7 +78,10 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
     if problem.feels_order and is_even and phasing.shares_throws:
         pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
         stars = [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]
-        return _by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
+        result = _by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
+        if not phasing.continuous:
+            return result
+        return _uneven(problem, phasing, None if result.objective is None else result)
     families = families_of(phasing, problem.feels_order)[0] if is_even else ()
     if not families and not phasing.continuous:
         return no_star(problem, none_fires(phasing)[0])

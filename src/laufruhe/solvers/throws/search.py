@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.throw_waves import ThrowWaves
+from laufruhe.load_models.throw_waves import ThrowWaves, averaged, averages
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.machine.firing_windows import FiringWindow
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import over
-from laufruhe.problem.measure import Measure, load_rows
+from laufruhe.problem.measure import load_rows
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
@@ -24,6 +24,9 @@ from laufruhe.solvers.stars.ranking import ranked_orders
 from laufruhe.solvers.throws.boxes import ThrowBox, ThrowPrograms
 from laufruhe.solvers.throws.riders import Riders
 from laufruhe.solvers.throws.windows import amid, firing_of, nearest, windows_of
+
+Programs = tuple[Callable[[int], ThrowPrograms], Callable[[int], float], Sequence[FiringWindow]]
+"""Programs at so many steps over the period, what their orders leave out of the objective, their windows."""
 
 Improve = Callable[[Candidate], StarDesign | None]
 """The best design near a candidate, and only the allowed one."""
@@ -90,7 +93,7 @@ class _Stage:
     make
         Programs.
     lost
-        Of the best design, that means lose by steps (P7).
+        Of the best design, that means and peaks lose by steps (P7).
     value
         Of the best design.
     left_out
@@ -99,7 +102,7 @@ class _Stage:
 
     def __init__(
         self, make: Callable[[int], ThrowPrograms], samples: int, lost: Callable[[int], float], value: float,
-        left_out: float,
+        left_out: Callable[[int], float],
     ) -> None:  # fmt: skip
         self._make, self._samples, self._lost, self._value, self._left_out = make, samples, lost, value, left_out
 
@@ -111,14 +114,16 @@ class _Stage:
     @cached_property
     def cost(self) -> float:
         """Share of the best design that no bound gets back."""
-        return (self._lost(self._samples) + self._left_out) / self._value
+        return (self._lost(self._samples) + self._left_out(self._samples)) / self._value
 
     @cached_property
     def next(self) -> _Stage | None:
         """With twice as many; None where these are enough."""
         if self._lost(self._samples) <= STEPS_COST * self._value or 2 * self._samples > MOST_SAMPLES:
             return None
-        return _Stage(self._make, 2 * self._samples, self._lost, self._value, self._left_out)
+        found = _Stage(self._make, 2 * self._samples, self._lost, self._value, self._left_out)
+        # short averages know less of a pressure that jumps
+        return found if found.cost < self.cost else None
 
     @cached_property
     def finer(self) -> _Stage | None:
@@ -177,6 +182,11 @@ def search_throws(
     return found_by(search, problem, best, floor, "boxes of throws")
 
 
+def loss_of(waves: ThrowWaves, problem: Problem) -> Callable[[int], float]:
+    """What orders that are left out take off the objective, at so many steps."""
+    return lambda samples: sum(term.weight * waves.left_out(term.measure, samples) for term in problem.objective)
+
+
 def found_by(
     search: ThrowSearch, problem: Problem, best: StarDesign | None, floor: float, what: str
 ) -> Searched | None:  # fmt: skip
@@ -207,12 +217,7 @@ def knows(problem: Problem) -> bool:
     """Whether waves know what is asked."""
     if problem.feels_gas and any(r.shaft.ratio != round(r.shaft.ratio) for r in problem.engine.rotors):
         return False
-    return bool(problem.objective) and all(_is_known(problem, term.measure) for term in problem.objective)
-
-
-def _is_known(problem: Problem, measure: Measure) -> bool:
-    """Whether its orders are all there is of it: a peak of the gas has more."""
-    return not (problem.feels_gas and measure.feels_gas and measure.norm.refinement > 1)
+    return bool(problem.objective)
 
 
 class ThrowSearch:
@@ -253,16 +258,16 @@ class ThrowSearch:
         problem, found = best.result.problem, best.result.final
         lost = 0.0
         for term in problem.objective:
-            if term.measure.is_load and term.measure.norm.averages:
+            if averages(problem, term.measure):
                 signals = over(problem.engine.cycle.base_order, found.signals(term.measure.load))
-                averaged = [signal.averaged(signal.period / samples) for signal in signals]
-                rows = load_rows(term.measure, problem.points, averaged, found.engine, 4 * samples)
+                short = [averaged(problem, term.measure, signal, samples) for signal in signals]
+                # of a mean the rows between are as good, of a peak they are not there
+                steps = 4 * samples if term.measure.norm.averages else samples
+                rows = load_rows(term.measure, problem.points, short, found.engine, steps)
                 lost += term.weight * max(found.value(term.measure) - rows.value, 0.0)
         return lost
 
-    def _programs(
-        self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]
-    ) -> Iterator[tuple[Callable[[int], ThrowPrograms], float, Sequence[FiringWindow]]]:
+    def _programs(self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]) -> Iterator[Programs]:
         """Programs at so many steps over the period, what their orders leave out of the objective, their windows."""
         phasing, layout = self._phasing, self._phasing.layout(*self._phasing.least_geometry)
         for k, window in enumerate(windows):
@@ -275,18 +280,11 @@ class ThrowSearch:
                     continue
                 raise
             rides = rides_of(phasing, candidate)
-            riders = Riders(self.known(realised), rides, candidate.throws)
+            riders = Riders(realised, rides, candidate.throws)
             waves = ThrowWaves(riders.problem, layout, rides)
-            loss = sum(term.weight * waves.left_out(term.measure) for term in realised.objective)
-            yield partial(ThrowPrograms, waves, riders, firing_of(phasing)), loss, windows
+            yield partial(ThrowPrograms, waves, riders, firing_of(phasing)), loss_of(waves, realised), windows
             return
         raise ModelError("no crank fires")
-
-    @staticmethod
-    def known(problem: Problem) -> Problem:
-        """With the limits that waves know."""
-        limits = tuple(limit for limit in problem.load_limits if _is_known(problem, limit.measure))
-        return replace(problem, limits=limits)
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
         """A design with these throws, and with a firing order that they keep."""

@@ -1,0 +1,51 @@
+"""Parts of an engine that load by themselves: one cylinder, or some rotors, the other cylinders idle in their places.
+
+What an idle cylinder leaves in place are its pin and its bearings: loads inside the crankcase have places of every
+cylinder, and one cylinder may load those of another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from laufruhe.machine import Chambers, Engine, OperatingPoint, Rotor, SliderCrank
+from laufruhe.problem.problem import Problem
+
+
+def idle(part: SliderCrank) -> SliderCrank:
+    """A cylinder without mass, and without an area that a charge could press."""
+    return replace(part.only({}), bore=None if part.bore is None else 0.0)
+
+
+def lone(engine: Engine, k: int, beside: bool, part: SliderCrank | None = None) -> Engine:
+    """Cylinder k alone, or another in its place; the places of the others beside it where these are asked."""
+    parts = engine.slider_cranks
+    own = parts[k] if part is None else part
+    every = [own if j == k else idle(other) for j, other in enumerate(parts)]
+    return replace(engine, slider_cranks=tuple(every) if beside else (own,), rotors=())
+
+
+def only_rotors(engine: Engine, rotors: Sequence[Rotor], beside: bool) -> Engine:
+    """These rotors alone; the places of the cylinders beside them where these are asked."""
+    parts = tuple(map(idle, engine.slider_cranks)) if beside else ()
+    return replace(engine, slider_cranks=parts, rotors=tuple(rotors))
+
+
+def working(problem: Problem, name: str) -> Problem:
+    """The problem with the gas of one cylinder alone."""
+    return replace(problem, points=tuple(_working(point, name) for point in problem.points))
+
+
+def motored(problem: Problem) -> Problem:
+    """The problem without gas."""
+    return replace(problem, fidelity=replace(problem.fidelity, gas=False, gas_orders=None))
+
+
+def _working(point: OperatingPoint, name: str) -> OperatingPoint:
+    gas = point.gas
+    if not isinstance(gas, Chambers):
+        # idle cylinders have no bore
+        return point
+    own = tuple(replace(one, cylinders=(name,)) for one in gas.chambers if name in one.cylinders)
+    return replace(point, gas=replace(gas, chambers=own) if own else None)
