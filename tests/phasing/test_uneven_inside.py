@@ -78,6 +78,7 @@ SCENES = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Throws, bank, split pin and weight drawn at random; every order kept."""
@@ -104,6 +105,7 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
         assert value == pytest.approx(exact.value(measure), rel=2e-4), load
 
 
+@pytest.mark.slow
 def test_waves_of_throws_are_those_of_the_exact_model() -> None:
     """In any firing window, at any throws: one cylinder may load the places of another."""
     rng = np.random.default_rng(3)

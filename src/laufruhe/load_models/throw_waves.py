@@ -102,8 +102,8 @@ class ThrowWaves:
     """
 
     share_left_out: ClassVar[tuple[float, float]] = 1e-4, 1e-3
-    """Of the moving parts' root mean square, that the orders left out may hold, of the first few next to nothing; bounds are
-    lowered by it. Of many orders more: inside the crankcase a pressure that jumps has no end of them."""
+    """Of the moving parts' root mean square, that orders left out may hold, of the first few next to nothing; bounds
+    are lowered by it. Of many orders more: inside the crankcase a pressure that jumps has no end of them."""
     _followed: ClassVar[tuple[float, float]] = 1e-4, 3e-5
 
     def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
