@@ -244,13 +244,7 @@ class AffineModel:
         return [(bare, tuple(map(channel.signal, by))) for bare, by in zip(own, self._slopes, strict=True)]
 
     def norm(self, measure: Measure, samples: int, averaged: bool = False, peaks: int = 0) -> AffineNorm:
-        """A measure at `samples` steps over the common period, a mean averaged about them if asked.
-
-        Parameters
-        ----------
-        peaks
-            Parts of a step about which a peak is averaged beside means; zero where it is not.
-        """
+        """A measure at `samples` steps over the common period, a mean averaged about them, peaks in parts of these."""
         channel, known = measure.channel, self.problem.known_rows.get(measure)
         if known is not None:
             grid = Grid(np.ones(len(known.constant)), len(known.constant))
