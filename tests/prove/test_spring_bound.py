@@ -25,7 +25,8 @@ from laufruhe.prove.springs.lines import Felt
 from laufruhe.prove.springs.mirrored import mirrored_halves, mirrored_parts
 from laufruhe.prove.springs.open_mounts import OpenMounts, open_mounts
 from laufruhe.prove.springs.program import proposed
-from laufruhe.prove.springs.search import SpringBoxes, spring_bound
+from laufruhe.prove.springs.proof import spring_bound
+from laufruhe.prove.springs.search import SpringBoxes
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from prove.test_subdivision import DAMPED, asked_for

@@ -20,6 +20,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.springs.conditions import Held
+from laufruhe.prove.springs.modes import Shapes
 
 # shifts that make a matrix convex, in parts of its largest eigenvalue
 _SHIFTS = np.concatenate([[0.0], 10.0 ** np.arange(-14.0, 0.1, 0.25)])
@@ -116,6 +117,10 @@ class Program:
         Of the heads.
     roots
         Of the heads, where these are what is minimised, in place of their prices.
+    tops
+        What heads without a price are not over; none where all have prices.
+    aim
+        What is minimised beside the heads: of every s, and of the w of every mode.
     sets
         Matrices C with <C, (1, u)(1, u)'> not over zero for unbalances allowed, shape (1 + columns, 1 + columns).
     """
@@ -130,6 +135,15 @@ class Program:
     budgets: Sequence[Budget] = ()
     sets: Sequence[Array] = ()
     roots: Sequence[Root] = ()
+    shapes: Sequence[Shapes] = ()
+    tops: Array | None = None
+    aim: Array | None = None
+
+    @property
+    def aims(self) -> tuple[Array, list[Array]]:
+        """Of s, and of the w of every mode."""
+        whole = np.zeros(self.numbers + 5 * len(self.shapes)) if self.aim is None else self.aim
+        return whole[: self.numbers], list(whole[self.numbers :].reshape(-1, 5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,21 +160,36 @@ class Multipliers:
     links: Sequence[Array]
     lines: Array
     lengths: Sequence[Sequence[Array]]
+    shapes: Sequence[Priced] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Priced:
+    """Multipliers of a mode: of its matrices, sides, equations, corners of Z_j that are s_j, Z + Z_j and Z - Z_j."""
+
+    matrices: Sequence[Array]
+    sides: Array
+    equal: Array
+    corners: Array
+    shares: Sequence[tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
 class Proposed:
-    """What a solver says: multipliers, s, the moments of every order, and what it takes the least value for."""
+    """What a solver says: multipliers, s, the moments of orders and of modes, and what it takes the least value for."""
 
     multipliers: Multipliers
     middle: Array
     moments: Sequence[Array]
     least: float
+    shapes: Sequence[Array] = ()
 
 
 def follows(program: Program, found: Multipliers) -> float:
     """What multipliers prove: the least value of the heads less all that they price (E44)."""
     left, slopes, bound = [np.zeros((d, d)) for d in program.sizes], np.zeros(program.numbers), 0.0
+    aim, aims = program.aims
+    slopes += aim
     prices = np.array(program.prices, dtype=float)
     for number, (root, line, along) in enumerate(zip(program.roots, found.lines, found.lengths, strict=True)):
         share, taken = _of_root(root, float(line), along)
@@ -170,7 +199,9 @@ def follows(program: Program, found: Multipliers) -> float:
             first = 0.5 * np.einsum("na,nad->d", vectors, rows)
             left[order][0] += first
             left[order][:, 0] += first
-    for cap, price in zip(program.caps, _shared(prices, program.caps, found.caps), strict=True):
+    for cap, price in zip(program.caps, _shared(program, prices, found.caps), strict=True):
+        if program.tops is not None and math.isfinite(program.tops[cap.head]):
+            bound -= cap.share(price) * float(program.tops[cap.head])
         for order, rows in cap.rows:
             left[order] += np.einsum("pad,ab,pbe->de", rows, price, rows, optimize=True)
     for limit, multiplier in zip(program.held, found.held, strict=True):
@@ -189,6 +220,9 @@ def follows(program: Program, found: Multipliers) -> float:
         both = 0.5 * (link + link.T)
         left[order][corner, corner] += both
         left[0][corner, corner] -= both
+    for shapes, priced, own in zip(program.shapes, found.shapes, aims, strict=True):
+        bound += _of_shapes(shapes, priced, own)
+        slopes -= priced.corners
     least = sum(_least(matrix, reach) for matrix, reach in zip(left, program.reaches, strict=True))
     return bound - float(np.abs(slopes).sum()) + least
 
@@ -203,13 +237,53 @@ def _of_root(root: Root, line: float, along: Sequence[Array]) -> tuple[float, li
     return factor * line, [factor * each for each in along]
 
 
-def _shared(prices: Array, caps: Sequence[Cap], multipliers: Sequence[Array]) -> list[Array]:
+def _of_shapes(shapes: Shapes, found: Priced, aim: Array) -> float:
+    """Least of what multipliers leave of (1, w)(1, w)', every s_j with the worse sign (E56)."""
+    left = _left(shapes, found)
+    left[1:, 0, 0] += found.corners
+    left[0, 0, 1:] += 0.5 * aim
+    left[0, 1:, 0] += 0.5 * aim
+    for matrix, (above, under) in zip(left[1:], found.shares, strict=True):
+        # P + Q + |P - Q - L| is not under L, nor under -L
+        first, second = _positive(above), _positive(under)
+        left[0] -= first + second + _size(matrix - first + second)
+    return _shifted(left[0], 1.0)
+
+
+def _left(shapes: Shapes, found: Priced) -> Array:
+    """What conditions of a mode leave of Z, Z_1 ..."""
+    left = np.tensordot(found.equal, shapes.equal, 1) - np.tensordot(np.maximum(found.sides, 0.0), shapes.sides, 1)
+    for tensor, multiplier in zip(shapes.matrices, found.matrices, strict=True):
+        left -= np.einsum("ab,mabxy->mxy", _positive(multiplier), tensor)
+    return np.asarray(left)
+
+
+def pulls(shapes: Shapes, found: Priced, s: Array, moments: Array) -> tuple[Array, Array]:
+    """Of every s and every w, what products are not those of the means, as it is priced."""
+    left, z = _left(shapes, found), moments[0][0]
+    apart = moments[1:] - s[:, None, None] * moments[0]
+    priced = np.abs(np.einsum("jab,jab->jb", left[1:], apart))
+    plain = np.abs(np.einsum("ab,ab->b", left[0], moments[0] - np.outer(z, z)))
+    return priced.sum(axis=1), np.asarray((priced.sum(axis=0) + plain)[1:])
+
+
+def _size(matrix: Array) -> Array:
+    """Of a symmetric matrix the one with its eigenvalues' absolute values."""
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return np.asarray((vectors * np.abs(values)) @ vectors.T)
+
+
+def _shared(program: Program, prices: Array, multipliers: Sequence[Array]) -> list[Array]:
     """Multipliers of the caps that take of the price of each head what it has."""
+    caps, tops = program.caps, program.tops
     found = [_positive(multiplier) for multiplier in multipliers]
     taken = np.zeros(len(prices))
     for cap, price in zip(caps, found, strict=True):
         taken[cap.head] += cap.share(price)
     factors = np.where(taken > 0.0, prices / np.where(taken > 0.0, taken, 1.0), 0.0)
+    if tops is not None:
+        # what is limited has any price
+        factors = np.where(np.isfinite(tops), 1.0, factors)
     return [factors[cap.head] * price for cap, price in zip(caps, found, strict=True)]
 
 

@@ -110,6 +110,13 @@ class OpenMounts:
         return np.sqrt([len(own) for own in self.members])
 
     @property
+    def straight(self) -> list[int | None]:
+        """Of every s the open number that it goes through from end to end; none where it is one of a matrix."""
+        along = {j for spring in self.springs if spring.axes.shape[1] == 1 for j, _ in spring.terms}
+        along |= {place.number for place in self.places}
+        return [own[0] if j in along else None for j, own in enumerate(self.keys)]
+
+    @property
     def turns(self) -> Array:
         """Turns of the block per motion, shape (3, k)."""
         return np.asarray(self.root.T[3:])

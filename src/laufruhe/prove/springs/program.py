@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.prove.quadratics import answered, column, triangle
-from laufruhe.prove.springs.bound import Cap, Multipliers, Program, Proposed, Root
+from laufruhe.prove.springs.bound import Cap, Multipliers, Priced, Program, Proposed, Root, follows
 from laufruhe.prove.springs.conditions import Held
+from laufruhe.prove.springs.modes import Shapes
 
 # what a solver leaves of a price of one for every square, so that what its multipliers leave over is convex
 ASIDE = 3e-7
+# of what narrows a box, how far multipliers may be off
+ROUGH = 3e-3
 _SETTINGS = {
     "verbose": False,
     "equilibrate_enable": False,
-    "tol_gap_rel": 1e-5,
     "tol_gap_abs": 1e-6,
     "tol_feas": 1e-7,
     "max_threads": 1,
@@ -27,13 +30,21 @@ _SETTINGS = {
 
 def proposed(program: Program) -> Iterator[Proposed]:
     """Multipliers of all conditions, s and moments, whatever the solver says of them; first and, where asked, again."""
-    stated = _Stated(program)
+    stated = Stated(program)
     for scaled in (True, False):
-        yield stated.answer({**_SETTINGS, "equilibrate_enable": scaled})
+        yield stated.answer(program, scaled)
 
 
-class _Stated:
-    """Variables: heads, blocks of the caps, roots and their lengths, s, the moments of every order."""
+def aimed(program: Program, aims: Iterable[Array]) -> Iterator[float]:
+    """Least of every aim under the same conditions, as multipliers prove."""
+    stated = Stated(program)
+    for aim in aims:
+        own = replace(program, aim=aim)
+        yield follows(own, stated.answer(own, True, ROUGH).multipliers)
+
+
+class Stated:
+    """Variables: heads, blocks of the caps, roots and their lengths, s, moments of every order and of every mode."""
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -47,6 +58,8 @@ class _Stated:
         self.roots = np.cumsum([self.blocks[-1], *counts])
         self.first = int(self.roots[-1])
         self.ends = np.cumsum([self.first + program.numbers, *map(_entries, program.sizes)])
+        sizes = [(1 + program.numbers) * _entries(6) for _ in program.shapes]
+        self.shapes = np.cumsum([int(self.ends[-1]), *sizes])
         self._whole()
         self._linked()
         self._linear()
@@ -59,13 +72,49 @@ class _Stated:
             self._held(limit)
         for number, root in enumerate(program.roots):
             self._root(number, root)
+        for number, shapes in enumerate(program.shapes):
+            self._shapes(number, shapes)
+
+    def _shapes(self, number: int, shapes: Shapes) -> None:
+        """E56: six kinds of rows."""
+        import clarabel
+
+        numbers, each = self.program.numbers, _entries(6)
+        own = np.arange(self.shapes[number], self.shapes[number + 1])
+        corners = own[::each]
+        self._add(np.ones((1, 1)), corners[:1], np.ones(1), clarabel.ZeroConeT(1))
+        both = np.concatenate([np.eye(numbers), -np.eye(numbers)], axis=1)
+        columns = np.concatenate([corners[1:], self.first + np.arange(numbers)])
+        self._add(both, columns, np.zeros(numbers), clarabel.ZeroConeT(numbers))
+        for matrices, cone in ((shapes.equal, clarabel.ZeroConeT), (shapes.sides, clarabel.NonnegativeConeT)):
+            rows = -column(matrices).reshape(len(matrices), -1)
+            self._add(rows, own, np.zeros(len(rows)), cone(len(rows)))
+        for tensor in shapes.matrices:
+            i, j, factor = triangle(tensor.shape[1])
+            rows = column(tensor[:, i, j]).transpose(1, 0, 2).reshape(len(i), -1) * factor[:, None]
+            self._add(-rows, own, np.zeros(len(i)), clarabel.PSDTriangleConeT(tensor.shape[1]))
+        first = np.arange(each)
+        for k in range(1, 1 + numbers):
+            for sign in (1.0, -1.0):
+                rows = np.concatenate([-np.eye(each), -sign * np.eye(each)], axis=1)
+                columns = np.concatenate([own[first], own[k * each + first]])
+                self._add(rows, columns, np.zeros(each), clarabel.PSDTriangleConeT(6))
+
+    def _priced(self, shapes: Shapes, parts: Sequence[Array]) -> Priced:
+        """From the multipliers of these rows."""
+        matrices = [
+            _matrix(part, tensor.shape[1])
+            for part, tensor in zip(parts[4 : 4 + len(shapes.matrices)], shapes.matrices, strict=True)
+        ]
+        both = [_matrix(part, 6) for part in parts[4 + len(shapes.matrices) :]]
+        return Priced(matrices, parts[3], -parts[2], parts[1], [*zip(both[::2], both[1::2], strict=True)])
 
     def _add(self, block: Array, columns: Indices, right: Array, cone: Any) -> None:
         """Rows with entries in these columns alone."""
         from scipy.sparse import coo_array
 
         row, place = np.nonzero(block)
-        shape = len(block), int(self.ends[-1])
+        shape = len(block), int(self.shapes[-1])
         self.rows.append(coo_array((block[row, place], (row, columns[place])), shape=shape))
         self.right.append(np.asarray(right, dtype=float))
         self.cones.append(cone)
@@ -105,6 +154,9 @@ class _Stated:
             columns = np.concatenate([self._moment(order) for order, _ in budget.matrices])
             block = np.concatenate([column(matrix) for _, matrix in budget.matrices])[None]
             self._add(block, columns, np.array([budget.most]), clarabel.NonnegativeConeT(1))
+        if program.tops is not None:
+            held = np.flatnonzero(np.isfinite(program.tops))
+            self._add(np.eye(len(held)), held, program.tops[held], clarabel.NonnegativeConeT(len(held)))
         at = 0
         for cap in program.caps:
             if cap.blocks:
@@ -183,15 +235,20 @@ class _Stated:
         block = np.concatenate([-column(limit.slopes).T.reshape(len(i), -1), own], axis=1)
         self._add(block, columns, column(limit.constant), clarabel.PSDTriangleConeT(limit.size))
 
-    def answer(self, settings: Mapping[str, Any]) -> Proposed:
-        """As multipliers and moments."""
+    def answer(self, program: Program, scaled: bool, enough: float = 1e-5) -> Proposed:
+        """As multipliers and moments of a program with the same conditions."""
         from scipy.sparse import csc_array, vstack
 
-        program, first = self.program, self.first
-        cost = np.zeros(int(self.ends[-1]))
+        first, settings = self.first, {**_SETTINGS, "equilibrate_enable": scaled, "tol_gap_rel": enough}
+        cost = np.zeros(int(self.shapes[-1]))
         cost[: len(program.prices)] = program.prices
         for at, root in zip(self.roots, program.roots, strict=False):
             cost[at] = root.price
+        aim, aims = program.aims
+        cost[first : first + program.numbers] = aim
+        for at, own in zip(self.shapes, aims, strict=False):
+            # entries (0, k) of a triangle column by column, which count by the root of two
+            cost[at + np.cumsum(np.arange(1, 6))] = own * math.sqrt(0.5)
         for order, size in enumerate(program.sizes):
             cost[self._moment(order)] = -ASIDE * _diagonal(size)
         found = answered(cost, csc_array(vstack(self.rows)), np.concatenate(self.right), self.cones, settings)
@@ -203,6 +260,11 @@ class _Stated:
         after = parts[3 + links :]
         sets, after = after[: len(program.sets)], after[len(program.sets) :]
         budgets, after = after[: len(program.budgets)], after[len(program.budgets) :]
+        shaped: list[Priced] = []
+        for shapes in reversed(program.shapes):
+            rows = 4 + len(shapes.matrices) + 2 * program.numbers
+            shaped.append(self._priced(shapes, after[len(after) - rows :]))
+            after = after[: len(after) - rows]
         counts = [2 + sum(len(rows) for _, rows in root.rows) for root in program.roots]
         starts = len(after) - sum(counts) + np.cumsum([0, *counts])
         along = [after[start : start + count] for start, count in zip(starts, counts, strict=False)]
@@ -213,9 +275,15 @@ class _Stated:
         held = [_matrix(part, limit.size) for part, limit in zip(rest, program.held, strict=True)]
         lines = _numbers([parts[0] for parts in along])
         lengths = [_lengths(root, parts[2:]) for root, parts in zip(program.roots, along, strict=True)]
-        multipliers = Multipliers(caps, held, _numbers(budgets), _numbers(sets), linked, lines, lengths)
+        multipliers = Multipliers(caps, held, _numbers(budgets), _numbers(sets), linked, lines, lengths, shaped[::-1])
         moments = [_matrix(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
-        return Proposed(multipliers, np.clip(x[first : first + program.numbers], -1.0, 1.0), moments, float(cost @ x))
+        middle = np.clip(x[first : first + program.numbers], -1.0, 1.0)
+        return Proposed(multipliers, middle, moments, float(cost @ x), [self._found(x, k) for k in range(len(shaped))])
+
+    def _found(self, x: Array, number: int) -> Array:
+        """Z, Z_1 ... of a mode."""
+        own = x[self.shapes[number] : self.shapes[number + 1]].reshape(1 + self.program.numbers, -1)
+        return np.array([_matrix(each, 6) for each in own])
 
 
 def _lengths(root: Root, parts: Sequence[Array]) -> list[Array]:

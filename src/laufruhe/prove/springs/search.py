@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -15,56 +16,27 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import NEARLY, Divided, divide
+from laufruhe.prove.best_first import NEARLY
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
-from laufruhe.prove.springs.bound import Cap, Program, Proposed, Root, follows
+from laufruhe.prove.springs.bound import Cap, Program, Proposed, Root, follows, pulls
 from laufruhe.prove.springs.columns import columns_of
 from laufruhe.prove.springs.conditions import Held, conditions
 from laufruhe.prove.springs.lines import Felt, Line, line_of, squared
 from laufruhe.prove.springs.mirrored import mirrored_parts
-from laufruhe.prove.springs.open_mounts import OpenMounts, is_lifted, open_mounts
+from laufruhe.prove.springs.modes import modes_of, shapes_of
+from laufruhe.prove.springs.open_mounts import OpenMounts, open_mounts
 from laufruhe.prove.springs.orders import Asked, Head, Order, asked, heads_of, lengths_of
 from laufruhe.prove.springs.program import proposed
 
 # what all relaxations may cost together, a number of moments squared being one, and how many they may be
 WORK, MOST_BOXES = 4e7, 100
 EFFORT = 5
+# of what is to be shown, the share that small orders may take
+NEEDED = 0.3
 # share of what a solver takes for the least that its multipliers should prove
 NEAR = 0.97
 # share of the bounds of unbalances that says what is large beside the best design
 WIDE = 0.3
-
-
-def spring_bound(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:
-    """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
-
-    Parameters
-    ----------
-    value
-        Objective of the best design known; nothing is done where none is.
-    room
-        Difference that counts as none [SI].
-    near
-        Decisions of a design near which most boxes will be.
-    """
-    if not is_bounded(problem) or not 0.0 < value < math.inf:
-        return Divided(0.0, 0)
-    try:
-        boxes = SpringBoxes(problem, value, room, near)
-        most = boxes.most_boxes
-        if not most or not boxes.is_sampled_fully:
-            return Divided(0.0, 0)
-        found = divide(boxes, boxes.lower, boxes.upper, value, room, most)
-    except np.linalg.LinAlgError:
-        # a middle on a resonance that nothing damps
-        return Divided(0.0, 0)
-    return Divided(found.bound, found.boxes, (*boxes.places, *found.places) if found.places else ())
-
-
-def is_bounded(problem: Problem) -> bool:
-    """Whether all that is minimised are forces or travel, and what is open is in the relaxation."""
-    on_mounts = any(term.measure.on_mounts for term in problem.load_terms)
-    return on_mounts and not problem.mount_terms and is_lifted(problem)
 
 
 class SpringBoxes:
@@ -83,7 +55,12 @@ class SpringBoxes:
     def __init__(self, problem: Problem, value: float, room: float, near: Sequence[Value]) -> None:
         self.problem, self.value, self.enough = problem, value, value - NEARLY * room
         decisions = problem.mount_decisions
-        self.lower, self.upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+        lower, upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+        self._parts = self.parts(lower, upper)
+        self.modes = modes_of(problem, self._parts[0])
+        whole = np.ones(5 * len(self.modes))
+        self.lower, self.upper = np.append(lower, -whole), np.append(upper, whole)
+        self.own = [slice(len(lower) + 5 * k, len(lower) + 5 * (k + 1)) for k in range(len(self.modes))]
         self.places: list[Array] = []
         self._plain = StiffnessBoxes(problem, 0.05 * room) if divides(problem) else None
         self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
@@ -95,7 +72,6 @@ class SpringBoxes:
         # loads of the block are those of all mounts, and known where no unbalance is open
         rest = [] if problem.unbalances else [t for t in problem.load_terms if not t.measure.on_mounts]
         self._constant = sum(t.weight * known.value(t.measure) for t in rest)
-        self._parts = self.parts(self.lower, self.upper)
         told = [(t.weight, asked(problem, t.measure, self._model, known, columns, self._parts)) for t in terms]
         self.columns, fewer = columns[0].seen_by([order.loads[1:] for _, each in told for order in each.orders])
         self._terms = [(weight, each.of_columns(fewer)) for weight, each in told]
@@ -104,7 +80,8 @@ class SpringBoxes:
 
     def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
         """The mounts of a box for all motions, and where they mirror each other for both halves of them (E57)."""
-        whole = open_mounts(self.problem, lower, upper)
+        count = len(self.problem.mount_decisions)
+        whole = open_mounts(self.problem, lower[:count], upper[:count])
         return (whole, *mirrored_parts(whole))
 
     @property
@@ -136,13 +113,24 @@ class SpringBoxes:
         if self._plain is None:
             known, sides = np.zeros(len(lower)), np.zeros(len(lower), dtype=np.intp)
         else:
-            known, sides = self._plain.bounds(lower, upper)
+            known, sides = self._plain.bounds(
+                *(side[:, : len(self.problem.mount_decisions)] for side in (lower, upper))
+            )
         for k in np.flatnonzero(np.isfinite(known)):
             if known[k] < self.enough:
                 bound, pull = self.relaxed(lower[k], upper[k])
                 known[k] = max(known[k], bound)
                 sides[k] = int(np.argmax(pull)) if pull.max(initial=0.0) > 0.0 else sides[k]
         return known, sides
+
+    def look(self, lower: Array, upper: Array) -> tuple[float, Array]:
+        """The better of both bounds of one box, and the pull of its sides."""
+        known = 0.0
+        if self._plain is not None:
+            count = len(self._near)
+            known = float(self._plain.bounds(lower[None, :count], upper[None, :count])[0][0])
+        bound, pull = (known, np.zeros(len(lower))) if known >= self.enough else self.relaxed(lower, upper)
+        return max(known, bound), pull
 
     def relaxed(self, lower: Array, upper: Array) -> tuple[float, Array]:
         """Bound of one box, and how far each side keeps the relaxation from a design."""
@@ -158,13 +146,34 @@ class SpringBoxes:
         # a design that is worse than the best known is above it
         return min(total, self.value), pull * (upper > lower)
 
+    def left(self, lower: Array, upper: Array) -> tuple[Program, OpenMounts]:
+        """Conditions of designs of a box of which the first term leaves that they are better than the best known."""
+        weight, each = self._terms[0]
+        box = _Box(self, each, self._room(weight), lower, upper)
+        return box.under_all(self._heads[0]), box.mounts
+
+    def under(self, value: float) -> SpringBoxes:
+        """The same for designs that are better than a value, orders left out that this hardly needs."""
+        found = copy(self)
+        found.value = found.enough = value
+        found._heads = [[replace(head, orders=self._needed(head, value)) for head in heads] for heads in self._heads]
+        found._least = [np.zeros(len(heads)) for heads in self._heads]
+        return found
+
+    def _needed(self, head: Head, value: float) -> tuple[Order, ...]:
+        """Those without which a tenth of what is to be shown is not lost."""
+        size = np.array([float(np.sum(np.abs(order.felt) ** 2)) for order in head.orders])
+        left = 1.0 - np.cumsum(size) / max(float(size.sum()), 1e-300)
+        return head.orders[: int(np.argmax(left <= NEEDED * (1.0 - value / self.value))) + 1]
+
     def _room(self, weight: float) -> float:
         """What this term of a design that is better than the best known is not over."""
         return (self.value - self._constant) / weight
 
     def line(self, mounts: OpenMounts, order: Order, felt: Felt, lower: Array, upper: Array) -> Line:
         """Of an order, about the best design where that is in the box."""
-        inside = [float(v) for v in np.clip(self._near, lower, upper)]
+        count = len(self._near)
+        inside = [float(v) for v in np.clip(self._near, lower[:count], upper[:count])]
         mounting = mounting_in(self.problem.design(inside, self.problem.mount_decisions))
         moving = order.omega > 0.0
         parts = (mounting.springs, mounting.losses * moving, mounting.dampers * order.omega)
@@ -183,6 +192,10 @@ class _Box:
         self.parts = search.parts(lower, upper)
         self.mounts = self.parts[0]
         self._stated: dict[int, tuple[Line, list[Held]]] = {}
+        self.modes = tuple(
+            shapes_of(self.mounts, mode, lower[own], upper[own])
+            for mode, own in zip(search.modes, search.own, strict=True)
+        )
 
     def least(self, heads: Sequence[Head], known: Array) -> tuple[float, Array, Array | None]:
         """What a norm is not under on the box, how far each side keeps it from being so, and where it stands.
@@ -229,12 +242,27 @@ class _Box:
         self, heads: Sequence[Head], prices: Array, ends: tuple[Array, Array] | None = None
     ) -> tuple[float, Array, Array | None]:
         """Least sum of the squares of heads at these prices, or of their roots between ends."""
+        # a solver works best where what it minimises is of size one
+        size = float(prices.sum())
+        program, lines = self._program(heads, prices / size, ends)
+        bound, found = _best(program)
+        middle = self._design(found.middle) if self.search.stiffness_alone else None
+        parts = [order.part for head in heads for order in head.orders]
+        return size * bound, self._pull(parts, lines, found), middle
+
+    def under_all(self, heads: Sequence[Head]) -> Program:
+        """What no design goes over of which none of the heads is over the whole."""
+        tops = [((self.most / head.share + head.loss) / head.unit) ** 2 for head in heads]
+        return replace(self._program(heads, np.zeros(len(heads)))[0], tops=np.array(tops))
+
+    def _program(
+        self, heads: Sequence[Head], prices: Array, ends: tuple[Array, Array] | None = None
+    ) -> tuple[Program, list[Line]]:
+        """Of these heads at these prices, and the lines of its orders."""
         caps: list[Cap] = []
         lines: list[Line] = []
         held: list[Held] = []
         roots: list[Root] = []
-        # a solver works best where what it minimises is of size one
-        size = float(prices.sum())
         for number, head in enumerate(heads):
             first, stated = len(lines), [self._line(head, order) for order in head.orders]
             lines += [line for line, _ in stated]
@@ -243,19 +271,17 @@ class _Box:
             caps += head.caps(number, self.each, lines[first:], at)
             if ends is not None:
                 own = lengths_of(head, self.each, lines[first:], at)
-                roots.append(Root(prices[number] / size, float(ends[0][number]), float(ends[1][number]), own))
+                roots.append(Root(prices[number], float(ends[0][number]), float(ends[1][number]), own))
         program = Program(
             tuple(line.size for line in lines), tuple(line.reaches for line in lines), self.mounts.numbers,
-            lines[0].columns, 0.0 * prices if roots else prices / size, caps, held, (), self.search.columns.sets, roots,
+            lines[0].columns, 0.0 * prices if roots else prices, caps, held, (), self.search.columns.sets, roots,
+            self.modes,
         )  # fmt: skip
-        bound, found = _best(program)
-        middle = self._design(found.middle) if self.search.stiffness_alone else None
-        parts = [order.part for head in heads for order in head.orders]
-        return size * bound, self._pull(parts, lines, found), middle
+        return program, lines
 
     def _design(self, s: Array) -> Array:
         """Open numbers at s, where every number is one of them."""
-        out = 0.5 * (self.lower + self.upper)
+        out = 0.5 * (self.lower + self.upper)[: len(self.search.problem.mount_decisions)]
         for j, follows_ in enumerate(self.mounts.keys):
             out[follows_[0]] += 0.5 * (self.upper - self.lower)[follows_[0]] * s[j]
         return out
@@ -273,6 +299,13 @@ class _Box:
             for place, (seen, moved) in zip(mounts.places, line.places, strict=True):
                 apart = np.split(moved - s[place.number] * seen, 2)[1]
                 self._spread(pull, [place.number], max(float(np.sum(squared(apart) * moments)), 0.0) / size)
+        for shapes, priced, own, moments in zip(
+            self.modes, found.multipliers.shapes, self.search.own, found.shapes, strict=True
+        ):
+            of_numbers, of_shapes = pulls(shapes, priced, s, moments)
+            pull[own] += of_shapes
+            for j, share in enumerate(of_numbers):
+                self._spread(pull, [j], float(share))
         return pull
 
     def _spread(self, pull: Array, numbers: Sequence[int], share: float) -> None:

@@ -13,7 +13,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.mounts.subdivision import divided_bound, divides
-from laufruhe.prove.springs.search import spring_bound
+from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT
 from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.mounts.starts import unbalances_of

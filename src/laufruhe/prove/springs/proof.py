@@ -1,0 +1,154 @@
+"""What boxes of mounts prove by the forces of their springs: halved, or narrowed first where modes count (E59)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.budget import passed
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.prove.best_first import NEARLY, Box, Divided, Halving, Parts, Waiting, divide, halves
+from laufruhe.prove.springs.open_mounts import is_lifted
+from laufruhe.prove.springs.program import aimed
+from laufruhe.prove.springs.search import SpringBoxes
+
+# shares of the value that are shown one after the other to be out of reach
+LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
+# relaxations where none are asked for, and how many times those that were needed so far have to be left for a level
+MOST_RELAXED, AHEAD = 100, 3
+# of the largest, pulls of sides that are not narrowed; of what is to be shown, what a round of these has to bring
+LITTLE, PROGRESS = 0.1, 0.1
+
+
+def spring_bound(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:
+    """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
+
+    Parameters
+    ----------
+    value
+        Objective of the best design known; nothing is done where none is.
+    room
+        Difference that counts as none [SI].
+    near
+        Decisions of a design near which most boxes will be.
+    """
+    if not is_bounded(problem) or not 0.0 < value < math.inf:
+        return Divided(0.0, 0)
+    try:
+        boxes = SpringBoxes(problem, value, room, near)
+        most = boxes.most_boxes
+        if not most or not boxes.is_sampled_fully:
+            return Divided(0.0, 0)
+        if boxes.modes:
+            return _by_levels(boxes, room)
+        found = divide(boxes, boxes.lower, boxes.upper, value, room, most)
+    except np.linalg.LinAlgError:
+        # a middle on a resonance that nothing damps
+        return Divided(0.0, 0)
+    return Divided(found.bound, found.boxes, (*boxes.places, *found.places) if found.places else ())
+
+
+def is_bounded(problem: Problem) -> bool:
+    """Whether all that is minimised are forces or travel, and what is open is in the relaxation."""
+    on_mounts = any(term.measure.on_mounts for term in problem.load_terms)
+    return on_mounts and not problem.mount_terms and is_lifted(problem)
+
+
+def _by_levels(boxes: SpringBoxes, room: float) -> Divided:
+    """Show that no design is under a value, and then under one that is nearer to that of the best (E59)."""
+    asked_for = boxes.problem.search.boxes
+    most = MOST_RELAXED if asked_for is None else asked_for
+    bound, spent, places = boxes.look(boxes.lower, boxes.upper)[0], 1, tuple[Array, ...]()
+    for share in LEVELS:
+        shown = boxes.value - max(share * boxes.value, NEARLY * room)
+        if shown <= bound:
+            continue
+        if AHEAD * spent > most or passed():
+            break
+        narrowing = _Narrowing(boxes.under(shown), most - spent)
+        found = narrowing.run(narrowing.looked_at(boxes.lower, boxes.upper), most - spent)
+        spent += narrowing.spent
+        bound = max(bound, found.bound)
+        if found.bound < shown:
+            places = found.places
+            break
+    count = len(boxes.problem.mount_decisions)
+    left = bound < boxes.enough
+    return Divided(bound, spent, tuple(place[:count] for place in (*boxes.places, *places)) if left else ())
+
+
+class _Narrowing(Halving):
+    """Boxes that are narrowed before they are halved.
+
+    Attributes
+    ----------
+    spent
+        Relaxations that were solved.
+    """
+
+    what = "boxes of mounts and modes, by spring forces"
+
+    def __init__(self, search: SpringBoxes, most: int) -> None:
+        super().__init__(search.value, 0.0)
+        self._search, self._most, self.spent = search, most, 0
+
+    def looked_at(self, lower: Array, upper: Array) -> tuple[float, Box] | None:
+        """A box as small as it becomes, and its bound; None where it holds no better design."""
+        before = best = -math.inf
+        while True:
+            bound, pull = self._search.look(lower, upper)
+            self.spent += 1
+            before, best = best, max(best, bound)
+            if best >= self.enough:
+                return None
+            over = self.spent >= self._most or passed()
+            if over or not pull.any() or best - before < PROGRESS * (self.enough - before):
+                return best, Box(lower, upper, int(np.argmax(pull)))
+            found, solved = narrowed(self._search, lower, upper, pull)
+            self.spent += solved
+            if found is None:
+                return None
+            lower, upper = found
+
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
+        """Halves, each looked at by itself."""
+        return [self.looked_at(*half) for box in boxes for half in halves(box)]
+
+    def parts(self, taken: Sequence[Waiting[Box]]) -> Parts[Box]:
+        """Halves; what counts are the relaxations."""
+        found = [*super().parts(taken)]
+        self.seen = self.spent
+        return found
+
+
+def narrowed(boxes: SpringBoxes, lower: Array, upper: Array, pull: Array) -> tuple[tuple[Array, Array] | None, int]:
+    """A box without what the relaxation shows to hold no better design, none where that is all of it (E59).
+
+    Of every side the least and the largest number that leave room for one, as multipliers prove them. Sides that hardly
+    keep the relaxation from a design stay as they are.
+
+    Returns
+    -------
+    The box, and how many relaxations that took.
+    """
+    program, mounts = boxes.left(lower, upper)
+    numbers, count = program.numbers, len(boxes.problem.mount_decisions)
+    least, most = lower.copy(), upper.copy()
+    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    # numbers of shapes are not counted from the middle of a box
+    middle[count:], half[count:] = 0.0, 1.0
+    sides = [(j, side) for j, side in enumerate(mounts.straight) if side is not None]
+    sides += [(numbers + k, count + k) for k in range(len(lower) - count)]
+    sides = [(number, side) for number, side in sides if pull[side] > LITTLE * pull.max()]
+    whole = np.eye(numbers + len(lower) - count)
+    found = aimed(program, (sign * whole[number] for number, _ in sides for sign in (1.0, -1.0)))
+    for solved, (_, side) in enumerate(sides, 1):
+        least[side] = max(least[side], middle[side] + half[side] * next(found))
+        most[side] = min(most[side], middle[side] - half[side] * next(found))
+        if least[side] > most[side]:
+            return None, 2 * solved
+    return (least, most), 2 * len(sides)
