@@ -27,11 +27,10 @@ OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 UNFELT = frozenset({Kind.FLYWHEEL, Kind.TORSION})
 """At an even speed no load on block or bearings feels the flywheel, nor how the crankshaft twists."""
 ON_BLOCK = ("operating_points", "orders")
-AT_SECTIONS = (*ON_BLOCK, "sections")
+AT_SECTIONS, AT_WEBS = ((*ON_BLOCK, at) for at in ("sections", "webs"))
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
     (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
 )
-AT_WEBS = (*ON_BLOCK, "webs")
 OF_SHAFTS = frozenset({"cylinders", "webs", "sections"})
 """Keys of places that belong to one shaft."""
 OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
@@ -103,8 +102,8 @@ class Channel:
         Whether the torque of the crank is in it, which other decisions than the flywheel move too.
     of_engine
         The value as a function of an engine, if it is of its sizes alone and goes one way with each of them.
-    of_constant_stiffness
-        Whether it has no meaning where stiffness depends on frequency.
+    of_constant_stiffness, of_shares
+        Whether it has no meaning where stiffness depends on frequency, and is of the shares of motions in modes.
     of_cases
         Of a block under a held load what it is the largest length of, shape (mounts, 3), if it is of that.
     of_axis
@@ -134,6 +133,7 @@ class Channel:
     of_torque: bool = False
     of_modes: bool = False
     of_constant_stiffness: bool = False
+    of_shares: bool = False
     of_cases: Callable[[Any], Any] | None = None
     of_axis: Callable[[Block, Band], AxisResidual] | None = None
     open_frequency: bool = False

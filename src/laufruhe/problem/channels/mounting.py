@@ -99,6 +99,7 @@ FREQUENCIES = MountChannel(
 )  # fmt: skip
 DECOUPLING = MountChannel(
     "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False, of_constant_stiffness=True,
+    of_shares=True,
     values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
 )  # fmt: skip
 DECOUPLING_SHORTFALL = MountChannel(

@@ -70,8 +70,7 @@ def _spring_sides(order: int, numbers: int, spring: Spring, seen: ComplexArray, 
     if len(seen) > 1:
         return [*found, _between(order, numbers, product(first, second)[None, None])]
     rows = [np.concatenate([each.real, each.imag]) for each in (first, second)]
-    some = np.any(rows[0] != 0.0, axis=1) | np.any(rows[1] != 0.0, axis=1)
-    across = np.einsum("ax,by->abxy", *(each[some] for each in rows))
+    across = np.einsum("ax,by->abxy", *rows)
     across = across + across.transpose(1, 0, 2, 3)
     return [*found, _between(order, numbers, 0.25 * (across + across.transpose(0, 1, 3, 2)))]
 
@@ -86,10 +85,8 @@ def held(order: int, given: Array, slopes: Array, seen: ComplexArray, pressed: C
     """E43 from y and P y as functions of (1, v), shapes (p, d), P = given + sum s_j slopes_j."""
     p, d = seen.shape
     size = float(np.abs(seen).max()) or 1.0
-    # of what is real there is one part
-    parts = [(f(seen) / size, f(pressed) / size) for f in (np.real, np.imag) if np.any(f(seen)) or np.any(f(pressed))]
-    n = len(parts)
-    moments = np.zeros((p + n, p + n, d, d))
+    parts = [(f(seen) / size, f(pressed) / size) for f in (np.real, np.imag)]
+    moments = np.zeros((p + 2, p + 2, d, d))
     for k, (own, turned) in enumerate(parts):
         moments[:p, p + k, 0] += 0.5 * turned
         moments[:p, p + k, :, 0] += 0.5 * turned
@@ -97,7 +94,7 @@ def held(order: int, given: Array, slopes: Array, seen: ComplexArray, pressed: C
         for other, (theirs, bent) in enumerate(parts):
             twice = own.T @ bent + theirs.T @ turned
             moments[p + k, p + other] = 0.25 * (twice + twice.T)
-    return Held(order, _bordered(given, n), _bordered(slopes, n), moments)
+    return Held(order, _bordered(given, 2), _bordered(slopes, 2), moments)
 
 
 def _place_sides(order: int, numbers: int, place: Place, seen: ComplexArray, moved: ComplexArray) -> list[Held]:
@@ -106,14 +103,10 @@ def _place_sides(order: int, numbers: int, place: Place, seen: ComplexArray, mov
     size = np.abs(seen).max(axis=1, keepdims=True)
     size = np.where(size > 0.0, size, 1.0)
     own, theirs = ((rows / size) for rows in (seen, moved))
-    rows = np.concatenate([theirs.real, theirs.imag])
     plain = np.concatenate([own.real, own.imag])
-    # of what is real the imaginary part is nothing
-    some = np.any(plain != 0.0, axis=1) | np.any(rows != 0.0, axis=1)
-    plain, rows = plain[some], rows[some]
     count, d = plain.shape
     for sign in (1.0, -1.0):
-        pressed = plain + sign * rows
+        pressed = plain + sign * np.concatenate([theirs.real, theirs.imag])
         moments = np.zeros((1 + count, 1 + count, d, d))
         moments[0, 1:, 0] += 0.5 * pressed
         moments[0, 1:, :, 0] += 0.5 * pressed
@@ -124,6 +117,7 @@ def _place_sides(order: int, numbers: int, place: Place, seen: ComplexArray, mov
         slopes = np.zeros((numbers, 1, 1))
         slopes[place.number] = sign
         found.append(Held(order, _bordered(np.eye(1), count), _bordered(slopes, count), moments))
+    rows = np.concatenate([theirs.real, theirs.imag])
     squares = [np.einsum("ax,by->abxy", each, each) for each in (plain, rows)]
     left = squares[0] - squares[1]
     return [*found, _between(order, numbers, 0.5 * (left + left.transpose(0, 1, 3, 2)))]
@@ -142,8 +136,8 @@ def _limits_of_stiffness(order: int, mounts: OpenMounts, line: Line) -> list[Hel
 
 
 def _cornerless(whole: Held) -> Held:
-    """What it has for the motion alone."""
-    last = slice(6, whole.size)
+    """The last two rows and columns of it."""
+    last = slice(whole.size - 2, whole.size)
     return Held(whole.order, whole.constant[last, last], whole.slopes[:, last, last], whole.moments[last, last])
 
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem import channels
 from laufruhe.problem.channels import motion_indices
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.transmitted import SLACK
@@ -60,7 +59,7 @@ def modes_of(problem: Problem, mounts: OpenMounts) -> tuple[Mode, ...]:
     """By the limits of decoupling, the largest share of every motion; none where places of mounts are open."""
     found: dict[int, float] = {}
     for limit in problem.mount_limits:
-        if limit.measure.channel is channels.DECOUPLING and limit.minimum > 0.0:
+        if limit.measure.channel.of_shares and limit.minimum > 0.0:
             for motion in motion_indices(limit.measure):
                 found[motion] = max(found.get(motion, 0.0), limit.minimum * (1.0 - SLACK))
     return () if mounts.places else tuple(mode_of(mounts.root, *each) for each in found.items())
