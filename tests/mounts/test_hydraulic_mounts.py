@@ -145,7 +145,7 @@ def test_a_run_up_in_equal_steps_is_that_of_scipy() -> None:
     sized = load.each(lambda values: values / 60.0**2)
     steps = linear_steps(mounting, 0.0, 60.0, 1.0)
     assert steps is not None
-    own = steps.response([(sized.orders, sized.coefficients @ time_model(mounting).load.T)])
+    own = steps.response(steps.sweep.wrenches([(sized.orders, sized.coefficients)]))
     theirs = run_through(mounting, sized, None, 0.0, 60.0, 1.0, tolerance=1e-8)
     assert np.linalg.norm(own.force, axis=-1).max() == pytest.approx(theirs.worst_force, rel=5e-3)
 

@@ -94,8 +94,8 @@ def test_what_no_design_keeps_is_named() -> None:
 
 
 @pytest.mark.slow
-def test_loads_add_up_and_bump_stops_do_not() -> None:
-    """Motion of the sum of two weights is the sum of theirs; stops leave none, and limits are checked alone."""
+def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
+    """Motion of the sum of two weights is the sum of theirs; with stops no rows tell it."""
     problem = problem_of()
     run, point = problem.engine.run, problem.points[0]
     designs = ([0.0, 0.0], [1.0, 0.0], [0.0, 0.02j], [1.0, 0.02j])
@@ -106,8 +106,4 @@ def test_loads_add_up_and_bump_stops_do_not() -> None:
     mounts = tables_of(READY)["mounts"]
     stop = {"gap": "1 mm", "stiffness": "500 N/mm"}
     stopped = {**mounts, "places": [{**place, "stop": stop} for place in mounts["places"]]}
-    checked = problem_of(("run-up twist", "0.02 deg"), mounts=stopped)
-    assert responses_of(checked.engine, point, checked.fidelity, run) is None
-    result = laufruhe.solve(checked)
-    assert result.status is Status.FAILED
-    assert "a run-up is checked, not designed for" in result.message
+    assert responses_of(problem_of(mounts=stopped).engine, point, problem.fidelity, run) is None

@@ -13,7 +13,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.physics.linear_run import Response
 from laufruhe.physics.runs import STRETCHES, point_of, responses_of
 from laufruhe.problem.decision import domains_of
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import KnownRows, Problem
 from laufruhe.problem.sets import Value
 
@@ -35,15 +35,15 @@ class RunRows:
     slopes: dict[Measure, Array]
 
     @classmethod
-    def of(cls, problem: Problem, limits: Sequence[Limit]) -> RunRows | None:
-        """Of the measures of some limits; None where run-ups are not linear in the loads."""
+    def of(cls, problem: Problem, measures: Sequence[Measure]) -> RunRows | None:
+        """Of some measures; None where run-ups are not linear in the loads."""
         bare = _responses(problem, problem.design([0.0] * len(problem.decisions)))
         if bare is None:
             return None
         domains = domains_of(problem.decisions)
         units = [(k, direction) for k, domain in enumerate(domains) for direction in domain.set.directions]
-        constants = {limit.measure: _rows(limit.measure, bare) for limit in limits}
-        slopes: dict[Measure, list[Array]] = {limit.measure: [] for limit in limits}
+        constants = {measure: _rows(measure, bare) for measure in measures}
+        slopes: dict[Measure, list[Array]] = {measure: [] for measure in measures}
         for k, direction in units:
             values: list[Value] = [direction if j == k else 0.0 for j in range(len(problem.decisions))]
             moved = _responses(problem, problem.design(values))
@@ -53,19 +53,19 @@ class RunRows:
                 rows.append(_rows(measure, moved) - constants[measure])
         return cls(constants, {measure: np.stack(rows, axis=-1) for measure, rows in slopes.items()})
 
-    def worst(self, limit: Limit, x: Array) -> float:
+    def worst(self, measure: Measure, x: Array) -> float:
         """The largest length at x."""
-        return float(self._lengths(limit.measure, x).max())
+        return float(self._lengths(measure, x).max())
 
-    def near(self, limit: Limit, x: Array) -> NDArray[np.intp]:
-        """Of every stretch and place the longest row, of those that come near a limit at x, as flat places of rows."""
-        sizes = self._lengths(limit.measure, x)
+    def near(self, measure: Measure, x: Array, height: float) -> NDArray[np.intp]:
+        """Of every stretch and place the longest row, of those that come near a height at x, as flat places of rows."""
+        sizes = self._lengths(measure, x)
         count = -(-len(sizes) // (2 * STRETCHES))
         found = []
         for start in range(0, len(sizes), count):
             part = sizes[start : start + count]
             tops = part.argmax(axis=0)
-            kept = part[tops, np.arange(part.shape[1])] >= NEAR * limit.maximum
+            kept = part[tops, np.arange(part.shape[1])] >= NEAR * height
             found.append((start + tops[kept]) * sizes.shape[1] + np.flatnonzero(kept))
         return np.concatenate(found)
 

@@ -9,7 +9,8 @@ loads make the answer linear in them to a rounding.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -18,10 +19,55 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.time_model import TimeModel
 
 Loads: TypeAlias = Sequence[tuple[Array, ComplexArray]]
+"""Orders, and the wrenches of each, shape (n, 6): those of the first grow with the square of speed (E28)."""
 
 NODES, FINE = 4, 64
 _STIFFEST, _DEFECTIVE = 200.0, 1e8
-_AT_ONCE = 20_000
+_AT_ONCE, BLOCK = 20_000, 64
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Steps of one run.
+
+    Attributes
+    ----------
+    first, gain
+        Crank speed at the start [rad/s], and by how much it grows [rad/s2].
+    step, count
+        Of time [s].
+    """
+
+    first: float
+    gain: float
+    step: float
+    count: int
+
+    def wrenches(self, loads: Loads) -> Array:
+        """At the Gauss points of every step, shape (6 points, steps): six components of the first point, then others.
+
+        They do not depend on the mounts.
+        """
+        out = np.zeros((NODES, 6, self.count))
+        for k in range(0, self.count, _AT_ONCE):
+            starts = self.step * np.arange(k, min(k + _AT_ONCE, self.count))
+            for node, into in zip(_nodes(), out, strict=True):
+                into[:, k : k + len(starts)] = self._wrenches_at(starts + node * self.step, loads)
+        return out.reshape(6 * NODES, -1)
+
+    def _wrenches_at(self, times: Array, loads: Loads) -> Array:
+        """Shape (6, times)."""
+        speed, angle = self.first + self.gain * times, self.first * times + 0.5 * self.gain * times**2
+        total = np.zeros((6, len(times)))
+        for k, (orders, coefficients) in enumerate(loads):
+            part = np.zeros_like(total)
+            for order, own in zip(orders, coefficients, strict=True):
+                if np.any(own != 0.0):
+                    felt = np.flatnonzero(own)
+                    part[felt] += np.outer(own[felt].real, np.cos(order * angle))
+                    part[felt] -= np.outer(own[felt].imag, np.sin(order * angle))
+            total += part if k else speed**2 * part
+        return total
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,88 +76,116 @@ class Response:
 
     Attributes
     ----------
-    force, travel
-        Shapes (steps, mounts, 3) [N], [m].
-    twist
-        Roll of the block, shape (steps, 1, 1) [rad].
+    y, rate
+        Coordinates of the model, shape (n, steps + 1).
     """
 
-    force: Array
-    travel: Array
-    twist: Array
+    model: TimeModel = field(repr=False)
+    y: Array
+    rate: Array
+
+    @cached_property
+    def force(self) -> Array:
+        """Forces on the mounts, shape (steps + 1, mounts, 3) [N]."""
+        return self.model.mount_forces(self.y, self.rate)
+
+    @cached_property
+    def travel(self) -> Array:
+        """Travel of the mounts, shape (steps + 1, mounts, 3) [m]."""
+        return self.model.mount_travels(self.y)
+
+    @cached_property
+    def twist(self) -> Array:
+        """Roll of the block, shape (steps + 1, 1, 1) [rad]."""
+        return np.asarray((self.model.roll @ self.y)[:, None, None])
 
 
 class LinearRun:
-    """Steps of one run, for any loads.
+    """Steps of one run on some mounts, for any loads."""
 
-    Parameters
-    ----------
-    first, gain
-        Crank speed at the start [rad/s], and by how much it grows [rad/s2].
-    step, count
-        Of time [s].
-    """
-
-    def __init__(self, model: TimeModel, first: float, gain: float, step: float, count: int) -> None:
-        self._model, self._first, self._gain, self._step, self._count = model, first, gain, step, count
+    def __init__(self, model: TimeModel, sweep: Sweep) -> None:
+        self.model, self.sweep = model, sweep
         one = np.eye(model.size)
         matrix = np.block([[np.zeros_like(one), one], [-model.stiffness, -model.damping]])
         rates, shapes = np.linalg.eig(matrix)
         self._rates, self._shapes = rates.astype(complex), shapes.astype(complex)
 
     @property
+    def is_resolved(self) -> bool:
+        """Whether modes tell the motion between stops: none alike, none that hardly moves within a step."""
+        stiff = float(np.abs(self._rates).max()) * self.sweep.step > _STIFFEST
+        return not (stiff or np.linalg.cond(self._shapes) > _DEFECTIVE)
+
+    @property
     def is_known(self) -> bool:
-        """Whether modes tell the motion: none alike, none that hardly moves within a step, and no bump stop."""
-        stiff = float(np.abs(self._rates).max()) * self._step > _STIFFEST
-        return not (self._model.has_stops or stiff or np.linalg.cond(self._shapes) > _DEFECTIVE)
+        """Whether they tell all of it: no bump stop."""
+        return self.is_resolved and not self.model.has_stops
 
-    def response(self, loads: Loads) -> Response:
-        """Under loads by order: the first grows with the square of speed, others do not (E28)."""
-        model, driven = self._model, self._driven(loads)
-        states = (self._shapes @ self._stepped(driven)).real
-        y, rate = np.split(states, 2)
-        travel = model.mount_travels(y)
-        return Response(model.mount_forces(y, rate), travel, (model.roll @ y)[:, None, None])
+    @cached_property
+    def kept(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Rates, shapes that real parts are taken of, and loads to modes, (m,), (2 n, m), (m, n): of a pair one."""
+        kept = self._rates.imag >= 0.0
+        rates = self._rates[kept]
+        shapes = self._shapes[:, kept] * np.where(rates.imag > 0.0, 2.0, 1.0)
+        return rates, shapes, np.linalg.inv(self._shapes)[kept, self.model.size :]
 
-    def _driven(self, loads: Loads) -> ComplexArray:
-        """What every step adds to the modes, shape (2 n, steps)."""
-        inverse = np.linalg.inv(self._shapes)[:, self._model.size :]
-        nodes, weights = _weights(np.asarray(self._rates * self._step, dtype=complex))
-        out = np.zeros((len(self._rates), self._count), dtype=complex)
-        for k in range(0, self._count, _AT_ONCE):
-            starts = self._step * np.arange(k, min(k + _AT_ONCE, self._count))
-            for node, weight in zip(nodes, weights.T, strict=True):
-                load = self._load(starts + node * self._step, loads)
-                out[:, k : k + len(starts)] += self._step * weight[:, None] * (inverse @ load.T)
+    def driven(self, wrenches: Array) -> ComplexArray:
+        """What wrenches of `Sweep.wrenches` add to the modes in every step, nothing before, shape (m, steps + 1)."""
+        rates, _, inverse = self.kept
+        weights = self.sweep.step * _weights(np.asarray(rates * self.sweep.step, dtype=complex))
+        into = inverse @ self.model.load
+        driving = np.concatenate([weight[:, None] * into for weight in weights.T], axis=1)
+        out = np.zeros((len(rates), self.sweep.count + 1), dtype=complex)
+        out.real[:, 1:], out.imag[:, 1:] = driving.real @ wrenches, driving.imag @ wrenches
         return out
 
-    def _load(self, times: Array, loads: Loads) -> Array:
-        """Shape (times, n), in the coordinates of the model."""
-        speed, angle = self._first + self._gain * times, self._first * times + 0.5 * self._gain * times**2
-        total = np.zeros((len(times), self._model.size))
-        for k, (orders, coefficients) in enumerate(loads):
-            kept = np.any(coefficients != 0.0, axis=1)
-            part = (np.exp(1j * np.outer(angle, orders[kept])) @ coefficients[kept]).real
-            total += part if k else speed[:, None] ** 2 * part
-        return total
+    def seen(self, states: ComplexArray) -> Response:
+        """The motion of modes after every step, shape (m, steps + 1)."""
+        shapes = self.kept[1]
+        y, rate = np.split(shapes.real @ states.real - shapes.imag @ states.imag, 2)
+        return Response(self.model, y, rate)
 
-    def _stepped(self, driven: ComplexArray) -> ComplexArray:
-        """Modes after every step, from rest, shape (2 n, steps + 1)."""
-        out = np.zeros((self._count + 1, len(self._rates)), dtype=complex)
-        decay, state = np.exp(self._rates * self._step), out[0]
-        for k, own in enumerate(np.ascontiguousarray(driven.T), 1):
-            state = decay * state + own
-            out[k] = state
-        return out.T
+    def response(self, wrenches: Array) -> Response:
+        """Under wrenches of `Sweep.wrenches`, from rest."""
+        return self.seen(_stepped(self.driven(wrenches), np.exp(self.kept[0] * self.sweep.step)))
 
 
-def _weights(rates: ComplexArray) -> tuple[Array, ComplexArray]:
-    """Gauss points of a step of one, and of each rate r integrals of e^{r (1 - s)} L_i(s), shape (rates, points)."""
-    nodes = 0.5 * (np.polynomial.legendre.leggauss(NODES)[0] + 1.0)
+def _stepped(driven: ComplexArray, decays: ComplexArray) -> ComplexArray:
+    """z_k = decay z_{k-1} + what drives step k, of every mode; shapes (modes, steps) and (modes,)."""
+    modes, count = driven.shape
+    blocks = -(-count // BLOCK)
+    out = np.zeros((modes, blocks, BLOCK), dtype=complex)
+    out.reshape(modes, -1)[:, :count] = driven
+    reach = 1
+    while reach < BLOCK:
+        # each then has what drove it over twice as many steps of its block
+        out[..., reach:] += (decays**reach)[:, None, None] * out[..., :-reach]
+        reach *= 2
+    carried, whole = np.zeros((blocks, modes), dtype=complex), decays**BLOCK
+    for k, last in enumerate(np.ascontiguousarray(out[:, :-1, -1].T), 1):
+        carried[k] = whole * carried[k - 1] + last
+    out += carried.T[..., None] * decays[:, None, None] ** np.arange(1, BLOCK + 1)
+    return out.reshape(modes, -1)[:, :count]
+
+
+@lru_cache
+def _nodes() -> Array:
+    return np.asarray(0.5 * (np.polynomial.legendre.leggauss(NODES)[0] + 1.0))
+
+
+@lru_cache
+def _quadrature() -> tuple[Array, Array]:
+    """Fine points of a step of one, and their shares times the polynomials of the Gauss points, (points, nodes)."""
+    nodes = _nodes()
     points, shares = np.polynomial.legendre.leggauss(FINE)
     points = 0.5 * (points + 1.0)
     bases = np.array([
         np.prod([(points - other) / (node - other) for other in nodes if other != node], axis=0) for node in nodes
     ])  # fmt: skip
-    grown = np.exp(np.outer(rates, 1.0 - points))
-    return nodes, np.asarray(grown @ (0.5 * shares * bases).T)
+    return points, np.ascontiguousarray((0.5 * shares * bases).T)
+
+
+def _weights(rates: ComplexArray) -> ComplexArray:
+    """Of each rate r integrals of e^{r (1 - s)} L_i(s) over a step of one, L_i of its Gauss points, (rates, points)."""
+    points, shares = _quadrature()
+    return np.asarray(np.exp(np.outer(rates, 1.0 - points)) @ shares)

@@ -13,12 +13,14 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Run
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.linear_run import LinearRun, Loads, Response
+from laufruhe.physics.linear_run import LinearRun, Response, Sweep
 from laufruhe.physics.run_up import LEAST_STEPS, MOST_STEPS, STEPS_PER_PERIOD, RunUp, run_through
 from laufruhe.physics.speed_map import split_loads
+from laufruhe.physics.stopped_run import responses_to
 from laufruhe.physics.time_model import time_model
 
 HIGHEST = 12.0
@@ -48,16 +50,18 @@ def runs_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run)
 
 @lru_cache(maxsize=32)
 def _found_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[RunUp, RunUp]:
-    mounting, parts = _elastic(engine), _loads(engine, point, fidelity)
+    mounting, (inertia, gas) = _elastic(engine), run_loads(engine, point, fidelity)
 
     def through(first: float, last: float, seconds: float) -> RunUp:
-        steps = linear_steps(mounting, first, last, seconds)
-        if steps is not None:
-            return _envelope(steps.response(_by_modes(mounting, parts)), first, last)
+        sweep = sweep_of(first, last, seconds)
+        if sweep is not None:
+            (response,) = responses_to([time_model(mounting)], sweep, [_wrenches(sweep, inertia, gas)])
+            if response is not None:
+                return _envelope(response, first, last)
         # a mode that swings a million times in a run is followed, not resolved
         stiff = seconds * mounting.modes.frequencies[-1] > MOST_SWINGS
         method: Literal["RK45", "Radau"] = "Radau" if stiff else "RK45"
-        return run_through(mounting, *parts, first, last, seconds, STRETCHES, method, TOLERANCE)
+        return run_through(mounting, inertia, gas, first, last, seconds, STRETCHES, method, TOLERANCE)
 
     return through(0.0, run.speed, run.up), through(run.speed, 0.0, run.down)
 
@@ -65,25 +69,33 @@ def _found_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: 
 def responses_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[Response, ...] | None:
     """Motion in run-up and shut-down at equal steps of time, linear in the loads; None with bump stops (E28a)."""
     engine = replace(engine, bearings=(), flywheel=None, torsion=None, run=None)
-    mounting, parts = _elastic(engine), _loads(engine, point, fidelity)
+    mounting, loads = _elastic(engine), run_loads(engine, point, fidelity)
     found = []
     for first, last, seconds in ((0.0, run.speed, run.up), (run.speed, 0.0, run.down)):
         steps = linear_steps(mounting, first, last, seconds)
         if steps is None:
             return None
-        found.append(steps.response(_by_modes(mounting, parts)))
+        found.append(steps.response(_wrenches(steps.sweep, *loads)))
     return tuple(found)
 
 
 def linear_steps(mounting: ElasticMounting, first: float, last: float, seconds: float) -> LinearRun | None:
     """Equal steps that follow the fastest order that any load may have; None where they are no answer."""
+    sweep = sweep_of(first, last, seconds)
+    if sweep is None:
+        return None
+    run = LinearRun(time_model(mounting), sweep)
+    return run if run.is_known else None
+
+
+def sweep_of(first: float, last: float, seconds: float, coarser: int = 1) -> Sweep | None:
+    """Equal steps of a run, so many times as long as they are for the last word; None where these are too many."""
     fastest = max(first, last) * HIGHEST
     wanted = STEPS_PER_PERIOD * fastest * (seconds / STRETCHES) / math.tau
     if wanted > COARSEST * MOST_STEPS:
         return None
-    count = STRETCHES * int(min(max(wanted + 1.0, LEAST_STEPS), MOST_STEPS))
-    run = LinearRun(time_model(mounting), first, (last - first) / seconds, seconds / count, count)
-    return run if run.is_known else None
+    count = STRETCHES * max(int(min(max(wanted + 1.0, LEAST_STEPS), MOST_STEPS)) // coarser, LEAST_STEPS)
+    return Sweep(first, (last - first) / seconds, seconds / count, count)
 
 
 def _elastic(engine: Engine) -> ElasticMounting:
@@ -92,20 +104,20 @@ def _elastic(engine: Engine) -> ElasticMounting:
     return elastic_mounting(engine.block, engine.mounts)
 
 
-def _loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum, Spectrum | None]:
+def run_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum, Spectrum | None]:
+    """Wrench of inertia per square of crank speed, and that of the gas, of the orders that a run follows (E28)."""
     inertia, gas = split_loads(engine, point, fidelity)
     return inertia.kept(HIGHEST), None if gas is None else gas.kept(HIGHEST)
 
 
-def _by_modes(mounting: ElasticMounting, parts: tuple[Spectrum, Spectrum | None]) -> Loads:
-    model = time_model(mounting)
-    return [(part.orders, part.coefficients @ model.load.T) for part in parts if part is not None]
+def _wrenches(sweep: Sweep, inertia: Spectrum, gas: Spectrum | None) -> Array:
+    return sweep.wrenches([(part.orders, part.coefficients) for part in (inertia, gas) if part is not None])
 
 
 def _envelope(response: Response, first: float, last: float) -> RunUp:
     """The most within every stretch, its ends included."""
-    edges = np.arange(0, len(response.twist), (len(response.twist) - 1) // STRETCHES)
     signals = (response.force, response.travel, response.twist)
+    edges = np.arange(0, len(response.twist), (len(response.twist) - 1) // STRETCHES)
     sizes = [np.linalg.norm(signal, axis=-1).max(axis=-1) for signal in signals]
     most = [np.array([own[a : b + 1].max() for a, b in itertools.pairwise(edges)]) for own in sizes]
     speeds = first + (last - first) * edges[1:] / edges[-1]

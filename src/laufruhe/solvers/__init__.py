@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import Listener, listening, tell
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
@@ -21,11 +22,11 @@ from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.boxes.leads import solve_leads
 from laufruhe.solvers.boxes.places import solve_places
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
-from laufruhe.solvers.cones.run_limits import solve_runs
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_sharply
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.mounts.convex import is_convex, solve_convex_mounts
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.runs import solve_runs
 from laufruhe.solvers.tolerances.assembly import solve_assembly
 from laufruhe.solvers.tolerances.robust import solve_robust
 
@@ -255,24 +256,6 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
     return replace(found, certificate=replace(own, method=f"{own.method}; {CUT_SHORT}"))
 
 
-def _checked(problem: Problem, checked: Sequence[Limit]) -> Result:
-    """The best design without limits that no method designs for: where it keeps them, it is the best with them.
-
-    Where run-ups are linear in what is open they are designed for.
-    """
-    others = tuple(limit for limit in problem.limits if limit not in checked)
-    found = with_limits(_decided(problem.changed(limits=others)), problem.limits)
-    broken = broken_limits(checked, found.final) if found.status in (Status.OPTIMAL, Status.FEASIBLE) else ()
-    if not broken:
-        return found
-    designed = solve_runs(problem, checked, _decided)
-    if designed is not None:
-        return designed
-    names = " and ".join(f"'{name}'" for name in broken)
-    why = f"the best design found breaks {names}: a run-up is checked, not designed for; relax it, or limit travel"
-    return replace(found, status=Status.FAILED, certificate=None, message=why)
-
-
 def _decided(problem: Problem) -> Result:
     """By the first method that suits, for the drawing or for the engines that are built to it."""
     if problem.ranks:
@@ -294,10 +277,8 @@ def _decided(problem: Problem) -> Result:
             return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
         return with_limits(_decided(problem.changed(limits=moved)), problem.limits)
-    told = problem.known_rows
-    checked = [x for x in problem.limits if x.measure.channel.is_checked and x.measure not in told]
-    if checked and kinds:
-        return _checked(problem, checked)
+    if kinds and asks_runs(problem):
+        return solve_runs(problem, kinds, _decided)
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
         raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
     moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)

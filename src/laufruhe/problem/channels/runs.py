@@ -19,7 +19,6 @@ class RunChannel(NumberChannel):
     """The most of a number in run-up and shut-down, integrated in time."""
 
     needs: Needs = Needs.RUN
-    minimised: bool = False
     is_checked: ClassVar[bool] = True
 
 

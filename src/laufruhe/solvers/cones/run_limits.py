@@ -1,7 +1,7 @@
-"""Limits of run-up and shut-down that are designed for: loads add up on mounts without bump stops (E28a, P11).
+"""Run-up and shut-down over unbalances: loads add up on mounts without bump stops (E28a, P11).
 
 Each step of a run is affine in the unbalances, so that its largest force, travel and twist are convex. The cone program
-has the steps that matter, more as designs break others: fewer steps ask for less, so its bound holds for all of them.
+has the steps that matter, more as designs pass them: fewer steps ask for less, so its bound holds for all of them.
 """
 
 from __future__ import annotations
@@ -17,45 +17,45 @@ from laufruhe.load_models.run_rows import RunRows
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell
-from laufruhe.problem.decision import Kind, domains_of
+from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import broken_limits, none_within, with_limits
+from laufruhe.solvers.conclusion import none_within, with_limits
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import conflict_of
 from laufruhe.solvers.mounts.starts import unbalances_of
 from laufruhe.solvers.result import Result, Status
 
 _ROUNDS, _COARSE, _AGAIN = 40, 48, 4
+Decide = Callable[[Problem], Result]
 
 
-def solve_runs(problem: Problem, limits: Sequence[Limit], decide: Callable[[Problem], Result]) -> Result | None:
-    """The best design within limits of its run-ups; None where these are not linear in what is open."""
-    kinds = {decision.kind for decision in problem.decisions}
-    rows = RunRows.of(problem, limits) if kinds <= {Kind.UNBALANCE, Kind.SHARE} and problem.phasing is None else None
-    if rows is None:
-        return None
-    steps = _Steps(problem, limits, rows)
+def solve_run_cones(
+    problem: Problem, limits: Sequence[Limit], terms: Sequence[Term], rows: RunRows, decide: Decide
+) -> Result:  # fmt: skip
+    """The best unbalances, proven."""
+    steps = _Steps(problem, limits, terms, rows)
     if not steps.found():
         names = [limit.name for limit in steps.problem.load_limits]
         return none_within(problem, evaluate(problem), conflict_of(steps.affine, names), {})
     for _ in in_time(range(_AGAIN)):
         result = decide(steps.problem)
-        if result.status is Status.INFEASIBLE or not broken_limits(limits, result.final):
-            break
-        steps.add(np.concatenate([
+        x = np.concatenate([
             domain.columns_of(value)
             for domain, value in zip(domains_of(problem.decisions), unbalances_of(problem, result), strict=True)
-        ]))  # fmt: skip
+        ]) if result.decisions else None  # fmt: skip
+        if x is None or result.status is Status.INFEASIBLE or steps.has_all(x):
+            break
+        steps.add(x)
     return with_limits(replace(result, problem=problem), problem.limits)
 
 
 class _Steps:
-    """Steps of the runs that come near the limits of some design."""
+    """Steps of the runs that come near the limits of some design, or near its largest where that is minimised."""
 
-    def __init__(self, problem: Problem, limits: Sequence[Limit], rows: RunRows) -> None:
-        self._whole, self._limits, self._rows = problem, limits, rows
+    def __init__(self, problem: Problem, limits: Sequence[Limit], terms: Sequence[Term], rows: RunRows) -> None:
+        self._whole, self._limits, self._terms, self._rows = problem, limits, terms, rows
         self._places: dict[Measure, NDArray[np.intp]] = {}
 
     @property
@@ -72,12 +72,24 @@ class _Steps:
         return model.at(min(_COARSE, model.full_samples))
 
     def add(self, x: Array) -> None:
-        """Those that a design brings near the limits."""
-        for limit in self._limits:
-            near = self._rows.near(limit, x)
+        """Those that a design brings near the limits, and its largest."""
+        heights = [(limit.measure, limit.maximum) for limit in self._limits]
+        heights += [(term.measure, self._rows.worst(term.measure, x)) for term in self._terms]
+        for measure, height in heights:
+            near = self._rows.near(measure, x, height)
             if len(near):
-                known = self._places.get(limit.measure, near)
-                self._places[limit.measure] = np.union1d(known, near).astype(np.intp)
+                known = self._places.get(measure, near)
+                self._places[measure] = np.union1d(known, near).astype(np.intp)
+
+    def has_all(self, x: Array) -> bool:
+        """Whether a design keeps all steps, and none of them is above those that it is judged by."""
+        kept = all(self._rows.worst(own.measure, x) <= own.maximum * (1.0 + 0.1 * FEASIBLE) for own in self._limits)
+        return kept and all(self._is_top(term.measure, x) for term in self._terms)
+
+    def _is_top(self, measure: Measure, x: Array) -> bool:
+        known = self._rows.known(measure, self._places[measure])
+        top = np.linalg.norm(known.constant + known.slope @ x, axis=-1).max()
+        return self._rows.worst(measure, x) <= float(top) * (1.0 + 0.1 * self._whole.tolerance)
 
     def found(self) -> bool:
         """Whether designs of few angles keep all steps; those that break some add them."""
@@ -90,6 +102,6 @@ class _Steps:
             if solution.x is None:
                 return False
             x = solution.x
-            if all(self._rows.worst(limit, x) <= limit.maximum * (1.0 + 0.1 * FEASIBLE) for limit in self._limits):
+            if self.has_all(x):
                 break
         return True

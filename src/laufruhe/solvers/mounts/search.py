@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError
+from laufruhe.load_models.run_look import COARSER
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed, rounds
@@ -19,7 +20,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBLE, Design, given_design, judged
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, is_explored
-from laufruhe.solvers.smooth.nonlinear import solve_nonlinear
+from laufruhe.solvers.smooth.nonlinear import Enough, solve_nonlinear
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 SLACK = 1e-5
@@ -30,6 +31,10 @@ MOST_MARGINS = 3
 NEAR = 0.05
 ITERATIONS = 150
 MOST_AROUND = 3
+# ends of a search that run-ups are followed exactly from
+MOST_REFINED = 2
+# of a search whose every step follows run-ups
+RUN_ITERATIONS = 60
 # share of the size that a search counted in from which it is done again in a smaller one, and how often
 SMALL = 1e-2
 MOST_SIZES = 3
@@ -72,7 +77,7 @@ class MountSearch:
     moves
         Throws that may leave the star of the problem.
     first
-        Mounts and columns to start from before all others.
+        Mounts and columns to start from before all others, in place of those given or `beside` them.
 
     Attributes
     ----------
@@ -84,12 +89,12 @@ class MountSearch:
 
     def __init__(
         self, problem: Problem, initial: Evaluation, workers: int | None = None, moves: ThrowMoves | None = None,
-        first: tuple[list[float], Array] | None = None,
+        first: tuple[list[float], Array] | None = None, beside: bool = False,
     ) -> None:  # fmt: skip
-        self.problem, self.moves, self._workers = problem, moves, workers
+        self.problem, self.moves, self._workers, self._coarser = problem, moves, workers, COARSER
         tell("starts of the mounts")
         self._points, self._size = start_points(problem)
-        self._points = self._points if first is None else [first, *self._points[1:]]
+        self._points = self._points if first is None else [first, *self._points[0 if beside else 1 :]]
         tell("smooth program of all that is open")
         self.joint = SmoothProgram(problem, self._size, moves=moves)
         self._given = given_design(problem, initial) if moves is None else None
@@ -110,6 +115,19 @@ class MountSearch:
             self._search([_point(self.best), *self._points[1:]])
         self._tighten()
 
+    def refined(self) -> None:
+        """Once more from the best ends, with run-ups in the steps of the last word."""
+        ends = distinct(self.optima, max(abs(self.best.design.value) if self.best else 0.0, 1e-12), 1e-3)
+        ends = ends or tuple(sorted(self.optima, key=lambda optimum: optimum.violation)[:1])
+        places = [_parted(self.joint, optimum.x) for optimum in ends[:MOST_REFINED]]
+        if self.best is not None and self.best.optimum not in ends[:MOST_REFINED]:
+            places.append(_point(self.best))
+        self._coarser = 1
+        self.joint = SmoothProgram(self.problem, self._size, moves=self.moves, coarser=1)
+        starts = [self.joint.start(*place) for place in places]
+        self._take(self._ends(starts))
+        self._tighten()
+
     def again(self, places: Sequence[Array]) -> bool:
         """From other mounts, with the unbalances found; whether a better design came of it.
 
@@ -123,7 +141,7 @@ class MountSearch:
             if alone is not None and alone.excess <= 0.0:
                 self._keep(Found(alone, self.joint))
         starts = [self.joint.start(place.tolist(), columns) for place in places]
-        self._take(solve_nonlinear(self.joint.program, starts, self._workers, ITERATIONS))
+        self._take(self._ends(starts))
         self._tighten()
         return self.best is not None and (before is None or self.best.rank < before.rank)
 
@@ -149,7 +167,7 @@ class MountSearch:
         starts = [
             joint.start(mounts, columns, self._nudged(generator, k)) for k, (mounts, columns) in enumerate(points)
         ]
-        optima = solve_nonlinear(joint.program, starts, self._workers, ITERATIONS, enough=self._is_explored)
+        optima = self._ends(starts, self._is_explored)
         around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
         if around and len(points) > 1 and not self._is_explored(optima) and not passed():
             decisions = problem.mount_decisions
@@ -160,9 +178,17 @@ class MountSearch:
                 found, columns = _decided(joint, x)
                 mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
                 again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
-            more = solve_nonlinear(joint.program, again, self._workers, ITERATIONS)
+            more = self._ends(again)
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._take(optima)
+
+    @property
+    def _iterations(self) -> int:
+        return ITERATIONS if self.joint.program.told is None else RUN_ITERATIONS
+
+    def _ends(self, starts: Sequence[Array], enough: Enough | None = None) -> tuple[LocalOptimum, ...]:
+        """Where starts of the program lead to."""
+        return solve_nonlinear(self.joint.program, starts, self._workers, self._iterations, enough=enough)
 
     def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
         return is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12))
@@ -218,8 +244,8 @@ class MountSearch:
             if near.optimum is None or not FEASIBLE < near.design.excess <= NEAR:
                 break
             margin += 1.001 * near.design.excess
-            joint = SmoothProgram(self.problem, self._size, margin, self.moves)
-            ends = solve_nonlinear(joint.program, [near.optimum.x], workers=1)
+            joint = SmoothProgram(self.problem, self._size, margin, self.moves, coarser=self._coarser)
+            ends = solve_nonlinear(joint.program, [near.optimum.x], 1, self._iterations)
             design = self._judged(ends[0], joint) if ends else None
             if design is None:
                 break
@@ -238,11 +264,15 @@ def _decided(joint: SmoothProgram, x: Array) -> tuple[Array, Array]:
     return np.array(mounts), x[len(mounts) : len(mounts) + joint.columns]
 
 
+def _parted(joint: SmoothProgram, x: Array) -> tuple[list[float], Array]:
+    mounts, columns = _decided(joint, x)
+    return mounts.tolist(), columns
+
+
 def _point(found: Found) -> tuple[list[float], Array]:
     """Mounts and columns that an end of a search stands at."""
     assert found.optimum is not None
-    mounts, columns = _decided(found.joint, found.optimum.x)
-    return mounts.tolist(), columns
+    return _parted(found.joint, found.optimum.x)
 
 
 def judged_at(problem: Problem, values: Sequence[Value]) -> Design | None:

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.errors import ModelError
+from laufruhe.load_models.run_look import RunLook, asks_runs
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left, limited
 from laufruhe.problem.decision import Domain, domains_of
@@ -27,6 +28,10 @@ POOL = 16
 ROUGHLY = 1e-2
 # share of the time that is left for looking at points to start from
 LOOKING = 0.25
+# times as many candidates where run-ups, that have many optima, are asked about
+RUN_POOL = 4
+# of what is missed beside run-ups: limits that many designs nearly keep, few keep
+RUN_WEIGHT = 10.0
 POOL_SAMPLES, POOL_ORDERS = 72, 18
 
 
@@ -63,7 +68,7 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     spread = spread_starts(
         np.concatenate([low_log, -wide]),
         np.concatenate([high_log, wide]),
-        POOL * (starts + 1),
+        POOL * (starts + 1) * (RUN_POOL if asks_runs(problem) else 1),
         search.seed,
     )
     best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
@@ -93,6 +98,8 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, w
     given = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
     # unbalances are still to be decided, and may keep a limit on loads
     limits = problem.mount_limits if problem.unbalances else problem.limits
+    plain = problem.changed(objective=tuple(term for term in problem.objective if not term.measure.channel.is_checked))
+    runs, limits = RunLook(problem), tuple(limit for limit in limits if not limit.measure.channel.is_checked)
     misses, values = np.full(len(pool), np.inf), np.full(len(pool), np.inf)
     for k, row in in_time(enumerate(pool)):
         try:
@@ -100,7 +107,11 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, w
         except ModelError:
             continue
         misses[k] = sum(max(design.standing(limit).excess, 0.0) for limit in limits)
-        values[k] = objective_value(problem, design)
+        values[k] = objective_value(plain, design)
+        if runs.asked:
+            missed, value = runs.at(row)
+            misses[k] = RUN_WEIGHT * (misses[k] + missed)
+            values[k] += value
     known = values[np.isfinite(values)]
     middle = float(np.median(known)) if len(known) else 0.0
     best = np.argsort(misses + values / (middle or 1.0), kind="stable")

@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -19,6 +19,8 @@ from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
 # seconds that a start has where time is over
 SHORTEST = 0.5
+# of a program whose numbers are differences of a model outside
+LOOSER = 1e-8
 # programs that are kept built
 _BUILT = 4
 _QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False, "calc_lam_p": False}
@@ -43,6 +45,25 @@ _ENDINGS = {
 }
 
 
+class Teller(Protocol):
+    """A model outside a program, that another process can read."""
+
+    def values(self, asked: Array) -> Array:
+        """What it is asked for; no numbers where there are none."""
+
+    def slopes(self, asked: Array) -> Array:
+        """Of these numbers over what is asked, shape (values, asked)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outside:
+    """Numbers that a teller gives, of a serialized function of the variables; the oracle has them as its input r."""
+
+    asked: str
+    teller: Teller
+    count: int
+
+
 @dataclass(frozen=True, eq=False)
 class Task:
     """A program in a form that another process can read."""
@@ -59,6 +80,7 @@ class Task:
     max_iterations: int
     max_seconds: float
     expand: bool
+    outside: Outside | None = None
 
 
 def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
@@ -67,7 +89,7 @@ def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
     if not points:
         return []
     tell("derivatives of the smooth program")
-    built = _built(task.oracle, task.expand, task.max_iterations)
+    built = _built(task.oracle, task.expand, task.max_iterations, task.outside)
     return [_from_start(task, built, k, point) for k, point in in_time(telling("starts", points))]
 
 
@@ -100,26 +122,81 @@ class _Clock(ca.Callback):
         return [float(time.monotonic() > self._until)]
 
 
+class _Told(ca.Callback):
+    """A function of columns that Python answers; its derivative is another one."""
+
+    def __init__(self, name: str, sizes: tuple[int, ...], shape: tuple[int, int], answer: Any, slopes: Any) -> None:
+        ca.Callback.__init__(self)
+        self._sizes, self._shape, self._answer, self._slopes = sizes, shape, answer, slopes
+        self._derivative: Any = None
+        self.construct(name, {})
+
+    def get_n_in(self) -> int:
+        """Columns."""
+        return len(self._sizes)
+
+    def get_n_out(self) -> int:
+        """One matrix."""
+        return 1
+
+    def get_sparsity_in(self, k: int) -> Any:
+        """All of a column."""
+        return ca.Sparsity.dense(self._sizes[k], 1)
+
+    def get_sparsity_out(self, _: int) -> Any:
+        """All of the matrix."""
+        return ca.Sparsity.dense(*self._shape)
+
+    def eval(self, told: Any) -> list[Any]:
+        """Of the first column; a derivative is given the values too."""
+        return [ca.DM(self._answer(_flat(told[0])))]
+
+    def has_jacobian(self, *_: Any) -> bool:
+        """Where slopes are told."""
+        return self._slopes is not None
+
+    def get_jacobian(self, name: str, *_: Any) -> Any:
+        """Kept, for CasADi does not."""
+        count = self._shape[0]
+        self._derivative = _Told(name, (*self._sizes, count), (count, self._sizes[0]), self._slopes, None)
+        return self._derivative
+
+
 @dataclass(frozen=True, eq=False)
 class _Program:
-    """The solver of a program, its clock, and the derivatives of the judge's own making."""
+    """The solver of a program, its clock, the derivatives of the judge's own making, and what has to be kept for it."""
 
     solver: Any
     clock: _Clock
     slopes: Any
+    kept: Any = None
 
 
 @lru_cache(maxsize=_BUILT)
-def _built(oracle: str, expand: bool, max_iterations: int) -> _Program:
+def _built(oracle: str, expand: bool, max_iterations: int, outside: Outside | None) -> _Program:
     """A program that can be solved: to build it costs as much as some starts."""
-    function = ca.Function.deserialize(oracle)
+    function, told = ca.Function.deserialize(oracle), None
     if expand:
         function = function.expand()
+    solver = {**_OPTIONS, "max_iter": max_iterations}
+    if outside is not None:
+        function, told = _with_outside(function, outside)
+        # slopes are told, and no bends
+        solver |= {"hessian_approximation": "limited-memory", "tol": LOOSER}
     n, m = function.size1_in("x"), function.size1_out("g")
     clock = _Clock({"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": function.size1_in("p")})
-    options: dict[str, Any] = {**_QUIET, "ipopt": {**_OPTIONS, "max_iter": max_iterations}, "iteration_callback": clock}
+    options: dict[str, Any] = {**_QUIET, "ipopt": solver, "iteration_callback": clock}
     slopes = function.factory("slopes", ["x", "p"], ["f", "g", "grad:f:x", "jac:g:x"])
-    return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, slopes)
+    return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, slopes, told)
+
+
+def _with_outside(function: Any, outside: Outside) -> tuple[Any, _Told]:
+    """An oracle with what it is told from outside in it, and who tells it."""
+    asked, teller, count = ca.Function.deserialize(outside.asked), outside.teller, outside.count
+    told = _Told("told", (asked.size1_out(0),), (count, 1), teller.values, teller.slopes)
+    x, p = (ca.MX.sym(name, function.size1_in(name)) for name in ("x", "p"))
+    found = function(x=x, p=p, r=told(asked(x)))
+    return ca.Function("oracle", {"x": x, "p": p, "f": found["f"], "g": found["g"]}, ["x", "p"], ["f", "g"]), told
 
 
 def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptimum:

@@ -35,7 +35,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, each, executor_for
-from laufruhe.solvers.smooth.ipopt import Task, run
+from laufruhe.solvers.smooth.ipopt import Outside, Task, Teller, run
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
 Enough: TypeAlias = Callable[[Sequence[LocalOptimum]], bool]
@@ -46,6 +46,15 @@ WORTH_EXPANDING = 3
 ROUND = 6
 # share of the value, or of this share of its scale, and of every variable's scale, within which two ends are the same
 SAME_END, LEAST_SCALE, SAME_PLACE = 1e-7, 1e-3, 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """Column of symbols, what a teller is asked for them as an expression of the variables, and who tells."""
+
+    symbols: Any
+    asked: Any
+    teller: Teller
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +86,8 @@ class NonlinearProgram:
     expand
         Whether the expressions may be written out as scalars where several starts share
         the cost: three times as fast to evaluate, and slower to set up.
+    told
+        Numbers in the expressions that a model outside tells.
     """
 
     x: Any
@@ -94,6 +105,7 @@ class NonlinearProgram:
     parameters: Any = None
     stages: tuple[tuple[float, ...], ...] = ((),)
     expand: bool = False
+    told: Told | None = None
 
     def __post_init__(self) -> None:
         n, m = self.x.numel(), 0 if self.constraints is None else self.constraints.numel()
@@ -233,13 +245,18 @@ def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, ma
     constraints = symbol(0, 1) if program.constraints is None else program.constraints
     heights = np.ones(constraints.numel()) if program.constraint_scales is None else program.constraint_scales
     parameters = symbol(0, 1) if program.parameters is None else program.parameters
-    y = symbol.sym("y", program.x.numel())
-    f, g = ca.substitute(
-        [program.objective / program.objective_scale, constraints / ca.DM(heights)], [program.x], [y * ca.DM(scales)]
-    )
-    oracle = ca.Function("oracle", {"x": y, "p": parameters, "f": f, "g": g}, ["x", "p"], ["f", "g"])
+    y, told, outside = symbol.sym("y", program.x.numel()), program.told, None
+    f, g, asked = ca.substitute(
+        [program.objective / program.objective_scale, constraints / ca.DM(heights),
+         symbol(0, 1) if told is None else told.asked], [program.x], [y * ca.DM(scales)]
+    )  # fmt: skip
+    inputs = {"x": y, "p": parameters}
+    if told is not None:
+        inputs["r"] = told.symbols
+        outside = Outside(ca.Function("asked", [y], [asked]).serialize(), told.teller, told.symbols.numel())
+    oracle = ca.Function("oracle", {**inputs, "f": f, "g": g}, list(inputs), ["f", "g"])
     return Task(
         oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower / heights,
         program.constraint_upper / heights, scales, program.objective_scale, heights, program.stages,
-        max_iterations, max_seconds, program.expand and many,
+        max_iterations, max_seconds, program.expand and many, outside,
     )  # fmt: skip

@@ -27,6 +27,7 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.mount_loads import FixedThrows, Loads, MovedThrows
 from laufruhe.load_models.mount_rows import PointResponse, sampled_rows, transmitted
 from laufruhe.load_models.mount_symbols import elimination, response, symbolic_mounts
+from laufruhe.load_models.run_look import COARSER
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_model import UnevenModel, rides_of
 from laufruhe.numerics.arrays import Array
@@ -46,6 +47,7 @@ from laufruhe.solvers.smooth.gathered import Gathered
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum
 from laufruhe.solvers.smooth.modes import ModeVariables
 from laufruhe.solvers.smooth.nonlinear import NonlinearProgram
+from laufruhe.solvers.smooth.runs import RunVariables
 
 SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
 # bounds of a stiffness that are further apart leave a start no place between them
@@ -74,11 +76,13 @@ class SmoothProgram:
         Share by which all limits are tightened.
     softest
         Share of the objective that norms are softened by in the last stage (N4).
+    coarser
+        Times as long as those of the last word steps of run-ups are.
     """
 
     def __init__(
         self, problem: Problem, unit: float, margin: float = 0.0, moves: ThrowMoves | None = None,
-        slack: float = 0.0, softest: float = SOFTEST,
+        slack: float = 0.0, softest: float = SOFTEST, coarser: int = COARSER,
     ) -> None:  # fmt: skip
         self.problem, self._margin, self._slack, self.moves = problem, margin, slack, moves
         self._softest = softest
@@ -95,6 +99,7 @@ class SmoothProgram:
         self._e = ca.MX.sym("softness")
         self._held = Gathered()
         self._modes = ModeVariables(problem, self._held)
+        self._runs = RunVariables(problem, ca.vertcat(self._d, self._u), self._held, coarser)
         self.unit = unit
         self._points: list[PointResponse] = []
         if problem.asks_mounts:
@@ -140,14 +145,21 @@ class SmoothProgram:
             scales=self._scales(lower, upper),
             objective_scale=self.unit,
             parameters=self._e,
-            stages=tuple((share,) for share in (*SOFTNESS, self._softest)),
+            stages=self._stages,
             expand=not self._is_wide,
+            told=self._runs.told,
         )
 
     @property
     def _is_wide(self) -> bool:
         """Whether thousands of rows are waves of a few angles: whole arrays have their second derivatives sooner."""
         return self.moves is not None and any(measure.is_inside for measure in self.problem.measures)
+
+    @property
+    def _stages(self) -> tuple[tuple[float, ...], ...]:
+        """All softness at once where it costs run-ups and nothing that is minimised is softened (N4)."""
+        plain = self._runs.told is not None and not self.problem.load_terms
+        return tuple((share,) for share in (*(() if plain else SOFTNESS), self._softest))
 
     def _bounds(self) -> tuple[Array, Array]:
         low = self._inner([d.lower for d in self._decisions]).tolist()
@@ -197,6 +209,8 @@ class SmoothProgram:
         """A measure to be minimised, softened by a share of the objective (N3)."""
         if measure.is_mounting:
             return self._mount_number(measure)
+        if measure.channel.is_checked:
+            return self._runs.least(measure)
         rows, grid = self._rows(measure)
         return measure.norm.least(self._held.named(measure.name), grid, rows, self.unit, self._e)
 
@@ -206,6 +220,9 @@ class SmoothProgram:
             self._limit_mounts(limit)
             return
         tight = 1.0 - self._slack - self._margin
+        if measure.channel.is_checked:
+            self._runs.limit(limit, tight)
+            return
         rows, grid = self._rows(measure)
         unit = limit.maximum * tight or self.unit
         held = self._held.named(limit.name)
@@ -322,7 +339,8 @@ class SmoothProgram:
         if self._modes.asked:
             parts += self._modes.start(mounting_in(self.problem.design(list(mounts), self._decisions)))
         if self._held.heads:
-            given = [self._v, self._u, self._t]
+            given = [self._v, self._u, self._t, self._runs.symbols]
             values = ca.Function("tops", given, [ca.vertcat(*(value for _, value in self._held.heads))])
-            parts.append(1.05 * np.asarray(values(self._inner(mounts), columns, turns), dtype=float).reshape(-1))
+            told = values(self._inner(mounts), columns, turns, self._runs.at(mounts, columns))
+            parts.append(1.05 * np.asarray(told, dtype=float).reshape(-1))
         return np.concatenate(parts)

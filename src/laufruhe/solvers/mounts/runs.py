@@ -1,0 +1,88 @@
+"""Mounts, and unbalances with them, designed for run-up and shut-down: a smooth program with peaks told (E28b)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.decision import domains_of
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within
+from laufruhe.solvers.mounts.search import NEAR, Found, MountSearch
+from laufruhe.solvers.mounts.starts import columns_of, unbalances_of
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
+
+STARTS, STOPPED_STARTS = 6, 3
+"""Of a search at most: each of its steps costs several run-ups, most of them with bump stops."""
+
+
+def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
+    """The best local optimum that several starts find.
+
+    Parameters
+    ----------
+    relaxed
+        Of the same without what is asked of run-ups: a search starts there, and no design goes under its bound.
+    """
+    started = time.perf_counter()
+    initial = evaluate_start(problem)
+    stopped = any(spring.stop_stiffness > 0.0 for _, spring in every_spring(problem.engine.mounts))
+    starts = min(problem.search.starts, STOPPED_STARTS if stopped else STARTS)
+    few = replace(problem, search=replace(problem.search, starts=starts))
+    search = MountSearch(few, initial, first=None if relaxed is None else _place(problem, relaxed), beside=True)
+    search.run()
+    if not stopped and search.best is not None and search.best.design.excess <= NEAR:
+        search.refined()
+    timing = {"solve": time.perf_counter() - started}
+    found = search.chosen
+    if found is None or found.design.excess > KEPT:
+        return _none(problem, search, found, none_within(problem, initial, (), timing))
+    own = None if relaxed is None else relaxed.certificate
+    optimum = found.optimum
+    shown = Shown(
+        bound=0.0 if own is None else own.lower_bound,
+        reach=Reach.ASIDE,
+        kkt_residual=math.inf if optimum is None else optimum.kkt_residual,
+        method=_method(search.optima, max(found.design.value, nothing_of(problem)), own is not None),
+        prices={} if optimum is None else found.joint.prices(optimum),
+    )
+    design = replace(found.design, problem=problem)
+    return concluded(design, initial, shown, timing)
+
+
+def _place(problem: Problem, relaxed: Result) -> tuple[list[float], Array]:
+    """Mounts and columns of unbalances of a result."""
+    found = {decision.name: decision.value for decision in relaxed.decisions}
+    mounts = [found[decision.name] for decision in problem.mount_decisions]
+    return mounts, columns_of(domains_of(problem.unbalances), unbalances_of(problem, relaxed))
+
+
+def _method(optima: Sequence[LocalOptimum], scale: float, is_bounded: bool) -> str:
+    starts, usable = sum(o.starts for o in optima), [o for o in optima if o.usable]
+    apart = len(distinct(usable, scale, 1e-3))
+    ends = "one and the same optimum" if apart == 1 else f"{apart} different optima"
+    told = "" if is_bounded else "; nothing bounds a run-up alone"
+    bound = "; the bound is that of the same without what is asked of run-ups" if is_bounded else told
+    return (
+        f"IPOPT from {starts} starts with run-ups integrated, {sum(o.starts for o in usable)} of which ended at "
+        f"{ends}{bound}"
+    )
+
+
+def _none(problem: Problem, search: MountSearch, found: Found | None, result: Result) -> Result:
+    """No start ended within the limits, which proves nothing."""
+    names, miss = "the limits", ""
+    if found is not None:
+        names = " and ".join(f"'{name}'" for name in broken_limits(problem.limits, found.design.evaluation))
+        miss = f" (nearest misses by {found.design.excess:.3g} of a limit)"
+    starts = sum(optimum.starts for optimum in search.optima)
+    message = f"no design found: from {starts} starts none keeps {names}{miss}; relax it, or open more"
+    return replace(result, status=Status.FAILED, message=message)

@@ -1,0 +1,87 @@
+"""Run-ups and shut-downs that are asked about: checked where that is enough, designed for where it is not.
+
+What else is asked is decided first, without them: a design that keeps their limits is the best with them too, and what
+bounds it bounds all that keep them. Where loads add up, on mounts that stand, without bump stops, cones have the steps
+of a run that matter (E28a); where mounts are open, or stops are met, a smooth program has the peaks that the exact
+model tells (E28b).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.run_look import run_measures
+from laufruhe.load_models.run_rows import RunRows
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.measure import Limit, Term
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.conclusion import broken_limits, with_limits
+from laufruhe.solvers.cones.run_limits import solve_run_cones
+from laufruhe.solvers.result import Result, Status
+
+_LINEAR = frozenset({Kind.UNBALANCE, Kind.SHARE})
+_SMOOTH = frozenset({Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT})
+Decide = Callable[[Problem], Result]
+
+
+def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Result:
+    """The best design where run-ups are minimised or limited.
+
+    Parameters
+    ----------
+    kinds
+        Of what is open.
+    decide
+        What else is asked.
+
+    Raises
+    ------
+    ModelError
+        If a run-up is minimised over what nothing decides it by.
+    """
+    asked = run_measures(problem)
+    limits = tuple(limit for limit in problem.limits if limit.measure in asked)
+    terms = tuple(term for term in problem.objective if term.measure in asked)
+    apart = problem.changed(
+        objective=tuple(term for term in problem.objective if term not in terms),
+        limits=tuple(limit for limit in problem.limits if limit not in limits),
+    )
+    relaxed = None
+    if apart.objective:
+        relaxed = decide(apart)
+        broken = broken_limits(limits, relaxed.final)
+        if relaxed.status not in (Status.OPTIMAL, Status.FEASIBLE) or not (broken or terms):
+            # without what is asked of run-ups nothing is missing
+            return with_limits(relaxed, problem.limits)
+    designed = _designed(problem, kinds, limits, terms, relaxed, decide)
+    if designed is not None:
+        return designed
+    others = " and ".join(kind.name.lower() for kind in sorted(kinds - _SMOOTH)) or "this"
+    if terms or relaxed is None:
+        name = terms[0].measure.name
+        raise ModelError(f"{name} is minimised over unbalances and mounts, not over {others}; fix it, or limit it")
+    names = " and ".join(f"'{name}'" for name in broken_limits(limits, relaxed.final))
+    why = (
+        f"the best design found breaks {names}: beside {others} a run-up is checked, not designed for; "
+        "relax it, or limit travel"
+    )
+    return replace(with_limits(relaxed, problem.limits), status=Status.FAILED, certificate=None, message=why)
+
+
+def _designed(
+    problem: Problem, kinds: frozenset[Kind], limits: Sequence[Limit], terms: Sequence[Term], relaxed: Result | None,
+    decide: Decide,
+) -> Result | None:  # fmt: skip
+    """A design that is made for them; None where no method does that."""
+    if problem.phasing is not None or problem.fidelity.mounts != "frequency":
+        return None
+    rows = RunRows.of(problem, run_measures(problem)) if kinds <= _LINEAR else None
+    if rows is not None:
+        return solve_run_cones(problem, limits, terms, rows, decide)
+    if not kinds <= _SMOOTH:
+        return None
+    from laufruhe.solvers.mounts.runs import solve_run_mounts
+
+    return solve_run_mounts(problem, relaxed)

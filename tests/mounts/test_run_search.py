@@ -1,0 +1,235 @@
+"""Run-ups that open mounts and bump stops are designed for: against integration by SciPy, and brute force."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import laufruhe
+from laufruhe.errors import LaufruheError
+from laufruhe.files.reader import load, load_tables, tables_of
+from laufruhe.load_models.run_peaks import RunPeaks
+from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.runs import run_loads, runs_of
+from laufruhe.physics.time_model import time_model
+from laufruhe.problem.channels import RUN_FORCE, RUN_TRAVEL, RUN_TWIST, mounting_in
+from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.measure import Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import Result, Status
+from problem_files import PROBLEMS
+
+READY = PROBLEMS / "soft-single-run-up-mounts.toml"
+OF_RUNS = tuple(Measure(channel) for channel in (RUN_FORCE, RUN_TRAVEL, RUN_TWIST))
+SHORT = {"up_to": "700 rpm", "time": "0.4 s", "shut_down_time": "0.5 s"}
+STOP = {"gap": "1 mm", "stiffness": "300 N/mm"}
+
+
+def tables(**more: Any) -> dict[str, Any]:
+    return {**tables_of(READY), "fidelity": {"samples": 120}, "run_up": SHORT, "search": {"starts": 6}, **more}
+
+
+def limited(*limits: tuple[str, str], **more: Any) -> Problem:
+    given = [{"limit": quantity, "max": most} for quantity, most in limits]
+    return load_tables(tables(constraints=given, **more), Path("single.toml"))
+
+
+def mounts(stop: dict[str, str] | None = None, **opened: Any) -> dict[str, Any]:
+    """The mounts of the ready problem, all stiffness given, with something else."""
+    found = tables_of(READY)["mounts"]
+    places = []
+    for place in found["places"]:
+        own = dict(place)
+        if "stiffness" in own:
+            own["stiffness"] = ["120 N/mm", "120 N/mm", "150 N/mm"]
+            own |= opened | ({"stop": stop} if stop else {})
+        places.append(own)
+    return {**found, "places": places}
+
+
+@pytest.fixture(scope="module")
+def ready() -> tuple[Problem, Result]:
+    problem = load(READY)
+    return problem, laufruhe.solve(problem)
+
+
+def by_scipy(engine: Engine, problem: Problem) -> tuple[float, float]:
+    """Largest force and travel of both runs: E25 written here once more, matrices of the mounts alone shared."""
+    run, model = problem.engine.run, time_model(mounting_in(engine))
+    inertia, gas = run_loads(engine, problem.points[0], problem.fidelity)
+    assert gas is None
+    force = travel = 0.0
+    for first, last, seconds in ((0.0, run.speed, run.up), (run.speed, 0.0, run.down)):
+        gain = (last - first) / seconds
+
+        def rates(t: float, z: Array, first: float = first, gain: float = gain) -> Array:
+            speed, angle = first + gain * t, first * t + gain * t * t / 2.0
+            wrench = speed**2 * (inertia.coefficients * np.exp(1j * inertia.orders * angle)[:, None]).real.sum(axis=0)
+            y, rate = z[:6], z[6:]
+            moved = model.travels @ y
+            stop = model.stops * np.sign(moved) * np.maximum(np.abs(moved) - model.gaps, 0.0)
+            push = model.load @ wrench - model.stiffness @ y - model.damping @ rate - model.travels.T @ stop
+            return np.concatenate([rate, push])
+
+        times = np.linspace(0.0, seconds, 12_000)
+        states = solve_ivp(rates, (0.0, seconds), np.zeros(12), "DOP853", times, rtol=1e-8, atol=1e-11, max_step=5e-3).y
+        y, rate = states[:6], states[6:]
+        force = max(force, float(np.linalg.norm(model.mount_forces(y, rate), axis=-1).max()))
+        travel = max(travel, float(np.linalg.norm(model.mount_travels(y), axis=-1).max()))
+    return force, travel
+
+
+@pytest.mark.slow
+def test_the_design_keeps_its_limits_when_scipy_integrates_it(ready: tuple[Problem, Result]) -> None:
+    problem, result = ready
+    assert result.status is Status.FEASIBLE
+    assert result.certificate.kind is Proof.LOCAL
+    assert "without what is asked of run-ups" in result.certificate.method
+    travel = next(limit for limit in result.limits if limit.name == "run-up travel")
+    assert travel.active
+    assert travel.shadow_price > 0.0
+    assert by_scipy(result.final.engine, problem)[1] == pytest.approx(travel.limit, rel=5e-4)
+    # what is best without the limit breaks it, and bounds what is best with it
+    free = laufruhe.solve(problem.changed(limits=problem.limits[:1]))
+    assert not free.final.standing(problem.limits[1]).excess <= 0.0
+    assert result.certificate.lower_bound == free.certificate.lower_bound
+    assert free.objective.value < result.objective.value
+
+
+@pytest.mark.slow
+def test_no_pair_of_stiffnesses_on_a_grid_is_better(ready: tuple[Problem, Result]) -> None:
+    """Of 900 pairs those that promise more, their run-ups followed: none keeps both limits, and near ones do."""
+    problem, result = ready
+    initial = evaluate(problem, samples=180)
+    grid = np.exp(np.linspace(np.log(40e3), np.log(600e3), 30))
+    best, looked = np.inf, 0
+    for pair in np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2).tolist():
+        design = remounted(initial, problem.design(pair))
+        value = objective_value(problem, design)
+        if value < 1.1 * result.objective.value and design.standing(problem.limits[0]).excess <= 0.0:
+            looked += 1
+            if design.standing(problem.limits[1]).excess <= 0.0:
+                best = min(best, value)
+    assert looked > 40
+    assert result.objective.value <= best * (1.0 + 1e-6) < np.inf
+
+
+def test_peaks_are_those_of_the_last_word_and_slope_as_they_differ() -> None:
+    """Of damping, place and a shaft; between coarse steps and at fine ones; with stops and without."""
+    opened = {
+        "damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"},
+        "position": [{"between": ["100 mm", "300 mm"], "start": "200 mm"}, "200 mm", "0 mm"],
+    }
+    shaft = tables_of(PROBLEMS / "soft-single-run-up.toml")["balancer_shafts"]
+    for stop, error in ((None, 1e-4), (STOP, 2e-3)):
+        given = mounts(stop)
+        given["places"][0] |= opened
+        problem = limited(mounts=given, balancer_shafts=shaft)
+        unbalance, mount_numbers = 0.004 + 0.003j, [1.2e-3, 0.21]
+        order = [d.name.split(".")[1] for d in problem.mount_decisions]
+        numbers = dict(zip(("damping_per_stiffness", "position"), mount_numbers, strict=True))
+        own = [numbers[name] for name in order]
+        x = np.array([*own, unbalance.real, unbalance.imag])
+        engine = problem.design([unbalance, *own])
+        told = runs_of(engine, problem.points[0], problem.fidelity, problem.engine.run)
+        for coarser, most in ((1, 1e-9), (4, error)):
+            peaks = RunPeaks(problem, OF_RUNS, coarser)
+            parts = np.split(peaks.values(x), np.cumsum(peaks.counts)[:-1])
+            for name, part in zip(("worst_force", "worst_travel", "worst_twist"), parts, strict=True):
+                assert part.max() == pytest.approx(max(getattr(run, name) for run in told), rel=max(most, 1e-9))
+            slopes = peaks.slopes(x)
+            at = [int(part.argmax()) + start for part, start in zip(parts, np.cumsum([0, *peaks.counts]), strict=False)]
+            for k, step in enumerate(1e-5 * np.maximum(np.abs(x), 1e-3)):
+                moved = step * np.eye(len(x))[k]
+                differences = (peaks.values(x + moved) - peaks.values(x - moved)) / (2.0 * step)
+                assert slopes[at, k] == pytest.approx(differences[at], rel=1e-3, abs=1e-6 * np.abs(slopes[at]).max())
+
+
+@pytest.mark.slow
+def test_runs_on_bump_stops_are_those_of_scipy() -> None:
+    problem = limited(mounts=mounts(STOP))
+    told = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.run)
+    force, travel = by_scipy(problem.engine, problem)
+    assert travel > 1.3e-3
+    assert max(run.worst_force for run in told) == pytest.approx(force, rel=1e-3)
+    assert max(run.worst_travel for run in told) == pytest.approx(travel, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_stiffness_is_designed_for_beside_bump_stops() -> None:
+    """One number: every better one of a dense row breaks the limit, by SciPy too."""
+    given = mounts(STOP)
+    given["places"][2]["stiffness"] = [
+        "120 N/mm",
+        "120 N/mm",
+        {"between": ["60 N/mm", "400 N/mm"], "start": "300 N/mm"},
+    ]
+    problem = limited(("run-up force", "420 N"), mounts=given, objective={"minimise": "static sag"})
+    result = laufruhe.solve(problem)
+    assert result.status is Status.FEASIBLE
+    assert result.certificate.kind is Proof.LOCAL
+    force = result.limits[0]
+    assert force.value <= force.limit * (1.0 + 1e-5)
+    assert by_scipy(result.final.engine, problem)[0] == pytest.approx(force.value, rel=2e-3)
+    initial = evaluate(problem)
+    for stiffness in np.linspace(60e3, 400e3, 120):
+        design = remounted(initial, problem.design([float(stiffness)]))
+        if objective_value(problem, design) < result.objective.value * (1.0 - 2e-3):
+            assert design.standing(problem.limits[0]).excess > 0.0
+
+
+@pytest.mark.slow
+def test_the_least_travel_of_a_start_over_weights_is_proven() -> None:
+    """A convex problem: no random design near or far is better than its bound."""
+    problem = load_tables(
+        {**tables_of(PROBLEMS / "soft-single-run-up.toml"), "run_up": SHORT,
+         "constraints": [], "objective": {"minimise": "run-up travel"}},
+        Path("single.toml"),
+    )  # fmt: skip
+    result = laufruhe.solve(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.unit == "m"
+    assert by_scipy(result.final.engine, problem)[1] == pytest.approx(result.objective.value, rel=1e-3)
+    rng = np.random.default_rng(3)
+    found = {decision.name: decision.value for decision in result.decisions}
+    unbalance = complex(found["first.unbalance"] * np.exp(1j * found["first.angle"]))
+    best = np.array([found["web.mass"], unbalance.real, unbalance.imag])
+    for scale in (1e-3, 1e-2, 0.1):
+        for mass, real, imag in best + scale * rng.normal(size=(15, 3)) * [2.0, 0.02, 0.02]:
+            unbalance = complex(real, imag)
+            unbalance *= min(1.0, 0.05 / max(abs(unbalance), 1e-12))
+            other = evaluate(problem, problem.design([float(np.clip(mass, 0.0, 4.0)), unbalance]))
+            assert other.value(OF_RUNS[1]) >= result.certificate.lower_bound
+
+
+@pytest.mark.slow
+def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
+    """More freedom is never worse: the least force through a start, of mounts alone and with a weight."""
+    weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
+    least = {"minimise": "run-up force"}
+    mounts_alone = laufruhe.solve(limited(("static sag", "5 mm"), objective=least))
+    both = laufruhe.solve(limited(("static sag", "5 mm"), objective=least, counterweights=[weight]))
+    assert both.objective.value < mounts_alone.objective.value < mounts_alone.objective.initial
+    for result in (mounts_alone, both):
+        assert result.certificate.kind is Proof.LOCAL
+        assert result.certificate.lower_bound == 0.0
+        assert "nothing bounds a run-up alone" in result.certificate.method
+        assert max(limit.value / limit.limit for limit in result.limits) <= 1.0 + 1e-5
+
+
+@pytest.mark.slow
+def test_what_is_beside_mounts_and_weights_is_checked_alone() -> None:
+    """A crank star: the search of stars knows nothing of run-ups, and says so; a run-up is not its objective."""
+    star = {"throws": "open", "firing_order": "open", "cylinder_spacing": "120 mm"}
+    engine = {**tables_of(READY)["engine"], **star}
+    spread = {"engine": engine, "mounts": mounts(), "counterweights": []}
+    with pytest.raises(LaufruheError, match="run-up travel is minimised over unbalances and mounts, not over star"):
+        laufruhe.solve(
+            limited(objective={"minimise": "run-up travel"}, **spread | {"engine": engine | {"cylinders": 3}})
+        )
