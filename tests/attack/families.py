@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from attack.plain_loads import number
 from attack.plain_scene import Table
 from attack.star_list import even_stars
 
@@ -170,6 +171,9 @@ def parts(rng: Generator) -> Table:
 
 def moving_mass(engine: Table) -> float:
     """Reciprocating mass times crank radius of all cylinders, about [kg m]."""
+    if engine["layout"] == "rotary":
+        count = engine["cylinders"] if engine["throws"] == "open" else len(engine["throws"])
+        return count * number(engine["rotor_mass"]) * number(engine["eccentricity"])
     count = {"vee": 2}.get(engine["layout"], 1)
     told = engine.get("throws")
     throw_count = len(told) if isinstance(told, list) else engine.get("cylinders", 1)
@@ -704,6 +708,53 @@ def banks(rng: Generator) -> Table:
     return with_objective(rng, table, 1, norms=SMOOTH)
 
 
+def rotary(rng: Generator) -> Table:
+    """One to four rotors: phases given, open on even steps, or between bounds; end weights, gas in every chamber."""
+    count, e = int(rng.integers(1, 5)), rng.uniform(0.008, 0.018)
+    engine: Table = {
+        "layout": "rotary", "cycle": "four-stroke", "eccentricity": q(e, "m"),
+        "rotor_radius": q(e * rng.uniform(5.8, 8.5), "m"), "rotor_width": q(rng.uniform(0.05, 0.09), "m"),
+        "rotor_mass": q(rng.uniform(2.0, 6.0), "kg"), "rotor_inertia": q(rng.uniform(0.0, 0.03), "kg m^2"),
+        "rotating_mass": q(rng.uniform(0.0, 2.0), "kg"), **spaced(rng),
+    }  # fmt: skip
+    chance = rng.random()
+    if count > 1 and chance < 0.4:
+        engine |= {"throws": "open", "firing_order": "open", "cylinders": count}
+    else:
+        engine["throws"] = throws(rng, count)
+    table: Table = {"engine": engine, "operating_points": points(rng, 2, 200.0, 900.0), "mounts": rigid_mounts(rng)}
+    if rng.random() < 0.6:
+        peak = rng.uniform(45.0, 70.0)
+        table["gas"] = {
+            "model": "seiliger", "compression_ratio": float(round(rng.uniform(7.5, 9.5), 2)),
+            "peak_pressure": q(peak, "bar"), "imep": q(peak * rng.uniform(0.18, 0.3), "bar"),
+        }  # fmt: skip
+    out = 0.5 * count * number(engine["cylinder_spacing"]) + rng.uniform(0.0, 0.05)
+    table["main_bearings"] = [{"x": q(out, "m")}, {"x": q(-out, "m")}]
+    size = moving_mass(engine)
+    table["counterweights"] = counterweights(rng, size, int(rng.integers(1, 4)))
+    if shafts := balancers(rng, size, int(rng.integers(0, 2))):
+        table["balancer_shafts"] = shafts
+    table["flywheel"] = {"inertia": q(rng.uniform(0.05, 0.5), "kg m^2")}
+    kinds = [
+        ("apex speed", "1e3 m/s"), ("apex acceleration", "1e6 m/s^2"), ("rms crank torque", "1e6 N m"),
+        ("maximum crank-pin force", "1e8 N"), ("degree of irregularity", 1.99),
+    ]  # fmt: skip
+    kinds = kinds if "gas" in table else kinds[:2]
+    chosen = [kinds[k] for k in sorted(rng.choice(len(kinds), 2, replace=False))]
+    table["constraints"] = [{"limit": name, "max": most, "name": name} for name, most in chosen]
+    if rng.random() < 0.25:
+        # what is left of force and couple, by as little mass as may be
+        table["objective"] = {"minimise": "counterweight mass"}
+        whole = size * number(table["operating_points"][0]["speed"]) ** 2
+        part = rng.uniform(0.05, 0.6)
+        table["constraints"].append(
+            {"limit": "maximum shaking force", "max": q(part * whole, "N"), "name": "force left"}
+        )
+        return table
+    return with_objective(rng, table, channels=(*LOADS, "main-bearing force"))
+
+
 FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "inline": of_unbalances(inline),
     "vee": of_unbalances(vee),
@@ -716,6 +767,7 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "crankcase": crankcase,
     "yokes": of_unbalances(yoke),
     "chambers": with_chambers,
+    "rotary": rotary,
     "stars": stars,
     "open-vees": vees,
     "elastic-few": few_stiffnesses(1, 2),

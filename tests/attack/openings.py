@@ -227,7 +227,7 @@ class Openings:
 
     def _star(self, engine: Any) -> Table:
         e = self.table["engine"]
-        if e.get("throws") != "open" or e["layout"] not in ("inline", "vee"):
+        if e.get("throws") != "open" or e["layout"] not in ("inline", "vee", "rotary"):
             return {}
         throws, bank, split = self._angles(engine)
         told: Table = {"throws": [math.degrees(t) for t in throws]}

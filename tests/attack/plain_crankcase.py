@@ -26,6 +26,8 @@ from attack.plain_loads import (
     seiliger,
     slope,
 )
+from attack.plain_rotary import on_eccentric
+from attack.plain_rotary import torque as rotor_torque
 
 FORCES = ("main-bearing force", "crank-pin force")
 OF_SHAFT = ("crank torque", "stored work", "shaft twist")
@@ -92,6 +94,8 @@ def _pressing(m: Mechanism, turns: int, gas: dict[str, Any] | None) -> np.ndarra
 
 def _on_pin(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
     """Of the rod."""
+    if m.shape is not None:
+        return on_eccentric(gas, m, speed)
     base, end = _moving(m, turns)
     along = -m.piston_mass * speed**2 * slope(slope(end, turns), turns).real + _pressing(m, turns, gas)
     rod = end - base
@@ -119,6 +123,9 @@ def _on_bearings(scene: Any, machine: Machine, pins: np.ndarray, speed: float) -
 
 def _torque(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
     """Of one cylinder: work of the gas less what the piston's energy takes."""
+    if m.shape is not None:
+        fired = np.mod(angles(turns) - (m.fires or 0.0), 2.0 * np.pi)
+        return np.interp(fired, angles(1, FINE), rotor_torque(gas, m), period=2.0 * np.pi) if gas else np.zeros(SAMPLES)
     _, end = _moving(m, turns)
     velocity = slope(end, turns)
     energy = 0.5 * m.piston_mass * np.abs(velocity) ** 2
@@ -136,6 +143,10 @@ def _uneven(scene: Any, machine: Machine, k: int, own: float) -> float:
     speed, gas, turns = scene.speeds[k], _gas(scene, k), machine.turns
     inertia, torque = np.full(SAMPLES, own), np.zeros(SAMPLES)
     for m in machine.mechanisms:
+        if m.shape is not None:
+            inertia += m.shape.inertia / 9.0
+            torque += _torque(m, turns, speed, gas)
+            continue
         velocity = slope(_moving(m, turns)[1], turns)
         inertia += m.piston_mass * np.abs(velocity) ** 2
         torque += _pressing(m, turns, gas) * velocity.real

@@ -59,8 +59,17 @@ class Lever:
 
 
 @dataclass(frozen=True)
+class Shape:
+    """A rotor with three flanks: to its apexes, along the shaft, and its inertia about its centre."""
+
+    radius: float
+    width: float
+    inertia: float
+
+
+@dataclass(frozen=True)
 class Mechanism:
-    """A piston on a rod on a crank, or a ram on a lever."""
+    """A piston on a rod on a crank, or a ram on a lever, or a rotor on an eccentric."""
 
     x: float
     throw: float
@@ -75,6 +84,7 @@ class Mechanism:
     centre: complex = 0j
     knuckle: Knuckle | None = None
     lever: Lever | None = None
+    shape: Shape | None = None
     bore: float = 0.0
     fires: float | None = None
     """Crank angle of its firing; None for one without gas of its own."""
@@ -115,7 +125,10 @@ def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
     phi, out = angles(turns), np.zeros((SAMPLES, 6))
     base = rod_end(m, phi)
     energy = np.zeros(SAMPLES)
-    if m.lever is None:
+    if m.shape is not None:
+        # it turns evenly about its centre
+        masses, deficit, swing = [(m.piston_mass, base)], 0.0, phi
+    elif m.lever is None:
         _, end, swing = piston(base, m.rod, m.bank, m.offset)
         masses, deficit = [(m.piston_mass, end)], m.deficit
     else:
@@ -169,27 +182,33 @@ def travel(m: Mechanism, alpha: np.ndarray) -> np.ndarray:
 
 def seiliger(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
     """Absolute pressure on a fine grid of one cycle from the firing dead centre; the cut-off is found by trying."""
-    e, n1, n2 = (gas.get(k, d) for k, d in DEFAULTS.items() if k in ("compression_ratio", *EXPONENTS))
-    intake, exhaust = number(gas.get("intake_pressure", ATMOSPHERE)), number(gas.get("exhaust_pressure", ATMOSPHERE))
-    peak, wanted = number(gas["peak_pressure"]), number(gas["imep"])
     alpha = angles(turns, FINE)
     s = travel(m, alpha)
     top, bottom = (math.asin(m.offset / (m.rod + m.radius)), math.pi + math.asin(m.offset / (m.rod - m.radius)))
     highest, lowest = travel(m, np.array([top, bottom]))
-    v = 1.0 / (e - 1.0) + (highest - s) / (highest - lowest)
+    since, down, up = np.mod(alpha - top, 2.0 * np.pi * turns), bottom - top, 2.0 * np.pi
+    strokes = np.select(
+        [since < down, since < up, since < up + down], [since / down, np.full_like(s, 1.5), np.full_like(s, 2.5)], 3.5
+    )
+    return mixed_cycle(gas, (highest - s) / (highest - lowest), strokes, 2 * turns)
+
+
+def mixed_cycle(gas: dict[str, Any], share: np.ndarray, strokes: np.ndarray, whole: int) -> np.ndarray:
+    """Absolute pressure where a chamber is so far from its smallest volume, so many strokes after it fires."""
+    e, n1, n2 = (gas.get(k, d) for k, d in DEFAULTS.items() if k in ("compression_ratio", *EXPONENTS))
+    intake, exhaust = number(gas.get("intake_pressure", ATMOSPHERE)), number(gas.get("exhaust_pressure", ATMOSPHERE))
+    peak, wanted = number(gas["peak_pressure"]), number(gas["imep"])
+    v = 1.0 / (e - 1.0) + share
     small, large = 1.0 / (e - 1.0), e / (e - 1.0)
-    since = np.mod(alpha - top, 2.0 * np.pi * turns)
-    down = bottom - top
 
     def pressure(cut_off: float) -> np.ndarray:
         burnt = peak * np.minimum(1.0, cut_off * small / v) ** n2
         compressed = intake * (large / v) ** n1
-        if turns == 1:
-            return np.where(since < down, burnt, compressed)
-        up = 2.0 * np.pi
+        if whole == 2:
+            return np.where(strokes < 1.0, burnt, compressed)
         return np.select(
-            [since < down, since < up, since < up + down], [burnt, np.full_like(v, exhaust), np.full_like(v, intake)],
-            compressed,
+            [strokes < 1.0, strokes < 2.0, strokes < 3.0],
+            [burnt, np.full_like(v, exhaust), np.full_like(v, intake)], compressed,
         )  # fmt: skip
 
     def imep(cut_off: float) -> float:
@@ -208,6 +227,10 @@ DEFAULTS = {"compression_ratio": 17.0, "compression_exponent": 1.35, "expansion_
 
 def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
     """Coefficients of the roll moment of the gas on one piston, its firing at angle 0."""
+    if m.shape is not None:
+        from attack.plain_rotary import spectrum
+
+        return spectrum(gas, m)
     area = 0.25 * math.pi * m.bore**2
     over = seiliger(gas, m, turns) - number(gas.get("crankcase_pressure", ATMOSPHERE))
     rise = slope(travel(m, angles(turns, FINE)).astype(complex), turns).real
@@ -256,11 +279,17 @@ class Machine:
     mechanisms: tuple[Mechanism, ...]
 
 
+def turns_of(engine: dict[str, Any]) -> int:
+    """Of the crank, after which loads repeat; a rotor fires once a turn."""
+    return 2 if engine["cycle"] == "four-stroke" and engine["layout"] != "rotary" else 1
+
+
 def machine(engine: dict[str, Any], order: list[int] | None = None) -> Machine:
     """Mechanisms of [engine], every number closed."""
-    turns = 2 if engine["cycle"] == "four-stroke" else 1
+    turns = turns_of(engine)
     build = {
-        "inline": _inline, "vee": _vee, "boxer": _boxer, "opposed-piston": _opposed, "radial": _radial, "parts": _parts
+        "inline": _inline, "vee": _vee, "boxer": _boxer, "opposed-piston": _opposed, "radial": _radial, "parts": _parts,
+        "rotary": _rotary,
     }[engine["layout"]]  # fmt: skip
     found = build(engine)
     given = order or engine.get("firing_order")
@@ -316,6 +345,19 @@ def _inline(e: dict[str, Any]) -> list[Mechanism]:
     places = stations(len(throws), number(e.get("cylinder_spacing", 1.0)))
     pin = number(e.get("rotating_mass", 0.0))
     return [Mechanism(x, t, 0.0, pin_mass=pin, **common) for x, t in zip(places, throws, strict=True)]
+
+
+def _rotary(e: dict[str, Any]) -> list[Mechanism]:
+    throws = _radians(e["throws"])
+    places = stations(len(throws), number(e.get("cylinder_spacing", 1.0)))
+    shape = Shape(number(e["rotor_radius"]), number(e["rotor_width"]), number(e.get("rotor_inertia", 0.0)))
+    mass, pin = number(e["rotor_mass"]), number(e.get("rotating_mass", 0.0))
+    return [
+        Mechanism(
+            x, throw, 0.0, number(e["eccentricity"]), 0.0, mass, pin, shape=shape, fires=(-throw) % (2.0 * math.pi)
+        )
+        for x, throw in zip(places, throws, strict=True)
+    ]  # fmt: skip
 
 
 def _banks(e: dict[str, Any], angle: float, throws: list[float], split: float) -> list[Mechanism]:

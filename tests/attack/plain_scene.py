@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from attack import plain_crankcase, plain_loads, plain_mounts
+from attack import plain_crankcase, plain_loads, plain_mounts, plain_rotary
 from attack.plain_loads import SAMPLES, number
 
 Table = dict[str, Any]
@@ -121,7 +121,7 @@ class Scene:
 
     @cached_property
     def turns(self) -> int:
-        return 2 if self.table["engine"]["cycle"] == "four-stroke" else 1
+        return plain_loads.turns_of(self.table["engine"])
 
     @cached_property
     def points(self) -> list[Table]:
@@ -207,6 +207,9 @@ class Scene:
             return norm_of(norm, self.signal(asked), self.weights(asked))
         if channel.endswith("mass"):
             return self.mass(channel)
+        if channel.startswith("apex"):
+            at = np.array(self.speeds)[self.weights(asked) > 0.0].max()
+            return plain_rotary.apex(self.table["engine"], float(at), 1 + channel.endswith("acceleration"))
         if channel == "degree of irregularity":
             return plain_crankcase.irregularity(self, _machine(self._key, self.order), self.weights(asked))
         block = self.mounting

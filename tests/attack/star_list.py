@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from attack.openings import is_open
+from attack.plain_loads import turns_of
 from attack.plain_scene import Table
 
 
@@ -28,9 +29,9 @@ def angles_of(engine: Table) -> Iterator[tuple[float, float]]:
 
 def even_stars(engine: Table) -> Iterator[Table]:
     """What to put into [engine], for every star that fires evenly, its first throw where cylinder 1 fires at 0."""
-    turns, count = 2 if engine["cycle"] == "four-stroke" else 1, int(engine["cylinders"])
+    turns, count = turns_of(engine), int(engine["cylinders"])
     steps = count // math.gcd(turns, count)
-    if engine["layout"] == "inline":
+    if engine["layout"] != "vee":
         for places in _stands(steps, count, [0], count // steps):
             yield {"throws": [360.0 * k / steps for k in places]}
         return
