@@ -74,8 +74,9 @@ def torque(gas: dict[str, Any], m: Mechanism) -> np.ndarray:
 
 
 def on_eccentric(gas: dict[str, Any] | None, m: Mechanism, speed: float) -> np.ndarray:
-    """Force of the rotor on its eccentric at the steps of the plain model: its flanks are pressed along their normals."""
-    assert m.shape is not None and m.fires is not None
+    """Force of the rotor on its eccentric at the steps of the plain model, its flanks pressed along their normals."""
+    assert m.shape is not None
+    assert m.fires is not None
     phi = angles(1)
     total = m.piston_mass * m.radius * speed**2 * np.exp(1j * (phi + m.throw))
     if gas is None:
