@@ -106,6 +106,10 @@ CASES = [
     (TWIN, True, "", "maximum rocking couple"),
     (SPLIT, False, "", "rms mount force"),
     (SPLIT, False, GAS, "rms roll moment"),
+    # least where two peaks, or two parts of the cycle, are as large: a bend of the objective
+    (TWIN, True, "", "maximum roll moment"),
+    (changed(TWIN, SECOND, ""), True, "", "maximum shaking force"),
+    (SPLIT, False, "", "mean rocking couple"),
 ]
 
 
@@ -119,7 +123,15 @@ def test_no_angle_is_better_than_the_bound(text: str, of_bank: bool, gas: str, n
     grid = [solve(_at(problem, angle, of_bank)).objective.value for angle in np.linspace(low, high, 13)]
     assert result.certificate.lower_bound <= min(grid) * (1.0 + 1e-9)
     assert result.objective.value <= min(grid) * (1.0 + 1e-6)
-    assert result.certificate.gap <= 2e-4
+    assert str(result.certificate.kind) == "global"
+    assert result.certificate.gap <= 1e-4
+    # close to the design, where a bend of the objective is missed by a program of smooth functions
+    at = result.phasing.ranking[0]
+    best = at.bank_angle if of_bank else at.split_pin
+    places = np.clip([best + step for step in (-1e-3, -1e-4, 1e-4, 1e-3)], low, high)
+    near = [solve(_at(problem, angle, of_bank)).objective.value for angle in places]
+    assert result.certificate.lower_bound <= min(near) * (1.0 + 1e-9)
+    assert result.objective.value <= min(near) * (1.0 + 1e-4)
 
 
 @pytest.mark.slow

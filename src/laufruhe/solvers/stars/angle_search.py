@@ -126,6 +126,9 @@ def _windows(phasing: Phasing, own: _Open) -> Iterator[FiringWindow]:
 class _AngleSearch(ThrowSearch):
     """Boxes of the angle, for every whole turn by which cylinder 2 fires later."""
 
+    # few boxes of one angle, so that steps may be many
+    most_samples, steps_cost = 6144, 2e-5
+
     def _programs(self, windows: Sequence[FiringWindow], _left_out: tuple[str, ...]) -> Iterator[Programs]:
         own = _open_angle(self._phasing)
         assert own is not None

@@ -6,19 +6,21 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_waves import ThrowWaves, averaged, averages
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.machine.firing_windows import FiringWindow
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.spectrum import common_base
 from laufruhe.problem.evaluation import over
-from laufruhe.problem.measure import load_rows
+from laufruhe.problem.measure import Measure, load_rows, selected
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.solvers.boxes.search import divided
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.design import StarDesign
 from laufruhe.solvers.stars.ranking import ranked_orders
 from laufruhe.solvers.throws.boxes import ThrowBox, ThrowPrograms
@@ -28,8 +30,8 @@ from laufruhe.solvers.throws.windows import amid, firing_of, nearest, windows_of
 Programs = tuple[Callable[[int], ThrowPrograms], Callable[[int], float], Sequence[FiringWindow]]
 """Programs at so many steps over the period, what their orders leave out of the objective, their windows."""
 
-Improve = Callable[[Candidate], StarDesign | None]
-"""The best design near a candidate, and only the allowed one."""
+Improve = Callable[[Candidate, bool], StarDesign | None]
+"""The best design near a candidate, or with its throws where they are; and only the allowed one."""
 
 MOST_BOXES = 1500
 FEWEST_SAMPLES, MOST_SAMPLES = 96, 384
@@ -43,6 +45,8 @@ _MOST_REALISED = 50
 _FINER = 1.5
 # boxes whose middle is tried: the first few, and one of so many
 _TRIED_FIRST, _TRIED_EACH, _MOST_TRIED = 2, 100, 5
+# how far from standing at one angle a mixture is whose middle is tried as it stands, and how often
+_STANDING, _MOST_STANDING = 1e-5, 12
 
 
 @dataclass(frozen=True)
@@ -98,13 +102,16 @@ class _Stage:
         Of the best design.
     left_out
         Of the objective, by the orders left out.
+    most, enough
+        Steps, and share of the value that they may cost.
     """
 
     def __init__(
         self, make: Callable[[int], ThrowPrograms], samples: int, lost: Callable[[int], float], value: float,
-        left_out: Callable[[int], float],
+        left_out: Callable[[int], float], most: int = MOST_SAMPLES, enough: float = STEPS_COST,
     ) -> None:  # fmt: skip
         self._make, self._samples, self._lost, self._value, self._left_out = make, samples, lost, value, left_out
+        self._most, self._enough = most, enough
 
     @cached_property
     def programs(self) -> ThrowPrograms:
@@ -119,9 +126,10 @@ class _Stage:
     @cached_property
     def next(self) -> _Stage | None:
         """With twice as many; None where these are enough."""
-        if self._lost(self._samples) <= STEPS_COST * self._value or 2 * self._samples > MOST_SAMPLES:
+        finer = 2 * self._samples
+        if self._lost(self._samples) <= self._enough * self._value or finer > self._most:
             return None
-        found = _Stage(self._make, 2 * self._samples, self._lost, self._value, self._left_out)
+        found = _Stage(self._make, finer, self._lost, self._value, self._left_out, self._most, self._enough)
         # short averages know less of a pressure that jumps
         return found if found.cost < self.cost else None
 
@@ -220,17 +228,27 @@ def knows(problem: Problem) -> bool:
     return bool(problem.objective)
 
 
+def _missed(measure: Measure, best: Result, samples: int) -> float:
+    """What a peak of a design may be over its samples, wherever these stand (F7)."""
+    signals = best.final.signals(measure.load)
+    own = over(common_base([signal.repeats() for signal in signals]), signals)
+    counted = [selected(measure, signal, best.final.engine) for signal in own]
+    steps = max(samples // measure.norm.refinement, 1)
+    return measure.norm.sampling_bound(counted, measure.shares(best.problem.points), steps, 2 * samples)
+
+
 class ThrowSearch:
     """Windows and boxes of the throws of a problem."""
 
     is_shared = False
+    most_samples, steps_cost = MOST_SAMPLES, STEPS_COST
 
     def __init__(
         self, problem: Problem, phasing: Phasing, windows: Sequence[FiringWindow], improve: Improve,
         best: StarDesign | None,
     ) -> None:  # fmt: skip
         self._problem, self._phasing, self._improve = problem, phasing, improve
-        self._seen = self._tried = 0
+        self._seen = self._tried = self._stood = 0
         self._best, self._not_met = _Best(best), set[str]()
         self.roots: list[tuple[_Stage, FiringWindow, tuple[str, ...]]] = []
         free = all(decision.set.lower <= 0.0 for decision in problem.unbalances)
@@ -238,7 +256,10 @@ class ThrowSearch:
             left_out = phasing.without(built)
             for make, loss, own in self._programs(windows, left_out):
                 value = best.value if best is not None and best.value > 0.0 else math.inf
-                stage = _Stage(make, FEWEST_SAMPLES, lambda samples: self._steps_cost(best, samples), value, loss)
+                stage = _Stage(
+                    make, FEWEST_SAMPLES, cache(partial(self._steps_cost, best)), value, loss, self.most_samples,
+                    self.steps_cost,
+                )  # fmt: skip
                 self.roots += [(stage, window, left_out) for window in own]
 
     @property
@@ -252,7 +273,7 @@ class ThrowSearch:
         return max(self._problem.tolerance, min(self._problem.tolerance, self.cost) + self.cost)
 
     def _steps_cost(self, best: StarDesign | None, samples: int) -> float:
-        """Of a design's value, that means averaged about the steps lose (P7)."""
+        """Of a design's value, what means averaged about the steps lose (P7), and peaks may miss between them (F7)."""
         if best is None:
             return 0.0
         problem, found = best.result.problem, best.result.final
@@ -265,6 +286,8 @@ class ThrowSearch:
                 steps = 4 * samples if term.measure.norm.averages else samples
                 rows = load_rows(term.measure, problem.points, short, found.engine, steps)
                 lost += term.weight * max(found.value(term.measure) - rows.value, 0.0)
+            elif term.measure.is_load and samples < self.most_samples:
+                lost += term.weight * _missed(term.measure, best.result, samples)
         return lost
 
     def _programs(self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]) -> Iterator[Programs]:
@@ -333,14 +356,16 @@ class ThrowSearch:
         if found is None:
             return None, None
         self._seen += 1
-        tried = self._tried < _MOST_TRIED and (self._seen <= _TRIED_FIRST or self._seen % _TRIED_EACH == 0)
-        if tried:
-            self._tried += 1
+        moving = self._tried < _MOST_TRIED and (self._seen <= _TRIED_FIRST or self._seen % _TRIED_EACH == 0)
+        stands = self._stood < _MOST_STANDING and float(found.spread.max()) < _STANDING
+        if moving or stands:
+            self._tried += moving
+            self._stood += not moving
             window = found.program.window
             candidate = replace(self.candidate(window, nearest(window, found.middle)), left_out=left_out)
-            improved = self._improve(candidate) if candidate.firing_order is not None else None
+            improved = self._improve(candidate, moving) if candidate.firing_order is not None else None
             self._best = self.better(self._best, _Best(improved))
-        return _Part(found.bound, found, stage, left_out), self._best if tried else None
+        return _Part(found.bound, found, stage, left_out), self._best if moving or stands else None
 
     @staticmethod
     def better(best: _Best, found: _Best) -> _Best:

@@ -98,9 +98,13 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     return _result(problem, phasing, even, found, tuple(trade), floor, source)
 
 
-def _near(phasing: Phasing, candidate: Candidate) -> StarDesign | None:
-    """The local optimum that a crank from a box leads to."""
-    return local_optimum(phasing, candidate, phasing.intervals)
+def _near(phasing: Phasing, candidate: Candidate, moving: bool) -> StarDesign | None:
+    """The local optimum that a crank from a box leads to; or that crank as it stands."""
+    if moving:
+        return local_optimum(phasing, candidate, phasing.intervals)
+    found = _evaluated(phasing, candidate, 0.0, moved=True)
+    is_held = found is not None and phasing.intervals.holds(firing_intervals(phasing, candidate), 1e-7)
+    return found if is_held else None
 
 
 def _narrowed(phasing: Phasing, share: float) -> Intervals:
