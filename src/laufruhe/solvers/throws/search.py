@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache, partial
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_waves import ThrowWaves, averaged, averages
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.machine.firing_windows import FiringWindow
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.spectrum import common_base
 from laufruhe.problem.evaluation import over
-from laufruhe.problem.measure import Measure, load_rows, selected
+from laufruhe.problem.measure import load_rows
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.solvers.boxes.search import divided
-from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.design import StarDesign
 from laufruhe.solvers.stars.ranking import ranked_orders
 from laufruhe.solvers.throws.boxes import ThrowBox, ThrowPrograms
 from laufruhe.solvers.throws.riders import Riders
+from laufruhe.solvers.throws.stages import FEWEST_SAMPLES, MOST_SAMPLES, STEPS_COST, Stage, missed
 from laufruhe.solvers.throws.windows import amid, firing_of, nearest, windows_of
 
 Programs = tuple[Callable[[int], ThrowPrograms], Callable[[int], float], Sequence[FiringWindow]]
@@ -34,15 +32,10 @@ Improve = Callable[[Candidate, bool], StarDesign | None]
 """The best design near a candidate, or with its throws where they are; and only the allowed one."""
 
 MOST_BOXES = 1500
-FEWEST_SAMPLES, MOST_SAMPLES = 96, 384
-# of the best design, that steps over the period may cost
-STEPS_COST = 1e-3
 # of the tolerance by which a design has to be better, for a box to be looked at
 SHARE = 0.5
 # windows that are tried for a crank that can be evaluated
 _MOST_REALISED = 50
-# of what steps cost, that a bound is beside the best design where more of them are taken
-_FINER = 1.5
 # boxes whose middle is tried: the first few, and one of so many
 _TRIED_FIRST, _TRIED_EACH, _MOST_TRIED = 2, 100, 5
 # how far from standing at one angle a mixture is whose middle is tried as it stands, and how often
@@ -80,76 +73,13 @@ class _Part:
 
     bound: float
     box: ThrowBox | None = None
-    stage: _Stage | None = None
+    stage: Stage | None = None
     left_out: tuple[str, ...] = ()
 
     @property
     def is_exact(self) -> bool:
         """Whether there is nothing left to cut."""
         return self.box is not None and self.box.is_exact
-
-
-class _Stage:
-    """Programs at so many steps over the period, and those at twice as many.
-
-    Parameters
-    ----------
-    make
-        Programs.
-    lost
-        Of the best design, that means and peaks lose by steps (P7).
-    value
-        Of the best design.
-    left_out
-        Of the objective, by the orders left out.
-    most, enough
-        Steps, and share of the value that they may cost.
-    """
-
-    def __init__(
-        self, make: Callable[[int], ThrowPrograms], samples: int, lost: Callable[[int], float], value: float,
-        left_out: Callable[[int], float], most: int = MOST_SAMPLES, enough: float = STEPS_COST,
-    ) -> None:  # fmt: skip
-        self._make, self._samples, self._lost, self._value, self._left_out = make, samples, lost, value, left_out
-        self._most, self._enough = most, enough
-
-    @cached_property
-    def programs(self) -> ThrowPrograms:
-        """With so many steps."""
-        return self._make(self._samples)
-
-    @cached_property
-    def cost(self) -> float:
-        """Share of the best design that no bound gets back."""
-        return (self._lost(self._samples) + self._left_out(self._samples)) / self._value
-
-    @cached_property
-    def next(self) -> _Stage | None:
-        """With twice as many; None where these are enough."""
-        finer = 2 * self._samples
-        if self._lost(self._samples) <= self._enough * self._value or finer > self._most:
-            return None
-        found = _Stage(self._make, finer, self._lost, self._value, self._left_out, self._most, self._enough)
-        # short averages know less of a pressure that jumps
-        return found if found.cost < self.cost else None
-
-    @cached_property
-    def finer(self) -> _Stage | None:
-        """The next, unless its numbers are too many to hold."""
-        if self.next is not None:
-            with suppress(ModelError):
-                _ = self.next.programs
-                return self.next
-        return None
-
-    def tells_all(self, bound: float, value: float, box: ThrowBox) -> bool:
-        """Whether steps cost more than what a smaller box could tell."""
-        return bound > value * (1.0 - _FINER * self.cost) or float(box.spread.sum()) < self.cost
-
-    @property
-    def last(self) -> _Stage:
-        """With the most."""
-        return self if self.next is None else self.next.last
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,15 +158,6 @@ def knows(problem: Problem) -> bool:
     return bool(problem.objective)
 
 
-def _missed(measure: Measure, best: Result, samples: int) -> float:
-    """What a peak of a design may be over its samples, wherever these stand (F7)."""
-    signals = best.final.signals(measure.load)
-    own = over(common_base([signal.repeats() for signal in signals]), signals)
-    counted = [selected(measure, signal, best.final.engine) for signal in own]
-    steps = max(samples // measure.norm.refinement, 1)
-    return measure.norm.sampling_bound(counted, measure.shares(best.problem.points), steps, 2 * samples)
-
-
 class ThrowSearch:
     """Windows and boxes of the throws of a problem."""
 
@@ -250,13 +171,13 @@ class ThrowSearch:
         self._problem, self._phasing, self._improve = problem, phasing, improve
         self._seen = self._tried = self._stood = 0
         self._best, self._not_met = _Best(best), set[str]()
-        self.roots: list[tuple[_Stage, FiringWindow, tuple[str, ...]]] = []
+        self.roots: list[tuple[Stage, FiringWindow, tuple[str, ...]]] = []
         free = all(decision.set.lower <= 0.0 for decision in problem.unbalances)
         for built in phasing.shafts.largest if free else phasing.shafts.allowed:
             left_out = phasing.without(built)
             for make, loss, own in self._programs(windows, left_out):
                 value = best.value if best is not None and best.value > 0.0 else math.inf
-                stage = _Stage(
+                stage = Stage(
                     make, FEWEST_SAMPLES, cache(partial(self._steps_cost, best)), value, loss, self.most_samples,
                     self.steps_cost,
                 )  # fmt: skip
@@ -286,8 +207,8 @@ class ThrowSearch:
                 steps = 4 * samples if term.measure.norm.averages else samples
                 rows = load_rows(term.measure, problem.points, short, found.engine, steps)
                 lost += term.weight * max(found.value(term.measure) - rows.value, 0.0)
-            elif term.measure.is_load and samples < self.most_samples:
-                lost += term.weight * _missed(term.measure, best.result, samples)
+            elif term.measure.is_load and not term.measure.norm.is_euclidean and samples < self.most_samples:
+                lost += term.weight * missed(term.measure, best.result, samples)
         return lost
 
     def _programs(self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]) -> Iterator[Programs]:
@@ -349,7 +270,7 @@ class ThrowSearch:
                 yield self._looked(stage, half, part.left_out)
 
     def _looked(
-        self, stage: _Stage, found: ThrowBox | None, left_out: tuple[str, ...]
+        self, stage: Stage, found: ThrowBox | None, left_out: tuple[str, ...]
     ) -> tuple[_Part | None, _Best | None]:
         """A box, and a better design near its middle."""
         self._not_met |= stage.programs.told
