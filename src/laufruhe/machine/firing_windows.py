@@ -135,24 +135,24 @@ class FiringBounds:
             if closed is not None:
                 yield FiringWindow(tuple(k + 1 for k in fired), tuple(laps[k] for k in range(count)), closed)
             return
-        before = fired[-1]
+        before, pins = fired[-1], self.layout.pins
         told = [self.order[len(fired)] - 1] if self.order else [k for k in range(count) if k not in laps]
+        used = {pins[j] for j in fired}
+        back, there = paths[:, pins[before]].tolist(), paths[pins[before]].tolist()
         for k in told:
-            for lap in self._laps(k, before, laps, paths):
+            own = pins[k]
+            free = self.throws is None and own not in used
+            for lap in (0,) if free else self._laps(k, before, laps[before], back[own], there[own]):
                 longer = self._apart(paths, before, laps[before], k, lap)
                 if longer is not None:
                     yield from self._grown((*fired, k), {**laps, k: lap}, longer)
 
-    def _laps(self, k: int, before: int, laps: dict[int, int], paths: Array) -> Sequence[int]:
-        """Whole turns that let cylinder k fire after another."""
-        pins, late = self.layout.pins, self.late
-        own, other = pins[k], pins[before]
-        if self.throws is None and not any(pins[j] == own for j in laps):
-            return (0,)
+    def _laps(self, k: int, before: int, lap_before: int, back: float, there: float) -> Sequence[int]:
+        """Whole turns that let cylinder k fire after another, whose throw stands `back` ahead at most, or `there` behind."""
         # 2 pi l = interval + theta_own + c_own + t_before
-        still = late[k] - late[before] + math.tau * laps[before]
-        low = self.least + still - paths[own, other]
-        high = min(self.most, math.tau) + still + paths[other, own]
+        still = self.late[k] - self.late[before] + math.tau * lap_before
+        low = self.least + still - back
+        high = min(self.most, math.tau) + still + there
         return range(math.ceil((low - SLACK) / math.tau), math.floor((high + SLACK) / math.tau) + 1)
 
     def _apart(
@@ -165,17 +165,18 @@ class FiringBounds:
         most = self.most if wrapped else min(self.most, math.tau)
         p, q = pins[before], pins[after]
         # least <= theta_p - theta_q + still <= most
-        paths = _tightened(paths, q, p, most - still + SLACK)
-        paths = _tightened(paths, p, q, still - self.least + SLACK)
-        return None if np.any(np.diag(paths) < -_ROUNDING) else paths
+        ahead, behind = most - still + SLACK, still - self.least + SLACK
+        if p == q:
+            return paths if min(ahead, behind) >= -_ROUNDING else None
+        there, back = float(paths[q, p]), float(paths[p, q])
+        # paths are shortest: the most negative circle through a new bound returns by one of them
+        if min(ahead + back, behind + min(ahead, there)) < -_ROUNDING:
+            return None
+        return _tightened(_tightened(paths, q, p, ahead), p, q, behind)
 
 
 def _tightened(paths: Array, i: int, j: int, most: float) -> Array:
     """Shortest paths when j stands no more ahead of i than this."""
-    if i == j:
-        out = paths
-        if most < -_ROUNDING:
-            out = paths.copy()
-            out[i, i] = most
-        return out
+    if most >= paths[i, j]:
+        return paths
     return np.minimum(paths, paths[:, i : i + 1] + most + paths[j : j + 1, :])

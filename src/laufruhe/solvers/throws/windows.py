@@ -25,8 +25,10 @@ def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
     if phasing.throw_bounds is not None and free and phasing.firing_order is None and not problem.feels_gas:
         # in which order they fire makes no difference
         return [firing.anywhere]
-    found = list(itertools.islice(firing.windows(), 4 * MOST_WINDOWS + 1))
-    if len(found) <= 4 * MOST_WINDOWS and _has_images(problem, phasing):
+    # of four images one stays
+    images = 4 if _has_images(problem, phasing) else 1
+    found = list(itertools.islice(firing.windows(), images * MOST_WINDOWS + 1))
+    if images > 1 and len(found) <= images * MOST_WINDOWS:
         found = _without_images(found, len(layout.positions))
     if len(found) > MOST_WINDOWS:
         return [firing.anywhere] if phasing.throw_bounds is not None and not problem.feels_gas else None
