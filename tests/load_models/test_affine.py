@@ -143,7 +143,7 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
         assert norm.value(x) == pytest.approx(expected.value, rel=1e-11, abs=1e-11 * size)
 
 
-@settings(max_examples=12)
+@settings(max_examples=4)
 @given(x=COLUMNS)
 def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) -> None:
     """As above; a bearing feels the cylinders beside it alone, so that its period is the whole cycle."""

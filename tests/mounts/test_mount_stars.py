@@ -38,7 +38,7 @@ balance_factor = { between = [0, 1] }
 """
 HEAVY_END = ('["0 mm", "0 mm", "120 mm"]', '["60 mm", "0 mm", "120 mm"]')
 FORCE = '[objective]\nminimise = "mean mount force"\n[[constraints]]\nlimit = "static sag"\nmax = "4 mm"\n'
-SEARCH = "[search]\nstarts = 2\n"
+SEARCH = "[search]\nstarts = 2\nboxes = 4\n"
 UNEVEN = '[phasing]\nintervals = { largest_deviation = "8 deg" }\nbest = 2\n'
 STARS = ([0, 180, 180, 0], [0, 180, 0, 180], [0, 0, 180, 180])
 

@@ -146,7 +146,9 @@ def test_one_open_throw_is_where_a_fine_grid_is_least(tmp_path, cycle):
     count = len(order)
     engine = f"throws = {throws}\nfiring_order = {list(order)}"
     allowed = 'intervals = { largest_deviation = "300 deg" }'
-    problem = engines.problem(tmp_path, count, cycle, engine, allowed, GAS + MOUNT_FORCE)
+    # bounds are not looked at here
+    few = "[search]\nboxes = 20\n"
+    problem = engines.problem(tmp_path, count, cycle, engine, allowed, GAS + MOUNT_FORCE + few)
     result = solve(problem)
     phasing = problem.phasing
     grid = {}
@@ -160,7 +162,7 @@ def test_one_open_throw_is_where_a_fine_grid_is_least(tmp_path, cycle):
     assert abs(math.degrees(result.decisions[1].value) - least) < 2.0
     assert result.objective.value < result.objective.initial
     # gas is what decides here
-    motored = solve(engines.problem(tmp_path, count, cycle, engine, allowed, MOUNT_FORCE))
+    motored = solve(engines.problem(tmp_path, count, cycle, engine, allowed, MOUNT_FORCE + few))
     assert abs(motored.decisions[1].value - result.decisions[1].value) > math.radians(0.5)
 
 

@@ -148,7 +148,7 @@ class FiringBounds:
                     yield from self._grown((*fired, k), {**laps, k: lap}, longer)
 
     def _laps(self, k: int, before: int, lap_before: int, back: float, there: float) -> Sequence[int]:
-        """Whole turns that let cylinder k fire after another, whose throw stands `back` ahead at most, or `there` behind."""
+        """Whole turns that let cylinder k fire after another, whose throw is at most so far back, or there ahead."""
         # 2 pi l = interval + theta_own + c_own + t_before
         still = self.late[k] - self.late[before] + math.tau * lap_before
         low = self.least + still - back

@@ -31,6 +31,7 @@ _NODES = 6
 _PLACES = 0.5 - 0.5 * np.cos(math.pi * (np.arange(_NODES) + 0.5) / _NODES)
 # least stretch, and the degree of a polynomial whose coefficients it determines to enough digits
 _DEGREES_OF = ((0.01, _NODES - 1), (1e-3, 3), (1e-5, 2), (0.0, 1))
+_FACTORIALS = np.array([float(math.factorial(m)) for m in range(DEGREES)])
 _CANCELLED = 1e-12
 _MET = 1e-7
 _STEPS = 360
@@ -211,13 +212,17 @@ def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float
     angles = at[:, None, None] + (sides * stretches)[:, :, None] * _PLACES
     values = np.asarray(signal(angles.ravel()))
     values = values.reshape(len(at), 2, _NODES, *values.shape[1:])
-    jumps = np.zeros((len(at), DEGREES, *values.shape[3:]))
-    for k, side in np.ndindex(len(at), 2):
-        stretch = sides[side] * stretches[k, side]
-        degree = next(degree for least, degree in _DEGREES_OF if stretches[k, side] >= least)
-        series = np.tensordot(_fit(degree), values[k, side], axes=1)
-        for m in range(min(degree + 1, DEGREES)):
-            jumps[k, m] += sides[side] * series[m] * math.factorial(m) / stretch**m
+    found = np.zeros((*stretches.shape, DEGREES, *values.shape[3:]))
+    longest = math.inf
+    for least, degree in _DEGREES_OF:
+        own = np.nonzero((least <= stretches) & (stretches < longest))
+        longest, count = least, min(degree + 1, DEGREES)
+        series = np.tensordot(values[own], _fit(degree)[:count], axes=(1, 1))
+        # shapes (n, ..., degrees): a power of the stretch, with its side, below every one
+        signed = (sides * stretches)[own].reshape(-1, *(1,) * (series.ndim - 1))
+        series *= np.sign(signed) * _FACTORIALS[:count] / signed ** np.arange(count)
+        found[(*own, slice(count))] = np.moveaxis(series, -1, 1)
+    jumps = found[:, 0] + found[:, 1]
     # polynomials meet to a rounding where nothing jumps
     jumps[:, 0] *= np.abs(jumps[:, 0]) > _MET * np.abs(values).max(initial=0.0)
     return merged(at, jumps)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import reduce
+from functools import cached_property, reduce
 from math import gcd, lcm
 from typing import Any, Self
 
@@ -64,7 +64,7 @@ class Spectrum:
         """2 pi / b [rad]."""
         return math.tau / float(self.base)
 
-    @property
+    @cached_property
     def smooth(self) -> Self:
         """The signal without its corners: no order beyond its coefficients."""
         if self.corners is None:

@@ -158,15 +158,25 @@ def _ball(points: Array) -> tuple[float, Array, np.ndarray, Array]:
     if unit == 0.0:
         return 0.0, np.zeros(points.shape[-1]), np.zeros(1, dtype=np.intp), np.ones(1)
     scaled = points / unit
-    held = np.array([int(np.argmax(lengths(scaled - scaled.mean(axis=0))))], dtype=np.intp)
+    if scaled.shape[-1] == 1:
+        ends = np.array([np.argmin(scaled), np.argmax(scaled)], dtype=np.intp)
+        low, high = scaled[ends]
+        return 0.5 * float(high[0] - low[0]) * unit, 0.5 * (low + high) * unit, ends, np.full(2, 0.5)
+    held = np.array([int(np.argmax(_apart(scaled, scaled.mean(axis=0))))], dtype=np.intp)
     radius, centre, shares = 0.0, scaled[held[0]], np.ones(1)
     for _ in range(len(points)):
-        far = lengths(scaled - centre)
+        far = _apart(scaled, centre)
         farthest = int(np.argmax(far))
         if far[farthest] <= radius * (1.0 + SAME) or farthest in held:
             break
         held, radius, centre, shares = _of_few(scaled, np.append(held, farthest))
     return radius * unit, centre * unit, held, shares
+
+
+def _apart(points: Array, centre: Array) -> Array:
+    """Distances of points none of whose coordinates is over one."""
+    away = points - centre
+    return np.asarray(np.sqrt(np.einsum("kd,kd->k", away, away)))
 
 
 def _of_few(points: Array, few: np.ndarray) -> tuple[np.ndarray, float, Array, Array]:
@@ -180,15 +190,15 @@ def _of_few(points: Array, few: np.ndarray) -> tuple[np.ndarray, float, Array, A
                 continue
             shares = np.maximum(shares, 0.0) / np.maximum(shares, 0.0).sum()
             centre = shares @ points[chosen]
-            radius = float(lengths(points[chosen] - centre).max())
-            outside = float(lengths(points[few] - centre).max())
+            radius = float(_apart(points[chosen], centre).max())
+            outside = float(_apart(points[few], centre).max())
             if outside <= radius * (1.0 + 1e-12) and (best is None or radius < best[1]):
                 best = chosen, max(radius, outside), centre, shares
     if best is None:
         # points that all but coincide with others: a ball about their middle holds them too
         shares = np.full(len(few), 1.0 / len(few))
         centre = shares @ points[few]
-        return few, float(lengths(points[few] - centre).max()), centre, shares
+        return few, float(_apart(points[few], centre).max()), centre, shares
     return best
 
 
