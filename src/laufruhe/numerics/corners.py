@@ -215,13 +215,13 @@ def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float
     found = np.zeros((*stretches.shape, DEGREES, *values.shape[3:]))
     longest = math.inf
     for least, degree in _DEGREES_OF:
-        own = np.nonzero((least <= stretches) & (stretches < longest))
+        own = (least <= stretches) & (stretches < longest)
         longest, count = least, min(degree + 1, DEGREES)
         series = np.tensordot(values[own], _fit(degree)[:count], axes=(1, 1))
         # shapes (n, ..., degrees): a power of the stretch, with its side, below every one
         signed = (sides * stretches)[own].reshape(-1, *(1,) * (series.ndim - 1))
         series *= np.sign(signed) * _FACTORIALS[:count] / signed ** np.arange(count)
-        found[(*own, slice(count))] = np.moveaxis(series, -1, 1)
+        found[own, :count] = np.moveaxis(series, -1, 1)
     jumps = found[:, 0] + found[:, 1]
     # polynomials meet to a rounding where nothing jumps
     jumps[:, 0] *= np.abs(jumps[:, 0]) > _MET * np.abs(values).max(initial=0.0)
