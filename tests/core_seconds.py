@@ -1,6 +1,6 @@
 """What every test takes of one core, and which lane that puts it into.
 
-`slow.txt` lists what took more than a quarter of a second and bears no mark `slow` of its own; `make lanes` writes
+`slow.txt` lists what took more than a fifth of a second and bears no mark `slow` of its own; `make lanes` writes
 it anew. Nothing fails by a time: a run names what it saw over that in the fast lane.
 """
 
@@ -15,11 +15,11 @@ from time import process_time
 
 import pytest
 
-MOST = 0.25
+MOST = 0.2
 """Core-seconds that a test of the fast lane may take."""
 
 LISTED = Path(__file__).with_name("slow.txt")
-_HEAD = "# What takes over a quarter of a second of one core; written by `make lanes`.\n"
+_HEAD = "# What takes over a fifth of a second of one core; written by `make lanes`.\n"
 _NAMED = 12
 _PROPERTY = "core-seconds"
 

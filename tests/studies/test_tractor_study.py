@@ -13,7 +13,6 @@ import pytest
 import xarray as xr
 from tests.studies.conftest import PROBLEMS, parts_of
 
-from lanes import first_fast
 from laufruhe import load
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.plots.picture import draw, save_picture
@@ -22,6 +21,9 @@ from laufruhe.studies.replication.judging import CONFIRMED, counted
 
 Data = Callable[[str], xr.Dataset]
 Worth = Callable[..., Any]
+
+# a figure takes seconds to compute, whichever test needs it first
+pytestmark = pytest.mark.slow
 
 FIGURES = list(parts_of("tractor-study"))
 SIZED = ["fig-12", "fig-15", "fig-17", "fig-22", "fig-25", "fig-28"]
@@ -91,7 +93,7 @@ OURS = {
 JUDGED = [name for name in FIGURES if any(name in ours for ours in OURS.values())]
 
 
-@pytest.mark.parametrize("name", first_fast(JUDGED, 4))
+@pytest.mark.parametrize("name", JUDGED)
 def test_statements(figure: Data, name: str) -> None:
     """In every reading of the reciprocating mass."""
     data = figure(name)
@@ -104,14 +106,13 @@ def test_statements(figure: Data, name: str) -> None:
         assert own["statement"].values[~held].tolist() == NOT_CONFIRMED[reading].get(name, [])
 
 
-@pytest.mark.slow
 def test_all_are_counted(figure: Data) -> None:
     assert [*JUDGED, "reciprocating-mass"] == FIGURES
     counts = f"{PRINTED}: 38 of 45 statements are confirmed. {MEANT}: 44 of 45 statements are confirmed."
     assert counted([figure(name) for name in FIGURES]) == counts
 
 
-@pytest.mark.parametrize("name", first_fast(FIGURES, 4))
+@pytest.mark.parametrize("name", FIGURES)
 def test_picture_and_file(figure: Data, name: str, tmp_path: Path) -> None:
     """A dataset that was read again is drawn: it knows all that its picture says."""
     figure(name).to_netcdf(tmp_path / "f.nc")
