@@ -20,7 +20,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import GRAVITY
 
-MOST_STEPS, HALVINGS, CLOSED = 200, 40, 1e-12
+MOST_STEPS, HALVINGS, CLOSED, ROUNDED = 200, 40, 1e-12, 1e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,8 @@ def _balanced(stiffness: Array, stops: Stops, wrench: Array) -> Array:
             return q
         here, share = energy(q), 1.0
         for _ in range(HALVINGS):
-            if energy(q + share * step) <= here - 1e-4 * share * float(pull @ step):
+            # at a gap what is left to fall is less than what energies are rounded by
+            if energy(q + share * step) <= here - 1e-4 * share * float(pull @ step) + ROUNDED * abs(here):
                 break
             share *= 0.5
         else:

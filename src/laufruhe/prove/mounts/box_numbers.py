@@ -11,12 +11,11 @@ import numpy as np
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import total_stiffness
-from laufruhe.physics.static_cases import case_wrench, stops_of
 from laufruhe.problem import channels
-from laufruhe.problem.channels import Channel, counted_cases, motion_indices
+from laufruhe.problem.channels import Channel, motion_indices
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.prove.mounts.box_norms import counted_rows
-from laufruhe.prove.mounts.box_response import BoxModel, Lines
+from laufruhe.prove.mounts.box_cases import held_loads
+from laufruhe.prove.mounts.box_response import BoxModel
 
 SLACK = 1e-6
 """Designs count as allowed when they break a limit by less."""
@@ -70,34 +69,6 @@ def _most_along(vector: Array, modes: Array, parts: Array) -> Array:
     together = np.sqrt(np.sum(np.where(near, along, 0.0) ** 2, axis=2))
     together += np.sum(np.where(near, 0.0, along * parts), axis=2)
     return np.asarray(np.minimum(together, np.sum(along * parts, axis=2)))
-
-
-def held_loads(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
-    """Least of the largest travel or force under load cases over boxes, shape (boxes,) (E37, E55).
-
-    Nothing is known where bump stops bend the stiffness.
-    """
-    mounting = model.mounting(model.lower)
-    if np.any(stops_of(mounting).stiffness):
-        return np.zeros(len(lower))
-    loads = [model.root @ case_wrench(mounting.block, case) for case in counted_cases(asked, model.problem.engine)]
-    still, none = np.zeros(len(loads)), np.zeros(len(loads), dtype=np.intp)
-    lines = Lines(none, none, still, still, np.array(loads, dtype=complex))
-    rows, factors = counted_rows(model, asked)
-    answer = model.answer(lines, model.expanded(lines, lower, upper), _AS_LOADS[asked.channel], rows, factors)
-    value, slopes = (part.real.reshape(*part.shape[:-1], -1, 3) for part in (answer.value, answer.slopes))
-    size = np.linalg.norm(value, axis=-1)
-    along = value / np.where(size > 0.0, size, 1.0)[..., None]
-    bent = np.abs(np.einsum("bknpa,bkpa->bkpn", slopes, along)).sum(axis=-1)
-    # next to a free mode an expansion does not end
-    least = np.where(np.isfinite(answer.rest)[..., None], size - bent - answer.rest[..., None], 0.0)
-    return np.asarray(np.maximum(least.max(axis=(1, 2)), 0.0))
-
-
-_AS_LOADS: Mapping[Channel, Channel] = {
-    channels.STATIC_TRAVEL: channels.MOUNT_TRAVEL,
-    channels.STATIC_FORCE: channels.MOUNT_FORCE,
-}
 
 
 def shortfall(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:

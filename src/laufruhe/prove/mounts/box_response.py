@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -250,29 +251,14 @@ class BoxModel:
         slopes = self._slopes["stiffness"] + 1j * lost
         inverse = _inverse(np.asarray(impedance, dtype=np.complex128))
         motion = np.einsum("bkij,kj->bki", inverse, lines.loads)
-        pulled = np.einsum("bkij,knjl->bknil", inverse, slopes) * halves[:, None, :, None, None]
-        first = np.einsum("bknij,bkj->bkni", pulled, motion)
-        second = np.einsum("bkmij,bknj->bkmni", pulled, first)
-        pull = np.linalg.norm(pulled, axis=(-2, -1))
-        size = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
-        rho = pull.sum(axis=-1)
-        share = np.where(rho < 1.0, rho / np.where(rho < 1.0, 1.0 - rho, 1.0), np.inf)
-        rest = np.where(size > 0.0, share * np.where(size > 0.0, size, 1.0), np.where(rho < 1.0, 0.0, np.inf))
-        return Expansion(centres, halves, motion, first, second, size, rest, pull)
+        return series(centres, halves, inverse, slopes[None], motion)
 
     def answer(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices, factors: Array) -> Answer:
         """Forces or travel, the rows of the mounts that count, with factors on them (E37)."""
-        value, slopes = self._maps(lines, at, channel, rows)
-        value, slopes = value * factors[:, None], slopes * factors[:, None]
-        first = np.einsum("bknri,bki->bknr", slopes, at.motion) - np.einsum("bkri,bkni->bknr", value, at.first)
-        second = np.einsum("bkri,bkmni->bkmnr", value, at.second) - np.einsum("bkmri,bkni->bkmnr", slopes, at.first)
-        rest = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
-        turned = np.linalg.norm(slopes, axis=(-2, -1)).sum(axis=-1)
-        rest = rest + np.linalg.norm(value, axis=(-2, -1)) * at.rest + turned * at.size
-        rest = rest + np.where(turned > 0.0, turned * np.where(turned > 0.0, at.rest, 0.0), 0.0)
-        return Answer(np.einsum("bkri,bki->bkr", value, at.motion), first, rest)
+        value, slopes = self.maps(lines, at, channel, rows)
+        return mapped(at, value * factors[:, None], slopes * factors[:, None])
 
-    def _maps(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices) -> tuple[ComplexArray, ComplexArray]:
+    def maps(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices) -> tuple[ComplexArray, ComplexArray]:
         """From motion to forces or travel at the centres, (boxes, lines, r, 6), and by side, (..., n, r, 6)."""
         boxes, count, open_numbers = len(at.centres), len(lines.omegas), len(self.lower)
         if is_travel(channel):
@@ -301,6 +287,30 @@ class BoxModel:
         still = math.sqrt(most) * float(np.linalg.norm(top.springs + 1j * top.losses))
         still = still + np.linalg.norm(self.added_forces(lines.omegas), axis=(1, 2))
         return np.asarray(motion * (still + lines.omegas * math.sqrt(most) * float(np.linalg.norm(top.dampers))))
+
+
+def series(centres: Array, halves: Array, inverse: Any, slopes: Any, motion: Any) -> Expansion:
+    """Motion over boxes from that at their centres, D(c)^-1 and the slopes of D, (boxes, lines, ...) each (E37)."""
+    pulled = np.einsum("bkij,bknjl->bknil", inverse, slopes) * halves[:, None, :, None, None]
+    first = np.einsum("bknij,bkj->bkni", pulled, motion)
+    second = np.einsum("bkmij,bknj->bkmni", pulled, first)
+    pull = np.linalg.norm(pulled, axis=(-2, -1))
+    size = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
+    rho = pull.sum(axis=-1)
+    share = np.where(rho < 1.0, rho / np.where(rho < 1.0, 1.0 - rho, 1.0), np.inf)
+    rest = np.where(size > 0.0, share * np.where(size > 0.0, size, 1.0), np.where(rho < 1.0, 0.0, np.inf))
+    return Expansion(centres, halves, motion, first, second, size, rest, pull)
+
+
+def mapped(at: Expansion, value: Any, slopes: Any) -> Answer:
+    """What maps at the centres, (boxes, lines, r, 6), and by side, (..., n, r, 6), make of motion (E37)."""
+    first = np.einsum("bknri,bki->bknr", slopes, at.motion) - np.einsum("bkri,bkni->bknr", value, at.first)
+    second = np.einsum("bkri,bkmni->bkmnr", value, at.second) - np.einsum("bkmri,bkni->bkmnr", slopes, at.first)
+    rest = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
+    turned = np.linalg.norm(slopes, axis=(-2, -1)).sum(axis=-1)
+    rest = rest + np.linalg.norm(value, axis=(-2, -1)) * at.rest + turned * at.size
+    rest = rest + np.where(turned > 0.0, turned * np.where(turned > 0.0, at.rest, 0.0), 0.0)
+    return Answer(np.einsum("bkri,bki->bkr", value, at.motion), first, rest)
 
 
 def _both_ways(second: ComplexArray) -> ComplexArray:
