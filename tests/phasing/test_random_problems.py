@@ -46,9 +46,9 @@ RIGID_SEEDS = [seed for seed in range(2, 160) if Writer(seed).mounts == RIGID]
 OTHER_SEEDS = [seed for seed in range(120) if Writer(seed).mounts not in (RIGID, OPEN)]
 OPEN_SEEDS = [seed for seed in range(50) if Writer(seed).mounts == OPEN]
 # those that take seconds each, and beyond the fast lane every other one
-LONG_RIGID = sorted({36, 60, 102, 111, 121, 154, 155, *RIGID_SEEDS[17::2]})
-LONG_OTHER = sorted({75, 88, *OTHER_SEEDS[9::2]})
-LONG_OPEN = sorted({0, 22, 33, *OPEN_SEEDS[1::2]})
+LONG_RIGID = sorted({9, 36, 60, 65, 102, 105, 111, 117, 121, 154, 155, *RIGID_SEEDS[17::2]})
+LONG_OTHER = sorted({25, 75, 88, *OTHER_SEEDS[9::2]})
+LONG_OPEN = sorted({0, 3, 10, 22, 33, *OPEN_SEEDS[1::2]})
 
 
 @pytest.mark.parametrize("seed", first_fast(RIGID_SEEDS, 16, long=LONG_RIGID))

@@ -85,9 +85,26 @@ def test_solve_by_command(tmp_path: Path) -> None:
     assert CUT_SHORT in found["certificate"]["method"]
 
 
+SWEEP = f"""
+title = "t"
+[[study.parts]]
+name = "p"
+kind = "counterweight fraction"
+title = "t"
+[[study.parts.sweep]]
+quantity = "operating_points.1.mean_piston_speed"
+from = "6 m/s"
+to = "12 m/s"
+points = 8
+[[study.parts.cases]]
+name = "single"
+problem = "{PROBLEMS / "tractor-single.toml"}"
+"""
+
+
 @pytest.mark.slow
 def test_a_study_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    words = ["study", str(PROBLEMS / "tractor-sweeps.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    words = ["study", str(written(tmp_path, SWEEP)), "--out", str(tmp_path / "out"), "--jobs", "1"]
     asked = iter(range(100))
     with monkeypatch.context() as patched:
         patched.setattr("laufruhe.studies.runner.passed", lambda: next(asked) >= 5)

@@ -20,7 +20,7 @@ from laufruhe.solvers.result import Result, Status
 from problem_files import PROBLEMS
 
 READY = PROBLEMS / "inline-five-damper.toml"
-QUICK = {"fidelity": {"samples": 180}, "tolerance": 1e-2, "search": {"starts": 4}}
+QUICK = {"fidelity": {"samples": 180}, "tolerance": 1e-2, "search": {"starts": 2}}
 STIFF = {"between": ["3e5 N m/rad", "6e5 N m/rad"], "start": "4e5 N m/rad"}
 
 
@@ -78,7 +78,9 @@ def test_a_shaft_under_a_limit_of_its_frequencies() -> None:
     """The diameter of the crank with no natural frequency in a band: the design keeps it, its bound holds on a grid."""
     crank = {"pieces": [{"length": "70 mm", "diameter": {"between": ["40 mm", "60 mm"], "start": "48 mm"}}]}
     band = {"limit": "torsional frequencies", "outside": ["300 Hz", "345 Hz"]}
-    problem = problem_of({"crank": crank, "absorbers": []}, constraints=[band])
+    # of fewer starts none ends in the better half beside the band
+    four = {"starts": 4}
+    problem = problem_of({"crank": crank, "absorbers": []}, constraints=[band], search=four)
     result = laufruhe.solve(problem)
     grid = np.linspace(0.040, 0.060, 41)
     values = {float(d): value_at(problem, [d]) for d in grid}
@@ -89,7 +91,7 @@ def test_a_shaft_under_a_limit_of_its_frequencies() -> None:
     assert result.objective.value <= min(kept) * (1.0 + 1e-6)
     assert result.certificate.lower_bound <= result.objective.value
     # without the limit there is more freedom
-    free = laufruhe.solve(problem_of({"crank": crank, "absorbers": []}))
+    free = laufruhe.solve(problem_of({"crank": crank, "absorbers": []}, search=four))
     assert free.objective.value <= result.objective.value * (1.0 + 1e-6)
     assert free.certificate.lower_bound <= min(values.values())
 
