@@ -414,6 +414,35 @@ def crankcase(rng: Generator) -> Table:
     return with_objective(rng, table, channels=("main-bearing force", "mount force"))
 
 
+INSIDE = ("main-bearing force", "crank torque", "stored work", "shaft twist", "crank-pin force", "mount force")
+
+
+def uneven_crankcase(rng: Generator) -> Table:
+    """Throws between bounds of their own in an order that they keep: bearings, torque, work or twist are minimised."""
+    table = crankcase(rng)
+    wide = 0.0
+    while wide < 3.0:
+        table = crankcase(rng)
+        told, turns = table["engine"]["throws"], 2 if table["engine"]["cycle"] == "four-stroke" else 1
+        # those that move keep away from where another fires, and from a dead centre of their own
+        at = np.sort(np.mod(-np.array(told), 360.0))
+        gaps = np.diff([*at, at[0] + 360.0])
+        wide = 0.4 * float(gaps.min()) if len(told) > 1 else 0.0
+    del turns
+    for k in rng.choice(len(told) - 1, int(rng.integers(1, min(len(told), 3))), replace=False) + 1:
+        width = min(wide, float(rng.uniform(3.0, 30.0)))
+        told[k] = {"between": [round(told[k] - width, 3), round(told[k] + width, 3)]}
+    if rng.random() < 0.5:
+        del table["counterweights"]
+    kept = [x for x in table["constraints"] if x["limit"] != "degree of irregularity"]
+    table["constraints"] = kept if rng.random() < 0.5 and kept else []
+    if not table["constraints"]:
+        del table["constraints"]
+    inside = [name for name in INSIDE if name != "shaft twist" or "torsion" in table]
+    objective = {"minimise": f"{rng.choice(NORMS)} {rng.choice(inside)}"}
+    return {**table, "objective": objective, "search": {"boxes": 60}}
+
+
 def star_of(engine: Table, count: int) -> Table:
     found = {k: v for k, v in engine.items() if k not in ("throws", "offset", "bank_stagger", "split_pin_angle")}
     return {**found, "throws": "open", "firing_order": "open", "cylinders": count}
@@ -776,6 +805,7 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "joint": joint,
     "elastic-balance": balance_on_elastic,
     "uneven": uneven,
+    "uneven crankcase": uneven_crankcase,
     "places": places,
     "leads": leads,
     "bank angle": banks,

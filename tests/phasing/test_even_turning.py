@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.errors import ModelError
 from laufruhe.files.reader import load_tables
 from laufruhe.machine.firing import lap_orders
 from laufruhe.physics.irregularity import irregularity
@@ -128,9 +127,3 @@ def test_stars_that_fire_evenly_turn_alike() -> None:
     broken = laufruhe.solve(problem_of(opened, constraints=[{**limit, "max": "0.0001"}]))
     assert broken.status is Status.INFEASIBLE
     assert "all that fire evenly turn the crank as evenly" in broken.message
-
-
-def test_throws_that_move_are_refused() -> None:
-    opened = {"throws": "open", "firing_order": "open", "cylinders": 3}
-    with pytest.raises(ModelError, match="degree of irregularity is decided with even firing or with throws that are"):
-        laufruhe.solve(problem_of(opened, phasing={"intervals": {"largest_deviation": "10 deg"}}))

@@ -25,6 +25,7 @@ from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.throws.swing import StoredBound
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.stars.design import solve_fixed
 from laufruhe.solvers.throws.starts import starts_of
@@ -59,6 +60,7 @@ def problem_of(engine: dict[str, Any], objective: str, throws: int = 3, **told: 
     bare = {key: value for key, value in THREE["engine"].items() if key not in ("firing_order", "throws")}
     whole = {key: value for key, value in THREE.items() if key not in ("constraints", "counterweights")}
     whole |= {"engine": bare | engine, "objective": {"minimise": objective}, "fidelity": {"samples": 192}}
+    whole["search"] = {"boxes": 60}
     whole["main_bearings"] = [
         {"x": f"{half - 125 * k} mm", "diameter": "80 mm", "width": "32 mm"} for k in range(throws + 1)
     ]
@@ -139,6 +141,7 @@ DECIDED = {
     "peak to peak stored work": {},
     "rms shaft stress": {"operating_points": [{"name": "a", "speed": "2500 rpm"}, {"name": "b", "speed": "3300 rpm"}]},
     "maximum shaft twist": {},
+    "degree of irregularity": {},
 }
 
 
@@ -179,3 +182,60 @@ def test_a_bank_that_is_open_beside_its_bearings() -> None:
     assert result.certificate.lower_bound <= min(values) * (1.0 + 1e-5)
     assert result.objective.value <= min(values) * (1.0 + 1e-4)
     assert result.certificate.gap < 0.02
+
+
+@pytest.mark.slow
+def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
+    """Between what the best bearings and the most even crank have: kept, and not far from the best of a grid."""
+    free = laufruhe.solve(problem_of(BETWEEN, "rms main-bearing force", counterweights=None))
+    even = laufruhe.solve(problem_of(BETWEEN, "degree of irregularity", counterweights=None))
+    degree = even.problem.objective[0].measure
+    most = 0.3 * free.final.value(degree) + 0.7 * even.objective.value
+    limit = [{"limit": "degree of irregularity", "max": most}]
+    result = laufruhe.solve(
+        problem := problem_of(BETWEEN, "rms main-bearing force", counterweights=None, constraints=limit)
+    )
+    assert result.limits[0].value <= most * (1.0 + 1e-6)
+    assert result.limits[0].value >= 0.95 * most
+    phasing, start, least = problem.phasing, starts_of(problem.phasing, None, True)[0], math.inf
+    for throws in itertools.product(
+        *(np.linspace(*pair, 12 if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds)
+    ):
+        own = replace(phasing.realise(replace(start, throws=tuple(map(float, throws)))), phasing=None)
+        found = evaluate(own)
+        if found.value(degree) <= most:
+            least = min(least, objective_value(own, found))
+    assert result.certificate.lower_bound <= least * (1.0 + 1e-5)
+    assert result.objective.value <= least * (1.0 + 1e-4)
+    told = laufruhe.solve(
+        problem_of(
+            BETWEEN,
+            "rms main-bearing force",
+            counterweights=None,
+            constraints=[{"limit": "degree of irregularity", "max": 0.5 * even.objective.value}],
+        )
+    )
+    assert told.status is Status.INFEASIBLE
+    assert told.conflict == ("degree of irregularity",)
+
+
+@pytest.mark.parametrize("inertia", [0.03, 0.1, 1.0, 20.0])
+def test_stored_work_bounds_the_degree_of_irregularity(inertia: float) -> None:
+    """T11, of random throws and loads, with flywheels that are hardly any (exact degree: T3)."""
+    problem = problem_of(BETWEEN, "degree of irregularity", counterweights=None, torsion=None,
+                         flywheel={"inertia": f"{inertia} kg m^2"})  # fmt: skip
+    phasing, rng = problem.phasing, np.random.default_rng(5)
+    start, shares = starts_of(phasing, None, True)[0], []
+    for _ in range(12):
+        throws = (0.0, *rng.uniform(1.0, 5.0, 2))
+        own = replace(phasing.realise(replace(start, throws=throws, firing_order=None)), phasing=None)
+        speed = float(rng.uniform(60.0, 400.0))
+        own = replace(own, points=tuple(replace(point, speed=speed) for point in own.points))
+        found, point = evaluate(own), own.points[0]
+        work = found.value(Measure(CHANNELS["stored work"], NORMS["peak to peak"]))
+        least = StoredBound.of(own.engine, point, own.fidelity, inertia).degree(work)
+        exact = found.value(own.objective[0].measure)
+        assert least <= exact
+        shares.append(least / exact)
+    if inertia > 10.0:
+        assert min(shares) > 0.93

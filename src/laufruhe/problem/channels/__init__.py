@@ -79,6 +79,7 @@ __all__ = [
     "SAG",
     "STATIC_FORCE",
     "STATIC_TRAVEL",
+    "STORED_WORK",
     "TORQUE_ROLL",
     "TOTAL_STIFFNESS",
     "TRANSMISSIBILITY",

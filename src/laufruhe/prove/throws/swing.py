@@ -6,8 +6,12 @@ middle it is m_h w_0^2 and no more than |m_h| (u_2 - u_1) / 2 beside it. So
 
     u_2 - u_1 >= |T_h| / h / (m_max / pi + |m_h| / 4),      delta >= (1 + (u_2 - u_1) / w_0^2)^(1/2) - 1
 
-with T of T1. Cylinders add up in T_h and m_h, each later by when it fires, so that thousands of firing orders are
-bounded at once.
+with T of T1. By the work S that is stored at even speed (T2), tight where the inertia is large (T11),
+
+    u_2 - u_1 >= S / (m_max / 2 + (J_max - J_min) / 4),
+
+for half of m times u less its middle spans no more than m_max (u_2 - u_1) / 2, and w_0^2 lies between the ends.
+Cylinders add up in T_h and m_h, each later by when it fires, so that thousands of firing orders are bounded at once.
 """
 
 from __future__ import annotations
@@ -88,6 +92,46 @@ class SwingBound:
     def _phases(self, fires: Array) -> ComplexArray:
         turned = fires[:, :, None] / self.turns * np.arange(1, self.work.shape[1] + 1)
         return np.asarray(np.exp(-2j * np.pi * turned))
+
+
+@dataclass(frozen=True)
+class StoredBound:
+    """What the work that is stored at even speed says of the degree of irregularity at one operating point (T11).
+
+    Attributes
+    ----------
+    most
+        m_max of cylinders in any phase [kg m2].
+    reach
+        The most by which their J may vary [kg m2].
+    speed
+        w_0 [rad/s].
+    """
+
+    most: float
+    reach: float
+    speed: float
+
+    @classmethod
+    def of(cls, engine: Engine, point: OperatingPoint, fidelity: Fidelity, turning: float) -> StoredBound:
+        """Of an engine whose cylinders stay what they are and fire at any angles, with an inertia beside them."""
+        angles = math.tau * np.arange(fidelity.samples) / fidelity.samples
+        alone = [replace(engine, slider_cranks=(part,)) for part in engine.slider_cranks]
+        own = [moving_inertia(one, fidelity, angles)[0] for one in alone]
+        most, least = (float(sum(map(end, own))) for end in (np.max, np.min))
+        return cls(turning + most, most - least, point.speed)
+
+    def degree(self, work: float) -> float:
+        """The least degree with so much work stored [J]."""
+        return (1.0 - SAMPLED) * (math.sqrt(1.0 + work / self._energy) - 1.0)
+
+    def work(self, degree: float) -> float:
+        """The most work that leaves a degree [J]."""
+        return ((1.0 + degree / (1.0 - SAMPLED)) ** 2 - 1.0) * self._energy
+
+    @property
+    def _energy(self) -> float:
+        return (0.5 * self.most + 0.25 * self.reach) * self.speed**2
 
 
 def _padded(series: Sequence[ComplexArray]) -> ComplexArray:

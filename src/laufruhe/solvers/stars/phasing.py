@@ -14,7 +14,7 @@ from laufruhe.machine.firing import MOST_ORDERS
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.nothing import nothing_of
-from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.solvers.conclusion import no_star, with_star
@@ -56,12 +56,7 @@ def solve_phasing(problem: Problem) -> Result:
     if phasing is None:
         raise SolverError("nothing of the phasing is open")
     wheel = of_wheel(problem)
-    if phasing.continuous and wheel:
-        rule = f"{wheel[0].name} is decided with even firing or with throws that are given"
-        raise ModelError(
-            f"{rule}; leave phasing.intervals and bounds of throws out, or ask for peak to peak stored work"
-        )
-    if phasing.throws is None and wheel:
+    if phasing.throws is None and wheel and not phasing.continuous:
         return solve_told_alike(problem, phasing, solve_phasing)
     started = time.perf_counter()
     if phasing.throws is not None:
@@ -75,6 +70,10 @@ def solve_phasing(problem: Problem) -> Result:
 
 def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
+    if of_wheel(problem):
+        alone = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
+        told = solve_told_alike(problem, alone, solve_phasing) if is_even and families_of(alone)[0] else None
+        return _uneven(problem, phasing, None if told is None or told.objective is None else told)
     if problem.feels_order and is_even and phasing.shares_throws:
         pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
         stars = [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]

@@ -199,7 +199,7 @@ class ThrowSearch:
             return 0.0
         problem, found = best.result.problem, best.result.final
         lost = 0.0
-        for term in problem.objective:
+        for term in self._problem.objective:
             if averages(problem, term.measure):
                 signals = over(problem.engine.cycle.base_order, found.signals(term.measure.load))
                 short = [averaged(problem, term.measure, signal, samples) for signal in signals]

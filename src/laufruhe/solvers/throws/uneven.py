@@ -38,6 +38,7 @@ from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import TradePoint, ranked_star, ranking_result
 from laufruhe.solvers.throws.search import Searched, search_throws
 from laufruhe.solvers.throws.starts import firing_intervals, none_fires, starts_of
+from laufruhe.solvers.throws.turning import bounding, of_other, with_work
 
 STARTS = 6
 # share of the objective as given that a search counts in at least
@@ -47,6 +48,8 @@ SOFT_LIMIT = 1e-7
 SOFTEST = 1e-6
 # share by which two ends of a search are one optimum
 SAME = 1e-6
+# how often limits are tightened that the best design breaks, by what share of its excess, and up to which
+_ATTEMPTS, _TIGHTENED, _MOST_TIGHTENED = 3, 1.2, 0.2
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 TRADE_STARTS = 3
 
@@ -82,9 +85,11 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     floor, source = _bound(problem, phasing, phasing.intervals)
     improve = partial(_near, phasing)
     first = found[0] if found else None
-    searched = search_angle(problem, phasing, first, floor, improve)
+    other = bounding(problem, first.value if first is not None else math.inf)
+    told = other(problem), of_other(phasing, other), first, floor, improve
+    searched = search_angle(*told)
     if searched is None:
-        searched = search_throws(problem, phasing, first, floor, improve)
+        searched = search_throws(*told)
     if searched is not None:
         floor, source = max(floor, searched.bound), f"{searched.boxes} {searched.what}"
         if searched.best is not None and searched.best not in found:
@@ -140,27 +145,39 @@ def _none(problem: Problem, phasing: Phasing, searched: Searched | None) -> Resu
 def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> StarDesign | None:
     """The local optimum that one star leads to; the star itself where nothing is better (S20)."""
     best = _evaluated(phasing, start, 0.0, moved=False)
+    if best is not None and not _is_kept(best):
+        best = None
     if best is not None and not intervals.holds(firing_intervals(phasing, start), 1e-7):
         best = None
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
-    problem = replace(phasing.realise(start), phasing=None)
+    problem = with_work(replace(phasing.realise(start), phasing=None))
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, intervals)
     if not moves.size or _is_nothing(best):
         return best
-    smooth = SmoothProgram(problem, _size(problem, best), moves=moves, slack=SOFT_LIMIT, softest=SOFTEST)
     prices: Mapping[Side, float] | None = None
-    for optimum in solve_nonlinear(smooth.program, _points(smooth, best), workers=1, max_seconds=30.0):
-        if not optimum.usable:
-            continue
-        candidate = moves.candidate(smooth.turns(optimum.x))
-        answer = _evaluated(phasing, candidate, optimum.kkt_residual, moved=True)
-        if answer is None or not intervals.holds(firing_intervals(phasing, candidate), 1e-7):
-            continue
-        if best is None or answer.value < best.value * (1.0 - 1e-9):
-            best, prices = answer, smooth.prices(optimum)
-        elif prices is None and answer.value < best.value * (1.0 + SAME):
-            prices = smooth.prices(optimum)
+    margin = 0.0
+    for _ in range(_ATTEMPTS):
+        smooth = SmoothProgram(problem, _size(problem, best), margin, moves, slack=SOFT_LIMIT, softest=SOFTEST)
+        least = math.inf
+        for optimum in solve_nonlinear(smooth.program, _points(smooth, best), workers=1, max_seconds=30.0):
+            if not optimum.usable:
+                continue
+            candidate = moves.candidate(smooth.turns(optimum.x))
+            answer = _evaluated(phasing, candidate, optimum.kkt_residual, moved=True)
+            if answer is None or not intervals.holds(firing_intervals(phasing, candidate), 1e-7):
+                continue
+            least = min(least, answer.result.final.excess(answer.result.problem.limits))
+            if not _is_kept(answer):
+                continue
+            if best is None or answer.value < best.value * (1.0 - 1e-9):
+                best, prices = answer, smooth.prices(optimum)
+            elif prices is None and answer.value < best.value * (1.0 + SAME):
+                prices = smooth.prices(optimum)
+        # the program knows a peak by fewer angles than the exact model, and a degree of irregularity by its work
+        if not FEASIBLE < least < _MOST_TIGHTENED:
+            break
+        margin += _TIGHTENED * least
     return None if best is None else _priced(best, prices or {})
 
 
@@ -197,15 +214,19 @@ def _points(smooth: SmoothProgram, best: StarDesign | None) -> list[Array]:
 
 
 def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: bool) -> StarDesign | None:
-    """A design by the exact model, its unbalances at their proven optimum; None if it breaks a limit."""
+    """A design by the exact model, its unbalances at their proven optimum; None where there is none."""
     try:
         design = StarDesign(
             candidate, solve_fixed(replace(phasing.realise(candidate), phasing=None)), None, residual, moved
         )
     except ModelError:
         return None
-    excess = design.result.final.excess(design.result.problem.limits)
-    return design if math.isfinite(design.value) and excess <= FEASIBLE else None
+    return design if design.result.objective is None or math.isfinite(design.result.objective.value) else None
+
+
+def _is_kept(design: StarDesign) -> bool:
+    """Whether it breaks no limit."""
+    return math.isfinite(design.value) and design.result.final.excess(design.result.problem.limits) <= FEASIBLE
 
 
 def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[float, str]:
@@ -221,6 +242,7 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
         # what stands still inside the crankcase leans with its bank
         felt = tuple(term for term in problem.objective if not term.measure.is_inside)
         problem = replace(problem, objective=felt)
+    problem = replace(problem, objective=problem.load_terms)
     return steady_bound(problem), "the steady part of the loads"
 
 
