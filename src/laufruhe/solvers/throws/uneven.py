@@ -83,13 +83,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         if found and len(steps) > 1:
             trade.append(_trade_point(problem, phasing, allowed, found[0]))
     floor, source = _bound(problem, phasing, phasing.intervals)
-    improve = partial(_near, phasing)
-    first = found[0] if found else None
-    other = bounding(problem, first.value if first is not None else math.inf)
-    told = other(problem), of_other(phasing, other), first, floor, improve
-    searched = search_angle(*told)
-    if searched is None:
-        searched = search_throws(*told)
+    searched = _searched(problem, phasing, found[0] if found else None, floor)
     if searched is not None:
         floor, source = max(floor, searched.bound), f"{searched.boxes} {searched.what}"
         if searched.best is not None and searched.best not in found:
@@ -101,6 +95,14 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         return _none(problem, phasing, searched)
     trade = [replace(point, lower_bound=max(point.lower_bound, min(floor, point.value))) for point in trade]
     return _result(problem, phasing, even, found, tuple(trade), floor, source)
+
+
+def _searched(problem: Problem, phasing: Phasing, first: StarDesign | None, floor: float) -> Searched | None:
+    """What boxes of the one angle of a vee twin, or of throws, told; None where they say nothing."""
+    other = bounding(problem, first.value if first is not None else math.inf)
+    told = other(problem), of_other(phasing, other), first, floor, partial(_near, phasing)
+    found = search_angle(*told)
+    return search_throws(*told) if found is None else found
 
 
 def _near(phasing: Phasing, candidate: Candidate, moving: bool) -> StarDesign | None:
