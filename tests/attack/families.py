@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from attack.plain_gear import SIZED
 from attack.plain_loads import number
 from attack.plain_scene import Table
 from attack.star_list import even_stars
@@ -20,7 +21,7 @@ Generator = np.random.Generator
 LOADS = ("mount force", "shaking force", "rocking couple", "roll moment")
 NORMS = ("mean", "maximum", "rms", "peak to peak")
 UNITS = {"mount force": "N", "shaking force": "N", "rocking couple": "N m", "roll moment": "N m", "mount travel": "m",
-         "main-bearing force": "N"}  # fmt: skip
+         "main-bearing force": "N", **SIZED}  # fmt: skip
 
 
 def q(value: float, unit: str, digits: int = 6) -> str:
@@ -784,6 +785,64 @@ def rotary(rng: Generator) -> Table:
     return with_objective(rng, table, channels=(*LOADS, "main-bearing force"))
 
 
+def sizes(rng: Generator) -> Table:
+    """Sizes of the running gear and weights together, under stresses that a random design nearly has."""
+    count = int(rng.integers(1, 3))
+    engine = gas_engine(rng)
+    while len(engine["throws"]) > 2:
+        engine = gas_engine(rng)
+    count, stroke = len(engine["throws"]), float(engine["stroke"].split()[0])
+    size = 1.5 * moving_mass(engine)
+    engine["cylinder_spacing"] = q(rng.uniform(1.8, 2.4) * stroke, "m")
+    apart = float(engine["cylinder_spacing"].split()[0])
+    engine["big_end"] = {
+        "diameter": q(rng.uniform(0.5, 0.7) * stroke, "m"),
+        "width": q(rng.uniform(0.3, 0.4) * stroke, "m"),
+    }
+    table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
+    if rng.random() < 0.5:
+        table["gas"] = {
+            "model": "seiliger", "peak_pressure": q(rng.uniform(55, 85), "bar"), "imep": q(rng.uniform(6.5, 10), "bar"),
+        }  # fmt: skip
+    table["main_bearings"] = [
+        {"name": f"b{k}", "x": q((0.5 * count - k) * apart + rng.uniform(-0.05, 0.05) * apart, "m"),
+         "diameter": q(rng.uniform(0.55, 0.75) * stroke, "m"), "width": q(rng.uniform(0.2, 0.35) * stroke, "m")}
+        for k in range(count + 1)
+    ]  # fmt: skip
+    table["running_gear"] = {
+        "density": "7850.0 kg/m^3",
+        "webs": {"width": q(rng.uniform(0.8, 1.2) * stroke, "m"), "thickness": q(rng.uniform(0.15, 0.3) * stroke, "m")},
+        "rod": {"diameter": q(rng.uniform(0.15, 0.3) * stroke, "m")},
+        "piston_pin": {
+            "diameter": q(rng.uniform(0.25, 0.35) * stroke, "m"), "bore": q(rng.uniform(0.1, 0.2) * stroke, "m"),
+            "length": q(rng.uniform(0.6, 0.9) * stroke, "m"),
+        },
+    }  # fmt: skip
+    gear = table["running_gear"]
+    among = [(engine["big_end"], "diameter"), (engine["big_end"], "width"), (gear["webs"], "thickness"),
+             (gear["rod"], "diameter"), (gear["piston_pin"], "diameter")]  # fmt: skip
+    for k in rng.choice(len(among), int(rng.integers(1, 4)), replace=False):
+        part, key = among[int(k)]
+        given = float(part[key].split()[0])
+        part[key] = {"between": [q(0.75 * given, "m"), q(1.5 * given, "m")], "start": q(1.2 * given, "m")}
+    weights, shafts = int(rng.integers(0, 3)), int(rng.integers(0, 2))
+    if weights:
+        table["counterweights"] = counterweights(rng, size, weights)
+    if shafts:
+        table["balancer_shafts"] = balancers(rng, size, shafts)
+    table["fidelity"], table["search"] = {"samples": 180}, {"boxes": 60}
+    if rng.random() < 0.1:
+        table["objective"] = {"minimise": "running-gear mass"}
+    else:
+        kinds = ("shaking force", "mount force", "main-bearing force", "crank-pin force")
+        table = with_objective(rng, table, channels=kinds, norms=SMOOTH)
+    stresses = [{"limit": f"maximum {name}", "side": "max", "unit": unit} for name, unit in SIZED.items()]
+    stresses.append({"limit": "throw clearance", "side": "min", "unit": "m"})
+    if weights:
+        stresses.append({"limit": "counterweight mass", "side": "max", "unit": "kg"})
+    return limits_at(rng, table, stresses, 0.9)
+
+
 FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "inline": of_unbalances(inline),
     "vee": of_unbalances(vee),
@@ -809,6 +868,7 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "places": places,
     "leads": leads,
     "bank angle": banks,
+    "sizes": sizes,
 }
 
 

@@ -19,7 +19,8 @@ from attack.plain_loads import number
 from attack.plain_scene import Scene, Table
 
 Path = tuple[Any, ...]
-OPENED = ("engine", "counterweights", "balancer_shafts", "mounts")
+OPENED = ("engine", "counterweights", "balancer_shafts", "mounts", "running_gear", "main_bearings")
+SIZED = ("running_gear", "main_bearings")
 SIGNS = {"equal": 1.0, "opposite": -1.0, "mirrored": 1.0, "mirrored opposite": -1.0}
 
 
@@ -128,7 +129,7 @@ class Openings:
 
         def look(value: Any, path: Path) -> None:
             if is_open(value):
-                if path[0] in ("engine", "mounts") or path[-1] not in ("mass", "unbalance", "angle"):
+                if path[0] in ("engine", "mounts", *SIZED) or path[-1] not in ("mass", "unbalance", "angle"):
                     found.append((path, *(number(v) for v in value["between"])))
             elif isinstance(value, dict | list):
                 for key, part in value.items() if isinstance(value, dict) else enumerate(value):
@@ -252,6 +253,10 @@ class Openings:
     def _number(self, path: Path, engine: Any, rotors: dict[str, Any], decided: dict[str, float]) -> float:
         if path[-1] == "lead":
             return math.degrees(decided[f"{_at(self.table, path[:-1])['name']}.lead"])
+        if path[0] == "running_gear" or path[:2] == ("engine", "big_end") or path == ("engine", "rod_length"):
+            return decided[".".join(path)]
+        if path[0] == "main_bearings":
+            return decided[f"{_at(self.table, path[:-1])['name']}.{path[-1]}"]
         if path[0] == "engine":
             throws, bank, split = self._angles(engine)
             if path[1] == "throws":

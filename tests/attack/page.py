@@ -23,6 +23,7 @@ FAMILIES = {
     "elastic mounts, one to four numbers open": ("elastic-few", "elastic-many"),
     "convex mounts": ("convex-mounts", "elastic-balance"),
     "mounts and unbalances together": ("joint",),
+    "sizes of the running gear with unbalances": ("sizes",),
 }
 """A family is of one method of proof; its kinds differ in what is drawn."""
 

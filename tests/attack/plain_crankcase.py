@@ -1,12 +1,16 @@
 """What happens inside the crankcase of an in-line engine, from positions and the law of the lever alone.
 
-A rod without a moment of its own pushes along itself; bearings beside a load share it as supports of a beam on two of
-them do; torque is work per angle; speed follows from energy; discs on shafts answer order by order.
+A rod without a moment of its own pushes along itself, one with a shank so that it turns as it does; bearings beside a
+load share it as supports of a beam on two of them do; torque is work per angle; speed follows from energy; discs on
+shafts answer order by order.
 """
 
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +28,7 @@ from attack.plain_loads import (
     piston,
     rod_end,
     seiliger,
+    shank_of,
     slope,
 )
 from attack.plain_rotary import on_eccentric
@@ -36,7 +41,7 @@ CHANNELS = (*FORCES, *OF_SHAFT)
 
 def signal(scene: Any, machine: Machine, channel: str, orders: list[float] | None) -> np.ndarray:
     """(points, places, samples, d) at every operating point, of some orders alone where they are named."""
-    whole = np.stack([_at(scene, machine, channel, k) for k in range(len(scene.points))])
+    whole = np.stack([at(scene, machine, channel, k) for k in range(len(scene.points))])
     if orders is None:
         return whole
     parts, multiples = np.fft.rfft(whole, axis=2), np.arange(SAMPLES // 2 + 1) / machine.turns
@@ -55,13 +60,13 @@ def irregularity(scene: Any, machine: Machine, weights: np.ndarray) -> float:
     return max(_uneven(scene, machine, k, own) for k in range(len(scene.points)) if weights[k] > 0.0)
 
 
-def _at(scene: Any, machine: Machine, channel: str, k: int) -> np.ndarray:
-    speed, gas = scene.speeds[k], _gas(scene, k)
+def at(scene: Any, machine: Machine, channel: str, k: int) -> np.ndarray:
+    speed, gas = scene.speeds[k], gas_at(scene, k)
     if channel in FORCES:
-        pins = np.array([_on_pin(m, machine.turns, speed, gas) for m in machine.mechanisms])
+        pins = np.array([on_pin(m, machine.turns, speed, gas) for m in machine.mechanisms])
         found = pins if channel == "crank-pin force" else _on_bearings(scene, machine, pins, speed)
         return np.stack([found.imag, found.real], axis=-1)
-    torques = [_torque(m, machine.turns, speed, gas) for m in machine.mechanisms]
+    torques = [torque_of(m, machine.turns, speed, gas) for m in machine.mechanisms]
     if channel == "shaft twist":
         return _twist(scene, machine, torques, speed)
     total = np.sum(torques, axis=0)
@@ -69,7 +74,7 @@ def _at(scene: Any, machine: Machine, channel: str, k: int) -> np.ndarray:
     return found[None, :, None]
 
 
-def _gas(scene: Any, k: int) -> dict[str, Any] | None:
+def gas_at(scene: Any, k: int) -> dict[str, Any] | None:
     point = scene.points[k]
     if "gas" not in scene.table or not point.get("gas", True):
         return None
@@ -82,35 +87,79 @@ def _moving(m: Mechanism, turns: int) -> tuple[np.ndarray, np.ndarray]:
     return base, piston(base, m.rod, m.bank, m.offset)[1]
 
 
+def _between(m: Mechanism, turns: int, share: float) -> np.ndarray:
+    """A place on the rod, so far from the crank pin."""
+    base, end = _moving(m, turns)
+    return base + share * (end - base)
+
+
 def _pressing(m: Mechanism, turns: int, gas: dict[str, Any] | None) -> np.ndarray:
     """Force of the gas on the piston, along its axis from the crank."""
     if gas is None or m.fires is None:
         return np.zeros(SAMPLES)
-    over = seiliger(gas, m, turns) - number(gas.get("crankcase_pressure", ATMOSPHERE))
+    weightless = replace(m, piston_mass=0.0, pin_mass=0.0, shank=0.0, x=0.0)
+    return _pressed(weightless, turns, json.dumps(gas, sort_keys=True))
+
+
+@lru_cache(maxsize=64)
+def _pressed(m: Mechanism, turns: int, gas: str) -> np.ndarray:
+    told = json.loads(gas)
+    over = seiliger(told, m, turns) - number(told.get("crankcase_pressure", ATMOSPHERE))
     fine = angles(turns, FINE)
     since = np.mod(angles(turns) - m.fires, 2.0 * np.pi * turns)
     return -0.25 * math.pi * m.bore**2 * np.interp(since, fine, over, period=2.0 * np.pi * turns)
 
 
-def _on_pin(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Moment of b at a, in a plane of complex numbers."""
+    return (np.conj(a) * b).imag
+
+
+def _pushed(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> tuple[np.ndarray, ...]:
+    """What the wall presses on the piston, across its axis, and the force on the crank pin."""
+    base, end = _moving(m, turns)
+    axis = np.exp(1j * m.bank)
+    pressing = _pressing(m, turns, gas) * axis
+    lost = m.piston_mass * speed**2 * slope(slope(end, turns), turns)
+    moment, total = _cross(end - base, lost - pressing), lost - pressing
+    for share, mass in shank_of(m):
+        own = mass * speed**2 * slope(slope(base + share * (end - base), turns), turns)
+        moment, total = moment + _cross(share * (end - base), own), total + own
+    wall = moment / _cross(end - base, 1j * axis * np.ones(len(base)))
+    return wall, wall * 1j * axis - total
+
+
+def pressing_rod(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
+    """Along the cylinder what presses the rod, half of its shank at the piston, and across it what the wall does."""
+    _, end = _moving(m, turns)
+    mass = m.piston_mass + 0.5 * m.shank
+    inertia = mass * speed**2 * (slope(slope(end, turns), turns) * np.exp(-1j * m.bank)).real
+    return _pressing(m, turns, gas) - inertia + 1j * _pushed(m, turns, speed, gas)[0]
+
+
+def on_pin(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
     """Of the rod."""
     if m.shape is not None:
         return on_eccentric(gas, m, speed)
-    base, end = _moving(m, turns)
-    along = -m.piston_mass * speed**2 * slope(slope(end, turns), turns).real + _pressing(m, turns, gas)
-    rod = end - base
-    return along * rod / rod.real
+    return _pushed(m, turns, speed, gas)[1]
+
+
+def on_shaft(scene: Any, machine: Machine, pins: Any, speed: float) -> list[tuple[float, np.ndarray]]:
+    """What stands on the crankshaft, and where."""
+    turned = np.exp(1j * angles(machine.turns))
+    loads = [(m.x, pin) for m, pin in zip(machine.mechanisms, pins, strict=True)]
+    # what turns with a throw beside its rod
+    loads += [(m.x, m.pin_mass * speed**2 * rod_end(m, angles(machine.turns))) for m in machine.mechanisms]
+    return loads + [
+        (x, unbalance * speed**2 * turned) for _, x, _, _, unbalance, _, role in scene.rotors if role == "c"
+    ]
 
 
 def _on_bearings(scene: Any, machine: Machine, pins: np.ndarray, speed: float) -> np.ndarray:
     """Each load on the two bearings beside it; what hangs over is levered up."""
     places = [number(b["x"]) for b in scene.table["main_bearings"]]
     out = np.zeros((len(places), SAMPLES), complex)
-    turned = np.exp(1j * angles(machine.turns))
-    loads = [(m.x, pin) for m, pin in zip(machine.mechanisms, pins, strict=True)]
-    # what turns with a throw beside its rod
-    loads += [(m.x, m.pin_mass * speed**2 * rod_end(m, angles(machine.turns))) for m in machine.mechanisms]
-    loads += [(x, unbalance * speed**2 * turned) for _, x, _, ratio, unbalance, _, role in scene.rotors if role == "c"]
+    loads = on_shaft(scene, machine, pins, speed)
     ranked = sorted(range(len(places)), key=lambda j: places[j])
     for x, load in loads:
         above = min(max(sum(places[j] < x for j in ranked), 1), len(ranked) - 1)
@@ -121,7 +170,7 @@ def _on_bearings(scene: Any, machine: Machine, pins: np.ndarray, speed: float) -
     return out
 
 
-def _torque(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
+def torque_of(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
     """Of one cylinder: work of the gas less what the piston's energy takes."""
     if m.shape is not None:
         fired = np.mod(angles(turns) - (m.fires or 0.0), 2.0 * np.pi)
@@ -129,6 +178,8 @@ def _torque(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) 
     _, end = _moving(m, turns)
     velocity = slope(end, turns)
     energy = 0.5 * m.piston_mass * np.abs(velocity) ** 2
+    for share, mass in shank_of(m):
+        energy += 0.5 * mass * np.abs(slope(_between(m, turns, share), turns)) ** 2
     return -(speed**2) * slope(energy, turns).real + _pressing(m, turns, gas) * velocity.real
 
 
@@ -140,12 +191,12 @@ def _integral(torque: np.ndarray, turns: int) -> np.ndarray:
 
 def _uneven(scene: Any, machine: Machine, k: int, own: float) -> float:
     """From the energy of all that moves, whose mean speed over time is the one given."""
-    speed, gas, turns = scene.speeds[k], _gas(scene, k), machine.turns
+    speed, gas, turns = scene.speeds[k], gas_at(scene, k), machine.turns
     inertia, torque = np.full(SAMPLES, own), np.zeros(SAMPLES)
     for m in machine.mechanisms:
         if m.shape is not None:
             inertia += m.shape.inertia / 9.0
-            torque += _torque(m, turns, speed, gas)
+            torque += torque_of(m, turns, speed, gas)
             continue
         velocity = slope(_moving(m, turns)[1], turns)
         inertia += m.piston_mass * np.abs(velocity) ** 2

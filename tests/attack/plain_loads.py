@@ -86,6 +86,8 @@ class Mechanism:
     lever: Lever | None = None
     shape: Shape | None = None
     bore: float = 0.0
+    shank: float = 0.0
+    """Mass of a straight rod between its pins."""
     fires: float | None = None
     """Crank angle of its firing; None for one without gas of its own."""
 
@@ -120,6 +122,12 @@ def rod_end(m: Mechanism, phi: np.ndarray) -> np.ndarray:
     return pin + k.radius * np.exp(1j * (turned + k.angle))
 
 
+def shank_of(m: Mechanism) -> list[tuple[float, float]]:
+    """Three points on a straight rod, from the crank pin, that have its mass, its centre and its inertia."""
+    aside = 0.5 * math.sqrt(0.6)
+    return [(0.5 + k * aside, w / 18.0 * m.shank) for k, w in ((-1, 5), (0, 8), (1, 5))] if m.shank else []
+
+
 def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
     """Wrench at unit speed, shape (samples, 6)."""
     phi, out = angles(turns), np.zeros((SAMPLES, 6))
@@ -131,6 +139,7 @@ def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
     elif m.lever is None:
         _, end, swing = piston(base, m.rod, m.bank, m.offset)
         masses, deficit = [(m.piston_mass, end)], m.deficit
+        masses += [(mass, base + share * (end - base)) for share, mass in shank_of(m)]
     else:
         masses, swing = lever_masses(m, m.lever, base)
         deficit = m.lever.inertia
@@ -313,8 +322,9 @@ def _common(engine: dict[str, Any], part: dict[str, Any] | None = None) -> dict[
             0.3 * stroke, 0.5 * stroke, xtol=1e-16,
         )  # fmt: skip
     return {
-        "radius": radius, "rod": rod, "piston_mass": number(told["reciprocating_mass"]), "deficit": deficit,
-        "offset": offset, "bore": number(told.get("bore", 0.0)),
+        "radius": radius, "rod": rod, "deficit": deficit, "offset": offset, "bore": number(told.get("bore", 0.0)),
+        "piston_mass": number(told["reciprocating_mass"]) + told.get("at_piston", 0.0),
+        "shank": told.get("shank", 0.0),
     }  # fmt: skip
 
 
@@ -343,7 +353,7 @@ def _radians(values: list[Any]) -> list[float]:
 def _inline(e: dict[str, Any]) -> list[Mechanism]:
     throws, common = _radians(e["throws"]), _common(e)
     places = stations(len(throws), number(e.get("cylinder_spacing", 1.0)))
-    pin = number(e.get("rotating_mass", 0.0))
+    pin = number(e.get("rotating_mass", 0.0)) + e.get("at_throw", 0.0)
     return [Mechanism(x, t, 0.0, pin_mass=pin, **common) for x, t in zip(places, throws, strict=True)]
 
 
@@ -501,6 +511,7 @@ def gas_spectrum(gas: dict[str, Any], found: Machine) -> np.ndarray:
         return total
     for m in found.mechanisms:
         if m.fires is not None:
-            one = _gas_spectrum(told, _with(m, throw=0.0, bank=0.0, x=0.0, pin_mass=0.0, fires=None), found.turns)
+            upright = _with(m, throw=0.0, bank=0.0, x=0.0, pin_mass=0.0, piston_mass=0.0, shank=0.0, fires=None)
+            one = _gas_spectrum(told, upright, found.turns)
             total += one * np.exp(-1j * orders * m.fires)
     return total

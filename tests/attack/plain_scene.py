@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from attack import plain_crankcase, plain_loads, plain_mounts, plain_rotary
+from attack import plain_crankcase, plain_gear, plain_loads, plain_mounts, plain_rotary
 from attack.plain_loads import SAMPLES, number
 
 Table = dict[str, Any]
@@ -117,7 +117,7 @@ class Scene:
 
     def __init__(self, table: Table, rotors: list[tuple[Any, ...]], order: tuple[int, ...] | None = None) -> None:
         self.table, self.rotors, self.order = table, rotors, order
-        self._key = json.dumps(table["engine"], sort_keys=True)
+        self._key = json.dumps(plain_gear.weighed(table), sort_keys=True)
 
     @cached_property
     def turns(self) -> int:
@@ -187,6 +187,9 @@ class Scene:
         _, channel = norm_and_channel(asked["quantity"])
         if channel in plain_crankcase.CHANNELS:
             return plain_crankcase.signal(self, _machine(self._key, self.order), channel, asked.get("orders"))
+        if channel in plain_gear.SIZED:
+            machine = _machine(self._key, self.order)
+            return np.stack([plain_gear.stress(self, machine, channel, k) for k in range(len(self.points))])
         found = [plain_mounts.over_cycle(c) for c in self.coefficients(channel, asked.get("orders"))]
         signal = np.stack(found).transpose(0, 2, 1, 3)
         if channel in ON_BLOCK:
@@ -205,6 +208,10 @@ class Scene:
         norm, channel = norm_and_channel(asked["quantity"])
         if norm:
             return norm_of(norm, self.signal(asked), self.weights(asked))
+        if channel == "running-gear mass":
+            return plain_gear.mass(self.table, _machine(self._key, self.order))
+        if channel == "throw clearance":
+            return plain_gear.clearance(self.table, _machine(self._key, self.order))
         if channel.endswith("mass"):
             return self.mass(channel)
         if channel.startswith("apex"):

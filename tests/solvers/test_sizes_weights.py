@@ -19,7 +19,7 @@ from laufruhe.solvers import Status
 from laufruhe.solvers.boxes.sizes import ask_cones
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result
-from problem_files import changed
+from problem_files import PROBLEMS, changed
 from solvers.test_sizes import TEXT
 
 WEIGHT = """
@@ -149,3 +149,80 @@ def test_what_is_not_decided_is_refused_in_a_line(text: str, rule: str) -> None:
     with pytest.raises(ModelError, match=rule) as refused:
         laufruhe.solve(text)
     assert "\n" not in str(refused.value)
+
+
+STARS = """
+title = "Four in line: star, sizes and a weight"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+stroke = "90 mm"
+bore = "80 mm"
+rod_length = "150 mm"
+reciprocating_mass = "0.6 kg"
+cylinders = 4
+cylinder_spacing = "120 mm"
+throws = "open"
+firing_order = "open"
+[engine.big_end]
+diameter = { between = ["35 mm", "70 mm"], start = "60 mm" }
+width = "28 mm"
+[[operating_points]]
+speed = "4000 rpm"
+[running_gear]
+density = "7850 kg/m^3"
+rod = { diameter = { between = ["10 mm", "30 mm"], start = "25 mm" } }
+[[counterweights]]
+name = "w"
+opposite_throw = 1
+unbalance = { between = ["0 kg m", "0.05 kg m"] }
+[objective]
+terms = [{ quantity = "mean rocking couple", weight = 5.0 }, { quantity = "mean shaking force" }]
+[[constraints]]
+limit = "maximum crank-pin pressure"
+max = "7 N/mm^2"
+[[constraints]]
+limit = "maximum rod stress"
+max = "60 N/mm^2"
+[fidelity]
+samples = 90
+"""
+
+
+def test_the_best_star_is_the_best_of_all_stars_each_with_its_sizes() -> None:
+    """Each star by itself, its throws given, and none is better; with a weight less it is no better."""
+    result = laufruhe.solve(STARS)
+    assert result.certificate.kind is Proof.GLOBAL
+    values = []
+    for throws in ([0, 180, 180, 0], [0, 180, 0, 180], [0, 0, 180, 180]):
+        given = changed(changed(STARS, 'throws = "open"', f"throws = {throws}"), "cylinders = 4\n", "")
+        own = laufruhe.solve(changed(given, 'firing_order = "open"\n', ""))
+        assert own.certificate.kind is Proof.GLOBAL
+        values.append(own.objective.value)
+    assert result.objective.value == pytest.approx(min(values), rel=2e-4, abs=1e-6)
+    assert max(values) > 1.1 * min(values) > 0.0
+    assert "of 3 stars" in result.certificate.method
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        ('throws = "open"', "throws = [0, { between = [100, 200] }, { between = [100, 200] }, 0]", "sizes are decided"),
+        ("cylinders = 4", "cylinders = 8", "more than 60 stars"),
+    ],
+)
+def test_stars_that_are_too_many_or_uneven_are_refused_beside_sizes(old: str, new: str, rule: str) -> None:
+    with pytest.raises(ModelError, match=rule) as refused:
+        laufruhe.solve(changed(STARS, old, new))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_weight_beside_the_length_of_the_rod_is_proven() -> None:
+    text = (PROBLEMS / "single-rod-length.toml").read_text(encoding="utf-8")
+    weight = '[[counterweights]]\nname = "w"\nopposite_throw = 1\nunbalance = { between = ["0 kg m", "0.025 kg m"] }\n'
+    result, without = laufruhe.solve(changed(text, "[objective]", f"{weight}[objective]")), laufruhe.solve(text)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value < 0.9 * without.objective.value
+    problem = result.problem
+    own = solve_unbalances(held(problem, np.array([entry.value for entry in result.decisions[1:]])))
+    assert own.objective.value == pytest.approx(result.objective.value, rel=1e-6)

@@ -113,6 +113,12 @@ def _sizes(problem: Problem) -> Result:
     return solve_within(problem, solve_sizes)
 
 
+def _star_sizes(problem: Problem) -> Result:
+    from laufruhe.solvers.stars.sizes import solve_star_sizes
+
+    return solve_within(problem, solve_star_sizes)
+
+
 def _asks_sizes(problem: Problem) -> bool:
     """Whether all that is asked is of loads that are affine in masses at an even speed, of sizes alone, or masses."""
     felt = [m.channel for m in problem.measures]
@@ -193,6 +199,7 @@ METHODS: tuple[Method, ...] = (
            lambda problem: solve_within(problem, solve_leads)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
+    Method("stars, each with boxes of sizes", frozenset({_S, _U, Kind.SIZE}), _asks_sizes, Reach.WHOLE, _star_sizes),
     Method("linear matrix inequalities", frozenset({_K}), is_convex, Reach.WHOLE, solve_convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _smooth),

@@ -112,8 +112,13 @@ class _SizeProgram(LocalProgram):
         return self.shares(HeldDesigns(problem).best_with(held, where).design.values)
 
 
-def solve_sizes(problem: Problem) -> Result:
+def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     """The best sizes and unbalances, proven where bounds of boxes close; or the limits that no sizes keep.
+
+    Parameters
+    ----------
+    known
+        Value of another design: where one is allowed here, that none of them is better is enough.
 
     Raises
     ------
@@ -130,7 +135,12 @@ def solve_sizes(problem: Problem) -> Result:
     def bounded(value: float, room: float) -> Divided:
         usual = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
         most = usual if problem.search.boxes is None else problem.search.boxes
-        return Divided(0.0, 0) if boxes is None else divided_sizes(boxes, value, room, most)
+        if boxes is None:
+            return Divided(0.0, 0)
+        if known < value < math.inf:
+            # a room is a share of the value
+            value, room = known, room * known / value
+        return divided_sizes(boxes, value, room, most)
 
     found = proven(program, best, bounded)
     if boxes is not None and found.excludes_all:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -37,6 +38,9 @@ from laufruhe.solvers.throws.starts import none_fires
 
 FINER, ROUNDS = 16, 2
 """Times as many angles at most for a search whose own are too few to prove its best star, and how often."""
+Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
+"""A star, and its steps where it fires evenly."""
+Decide: TypeAlias = Callable[[Problem, float], Result]
 
 
 def solve_phasing(problem: Problem) -> Result:
@@ -77,7 +81,7 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
     if problem.feels_order and is_even and phasing.shares_throws:
         pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
         stars = [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]
-        result = _by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
+        result = by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
         if not phasing.continuous:
             return result
         return _uneven(problem, phasing, None if result.objective is None else result)
@@ -121,13 +125,19 @@ def _with_more_angles(problem: Problem, families: Sequence[Family], result: Resu
 def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     """Throws as given: the best of their firing orders, and of the sets of shafts."""
     star = Candidate(phasing.throws or (), None, *phasing.least_geometry)
-    return _by_each_order(problem, phasing, [(star, None)])
+    return by_each_order(problem, phasing, [(star, None)])
 
 
-def _by_each_order(
-    problem: Problem, phasing: Phasing, stars: Sequence[tuple[Candidate, tuple[int, ...] | None]]
+def by_each_order(
+    problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda own, _: solve_fixed(own)
 ) -> Result:
-    """Every firing order that loads tell apart of every star, and every set of shafts, each solved by itself."""
+    """Every firing order that loads tell apart of every star, and every set of shafts, each solved by itself.
+
+    Parameters
+    ----------
+    decide
+        What else is open of one of them, where a design of a value is known.
+    """
     orders = {star: ranked_orders(phasing, star, steps) for star, steps in stars}
     if not any(orders.values()):
         return no_star(problem, none_fires(phasing)[0])
@@ -138,7 +148,7 @@ def _by_each_order(
         many = f"{MOST_ORDERS} and more firing orders and sets of shafts are too many to decide one by one"
         raise ModelError(f"{many}; give a firing order, or throws")
     designs = [replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in told]
-    every, least, complete = _solved(problem, phasing, designs)
+    every, least, complete = _solved(problem, phasing, designs, decide)
     solved = [design for design in every if design.is_met]
     if not solved:
         proven = complete and all(design.result.status is not Status.FAILED for design in every)
@@ -180,7 +190,9 @@ def _entries(
     return found
 
 
-def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) -> tuple[list[StarDesign], float, bool]:
+def _solved(
+    problem: Problem, phasing: Phasing, designs: Sequence[Candidate], decide: Decide
+) -> tuple[list[StarDesign], float, bool]:
     """Those that may be the best, the rest at its optimum; what the others are at least; whether time was enough."""
     started = time.perf_counter()
     found: list[StarDesign] = []
@@ -196,7 +208,7 @@ def _solved(problem: Problem, phasing: Phasing, designs: Sequence[Candidate]) ->
             continue
         if found and (passed() or time.perf_counter() - started > phasing.time_limit):
             return found, 0.0, False
-        result = solve_fixed(replace(phasing.realise(designs[place]), tolerance=_share(problem)))
+        result = decide(replace(phasing.realise(designs[place]), tolerance=_share(problem)), best)
         found.append(StarDesign(designs[place], result))
     return found, math.inf, True
 
