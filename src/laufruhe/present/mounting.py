@@ -85,6 +85,11 @@ def facts_of(evaluation: Evaluation) -> MountingFacts:
     )
 
 
+def at_which_stiffness(facts: MountingFacts) -> str:
+    """A sentence for pictures of modes, where stiffness depends on frequency."""
+    return " Modes are of the stiffness at rest, which changes with frequency." if facts.depends_on_frequency else ""
+
+
 def main_orders(evaluation: Evaluation, mounting: ElasticMounting) -> tuple[float, ...]:
     """Orders above zero whose drive of the modes is at least a tenth of the strongest."""
     found: dict[float, float] = {}

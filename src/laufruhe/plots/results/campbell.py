@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, limits_on, mark_points, order_entries
-from laufruhe.plots.style import AFTER, entry, entry_of_dots, headed, page, styled
+from laufruhe.plots.style import AFTER, BEFORE, entry, entry_of_dots, headed, page, styled
 from laufruhe.plots.words import FAINT, INK, beside
 from laufruhe.present.measures import changed
-from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
+from laufruhe.present.mounting import MountingFacts, at_which_stiffness, critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import number
 from laufruhe.present.speed_curves import fastest
 from laufruhe.problem import channels
@@ -32,7 +32,7 @@ def figure(result: Result) -> Figure:
     bands = [limit.outside for limit in limits_on(result, channels.FREQUENCIES) if limit.outside is not None]
     limits = limits_on(result, channels.FREQUENCIES)
     edges = [edge for limit in limits for edge in (limit.minimum, limit.maximum) if math.isfinite(edge)]
-    known = [*facts.modes.frequencies, *edges, *(edge for band in bands for edge in band), 1e-9]
+    known = [*facts.modes.frequencies, *facts.with_fluid, *edges, *(edge for band in bands for edge in band), 1e-9]
     reach = 1.1 * float(max(known))
     legend = _marked(axes, edges, bands)
     for k, order in enumerate(facts.orders):
@@ -42,9 +42,17 @@ def figure(result: Result) -> Figure:
     mark_points(axes, result, 0.98)
     critical = entry_of_dots("critical speed", color=AFTER, markersize=4.5)
     which = "of the design as decided" if changed(result) else "as given"
-    lines = f"Natural frequencies {which}, and the orders that load it most."
-    legend = [*order_entries(facts, AFTER), critical, *legend]
+    lines = f"Natural frequencies {which}, and the orders that load it most.{at_which_stiffness(facts)}"
+    legend = [*order_entries(facts, AFTER), critical, *legend, *_with_fluid(axes, facts)]
     return headed(drawn, result, "Critical speeds", lines, legend)
+
+
+def _with_fluid(axes: Axes, facts: MountingFacts) -> list[Artist]:
+    """Natural frequencies of block and fluid together, which may stand elsewhere; of these the legend."""
+    look: Any = {"color": BEFORE, "linewidth": 1.0, "linestyle": ":"}
+    for frequency in facts.with_fluid:
+        axes.axhline(frequency, zorder=1.5, **look)
+    return [entry("block and fluid together, undamped", **look)] if facts.with_fluid else []
 
 
 def _modes(axes: Axes, facts: MountingFacts) -> None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.plots.style import headed, page, series_of, styled
 from laufruhe.plots.words import SMALL, ink_on
-from laufruhe.present.mounting import MountingFacts, facts_of, is_elastic
+from laufruhe.present.mounting import MountingFacts, at_which_stiffness, facts_of, is_elastic
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
 
@@ -27,6 +27,7 @@ def figure(result: Result) -> Figure:
         _shares(axes, facts_of(one.design))
         axes.set_title(one.name, loc="left", size=10, pad=8, parse_math=False)
     lines = "Percent of each mode's kinetic energy; a motion apart from all others has 100. Bold: excited."
+    lines += at_which_stiffness(facts_of(result.final))
     return headed(drawn, result, "Natural modes", lines, [])
 
 

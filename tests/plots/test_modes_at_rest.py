@@ -1,0 +1,39 @@
+"""Pictures of modes say at which stiffness they are, where that depends on frequency."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from laufruhe.files.reader import load
+from laufruhe.plots.results import campbell, modes
+from laufruhe.present.mounting import at_which_stiffness, facts_of
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.solvers import solve
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+
+
+@pytest.mark.parametrize(("name", "depends"), [("powertrain-hydraulic", True), ("powertrain-decoupling", False)])
+def test_a_sentence_is_said_of_mounts_that_depend_on_frequency_alone(name: str, depends: bool) -> None:
+    facts = facts_of(evaluate(load(PROBLEMS / f"{name}.toml")))
+    assert ("at rest" in at_which_stiffness(facts)) is depends
+
+
+@pytest.mark.slow
+def test_both_pictures_of_modes_say_it_and_block_and_fluid_are_drawn() -> None:
+    result = solve(load(PROBLEMS / "powertrain-hydraulic.toml"))
+    for module in (campbell, modes):
+        drawn = module.figure(result)
+        words = " ".join(" ".join(text.get_text().split()) for text in drawn.texts)
+        assert "at rest" in words
+    facts = facts_of(result.final)
+    (axes,) = campbell.figure(result).axes
+    heights = [
+        float(line.get_ydata()[0])
+        for line in axes.lines
+        if line.get_linestyle() == ":" and len(set(line.get_ydata())) == 1
+    ]
+    assert len(facts.with_fluid) > 6
+    assert all(any(abs(height - each) < 1e-9 for height in heights) for each in facts.with_fluid)
