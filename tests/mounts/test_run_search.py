@@ -32,7 +32,8 @@ STOP = {"gap": "1 mm", "stiffness": "300 N/mm"}
 
 
 def tables(**more: Any) -> dict[str, Any]:
-    return {**tables_of(READY), "fidelity": {"samples": 120}, "run_up": SHORT, "search": {"starts": 6}, **more}
+    small = {"fidelity": {"samples": 120}, "run_up": SHORT, "search": {"starts": 6, "boxes": 4}}
+    return {**tables_of(READY), **small, **more}
 
 
 def limited(*limits: tuple[str, str], **more: Any) -> Problem:
@@ -95,6 +96,15 @@ def test_the_design_keeps_its_limits_when_scipy_integrates_it(ready: tuple[Probl
     assert travel.active
     assert travel.shadow_price > 0.0
     assert by_scipy(result.final.engine, problem)[1] == pytest.approx(travel.limit, rel=5e-4)
+    # both numbers are free, and one limit holds them: its price is the slope of the objective over its own
+    stiffness = np.array([decision.value for decision in result.decisions])
+    for k in range(2):
+        ends = [
+            evaluate(problem, problem.design((stiffness * (1.0 + sign * 1e-5 * np.eye(2)[k])).tolist()))
+            for sign in (-1, 1)
+        ]
+        force, moved = (np.diff([end.value(m) for end in ends])[0] for m in (problem.objective[0].measure, OF_RUNS[1]))
+        assert travel.shadow_price == pytest.approx(-force / moved, rel=5e-3)
     # what is best without the limit breaks it, and bounds what is best with it
     free = laufruhe.solve(problem.changed(limits=problem.limits[:1]))
     assert not free.final.standing(problem.limits[1]).excess <= 0.0
@@ -120,6 +130,7 @@ def test_no_pair_of_stiffnesses_on_a_grid_is_better(ready: tuple[Problem, Result
     assert result.objective.value <= best * (1.0 + 1e-6) < np.inf
 
 
+@pytest.mark.slow
 def test_peaks_are_those_of_the_last_word_and_slope_as_they_differ() -> None:
     """Of damping, place and a shaft; between coarse steps and at fine ones; with stops and without."""
     opened = {
@@ -213,14 +224,48 @@ def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
     """More freedom is never worse: the least force through a start, of mounts alone and with a weight."""
     weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
     least = {"minimise": "run-up force"}
-    mounts_alone = laufruhe.solve(limited(("static sag", "5 mm"), objective=least))
-    both = laufruhe.solve(limited(("static sag", "5 mm"), objective=least, counterweights=[weight]))
+    # a mount of its own under the weight of the block
+    given = mounts()
+    given["places"][2]["stiffness"] = [
+        "120 N/mm",
+        "120 N/mm",
+        {"between": ["60 N/mm", "400 N/mm"], "start": "300 N/mm"},
+    ]
+    asked = {"mounts": given, "objective": least, "search": {"starts": 3, "boxes": 4}}
+    mounts_alone = laufruhe.solve(limited(("static sag", "5 mm"), **asked))
+    both = laufruhe.solve(limited(("static sag", "5 mm"), counterweights=[weight], **asked))
     assert both.objective.value < mounts_alone.objective.value < mounts_alone.objective.initial
     for result in (mounts_alone, both):
         assert result.certificate.kind is Proof.LOCAL
         assert result.certificate.lower_bound == 0.0
         assert "nothing bounds a run-up alone" in result.certificate.method
         assert max(limit.value / limit.limit for limit in result.limits) <= 1.0 + 1e-5
+
+
+@pytest.mark.slow
+def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
+    """All at once: limits that the design as given breaks are kept by the exact model, at little force."""
+    given = mounts()
+    opened = {"between": ["60 N/mm", "600 N/mm"], "start": "200 N/mm"}
+    given["places"][0]["stiffness"] = ["120 N/mm", "120 N/mm", opened]
+    given["places"][2] |= {"fluid_track": {"mass": "25 kg", "bulge_stiffness": "260 N/mm", "damping": "500 N s/m"}}
+    points = [{"name": "idle", "speed": "900 rpm"}, {"name": "rated", "speed": "1500 rpm"}]
+    weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
+    problem = limited(
+        ("run-up travel", "11 mm"), ("static travel", "12 mm"), mounts=given, operating_points=points,
+        gas={"model": "seiliger", "peak_pressure": "55 bar", "imep": "3 bar"}, counterweights=[weight],
+        load_cases=[{"name": "pot hole", "times_weight": [0, 0, -3]}], search={"starts": 2, "boxes": 4},
+    )  # fmt: skip
+    result = laufruhe.solve(problem)
+    assert result.certificate.kind is not Proof.NONE
+    travel, settled = result.limits
+    assert travel.value <= travel.limit * (1.0 + 1e-5)
+    assert settled.value <= settled.limit * (1.0 + 1e-5)
+    assert result.final.value(OF_RUNS[1]) == travel.value
+    assert evaluate(problem).value(OF_RUNS[1]) > travel.limit
+    other = evaluate(problem, problem.design([2.0 + 0.0j, 300e3]))
+    assert other.excess(problem.limits) <= 0.0
+    assert result.objective.value < objective_value(problem, other)
 
 
 @pytest.mark.slow

@@ -65,7 +65,7 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
     names = " and ".join(f"'{name}'" for name in broken_limits(limits, relaxed.final))
     why = (
         f"the best design found breaks {names}: beside {others} a run-up is checked, not designed for; "
-        "relax it, or limit travel"
+        f"relax it, fix {others}, or limit travel"
     )
     return replace(with_limits(relaxed, problem.limits), status=Status.FAILED, certificate=None, message=why)
 
@@ -75,7 +75,7 @@ def _designed(
     decide: Decide,
 ) -> Result | None:  # fmt: skip
     """A design that is made for them; None where no method does that."""
-    if problem.phasing is not None or problem.fidelity.mounts != "frequency":
+    if problem.phasing is not None:
         return None
     rows = RunRows.of(problem, run_measures(problem)) if kinds <= _LINEAR else None
     if rows is not None:

@@ -32,7 +32,7 @@ NEAR = 0.05
 ITERATIONS = 150
 MOST_AROUND = 3
 # ends of a search that run-ups are followed exactly from
-MOST_REFINED = 2
+MOST_REFINED = 1
 # of a search whose every step follows run-ups
 RUN_ITERATIONS = 60
 # share of the size that a search counted in from which it is done again in a smaller one, and how often
