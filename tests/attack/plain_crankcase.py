@@ -97,17 +97,18 @@ def _pressing(m: Mechanism, turns: int, gas: dict[str, Any] | None) -> np.ndarra
     """Force of the gas on the piston, along its axis from the crank."""
     if gas is None or m.fires is None:
         return np.zeros(SAMPLES)
-    weightless = replace(m, piston_mass=0.0, pin_mass=0.0, shank=0.0, x=0.0)
-    return _pressed(weightless, turns, json.dumps(gas, sort_keys=True))
-
-
-@lru_cache(maxsize=64)
-def _pressed(m: Mechanism, turns: int, gas: str) -> np.ndarray:
-    told = json.loads(gas)
-    over = seiliger(told, m, turns) - number(told.get("crankcase_pressure", ATMOSPHERE))
+    alike = replace(m, x=0.0, throw=0.0, bank=0.0, fires=None, piston_mass=0.0, pin_mass=0.0, shank=0.0)
+    over = _over_crankcase(alike, turns, json.dumps(gas, sort_keys=True))
     fine = angles(turns, FINE)
     since = np.mod(angles(turns) - m.fires, 2.0 * np.pi * turns)
     return -0.25 * math.pi * m.bore**2 * np.interp(since, fine, over, period=2.0 * np.pi * turns)
+
+
+@lru_cache(maxsize=64)
+def _over_crankcase(m: Mechanism, turns: int, gas: str) -> np.ndarray:
+    """Pressure over that of the crankcase, on a fine grid from firing: the same wherever the throw stands."""
+    told = json.loads(gas)
+    return seiliger(told, m, turns) - number(told.get("crankcase_pressure", ATMOSPHERE))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -175,7 +175,6 @@ def test_friction_power_is_what_the_bearings_lose_in_sum(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        (("firing_order = [1, 3, 2]", 'throws = [0, 240, { between = [100, 140] }]\ncylinders = 3'), "even firing or"),
         (('x = "150 mm"', 'x = { between = ["100 mm", "150 mm"] }'), "no method decides .* place"),
     ],
 )  # fmt: skip

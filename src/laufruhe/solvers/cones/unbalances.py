@@ -29,6 +29,7 @@ from laufruhe.solvers.result import Result
 
 MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
+MANY_ROWS = 2000
 MOST_ROWS = 60_000
 # angles at which a limit is read that nothing open acts on
 FINE = 5760
@@ -89,7 +90,7 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
     -------
     The optimum, None where the limits cannot be met, and the angles that told.
     """
-    samples, best = model.full_samples, None
+    samples, best = _first_samples(model), None
     for _ in in_time(range(MOST_DOUBLINGS + 1)):
         found = _allowed(problem, model, samples, nothing)
         if found is None:
@@ -105,6 +106,13 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
             break
         samples *= 2
     return best, samples
+
+
+def _first_samples(model: AffineModel) -> int:
+    """Angles of the first program: of many half, for it is judged at twice as many, and these are all of a cycle."""
+    half = model.full_samples // 2
+    many = model.full_samples % 2 == 0 and any(len(norm.grid.weights) > MANY_ROWS for _, norm in model.at(half).terms)
+    return half if many else model.full_samples
 
 
 def _met_on_average(model: AffineModel, samples: int) -> bool:
