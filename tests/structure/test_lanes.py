@@ -1,0 +1,51 @@
+"""The list of slow tests is written from what a run measured, and no further than that run went."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import core_seconds
+from core_seconds import CoreSeconds, listed_now, mark_listed
+
+HERE = "tests/structure/test_lanes.py"
+OWN = f"{HERE}::test_a_run_lists_what_took_longer"
+
+
+@pytest.fixture
+def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A list of its own, and a run that says what tests took."""
+    path = tmp_path / "a/slow.txt"
+    path.parent.mkdir()
+    path.write_text(f"# kept\n{OWN}[not run]\n{OWN}[now quick]\n{HERE}::test_that_went\ntests/gone.py::test_a\n")
+    (tmp_path / HERE).parent.mkdir(parents=True)
+    (tmp_path / HERE).write_text("def test_a_run_lists_what_took_longer():\n")
+    monkeypatch.setattr(core_seconds, "LISTED", path)
+    config: Any = SimpleNamespace(getoption=lambda name: name == "--relist")
+    run = CoreSeconds(config)
+    for name, seconds, marks in (("now quick", 0.01, ()), ("now slow", 0.9, ()), ("marked", 0.9, ("slow",))):
+        for share in (0.25, 0.75):
+            report: Any = SimpleNamespace(
+                nodeid=f"{OWN}[{name}]", user_properties=[("core-seconds", share * seconds)], keywords=marks
+            )
+            run.pytest_runtest_logreport(report)
+    return run
+
+
+def test_a_run_lists_what_took_longer(told: CoreSeconds) -> None:
+    told.pytest_terminal_summary(SimpleNamespace())
+    assert listed_now() == [f"{OWN}[not run]", f"{OWN}[now slow]"]
+
+
+def test_what_is_listed_is_marked_unless_it_is_measured_anew(told: CoreSeconds) -> None:
+    for relist in (False, True):
+        marked: list[str] = []
+        items: Any = [
+            SimpleNamespace(nodeid=f"{OWN}[{name}]", add_marker=marked.append) for name in ("not run", "other")
+        ]
+        config: Any = SimpleNamespace(getoption=lambda name, relist=relist: relist)
+        mark_listed(config, items)
+        assert marked == ([] if relist else ["slow"])
