@@ -228,7 +228,7 @@ def test_a_natural_frequency_is_kept_out_of_a_band(tmp_path):
 def test_bounds_a_thousand_million_apart_are_searched_by_ratio(start, tmp_path):
     """The least stiffness isolates best; no start may be pushed to the middle of bounds and end above itself."""
     wide = MOUNTS.replace('"20 N/mm", "4000 N/mm"], start = "400 N/mm"', f'"1e-3 N/mm", "1e6 N/mm"], start = "{start}"')
-    result = solve(problem_of(tmp_path, ENGINE, BLOCK, wide, FORCE.format(measure="rms"), SEARCH))
+    result = solve(problem_of(tmp_path, ENGINE, BLOCK, wide, FORCE.format(measure="rms"), SEARCH + "boxes = 4\n"))
     assert result.objective.value <= result.objective.initial
     # below this only the horizontal stiffness, which is not open, is left
     assert result.objective.value == pytest.approx(0.91240, rel=1e-3)
@@ -239,7 +239,7 @@ def test_bounds_a_thousand_million_apart_are_searched_by_ratio(start, tmp_path):
 @pytest.mark.parametrize("seed", first_fast(range(10), 0, long=range(2, 10)))
 def test_ten_seeds_find_the_best_known_optimum_of_the_tractor(seed):
     problem = load(PROBLEMS / "tractor-four-elastic.toml")
-    problem = replace(problem, search=replace(problem.search, starts=2, seed=seed))
+    problem = replace(problem, search=replace(problem.search, starts=2, seed=seed, boxes=1))
     assert solve_joint(problem).objective.value == pytest.approx(4.0870, rel=1e-3)
 
 
@@ -248,5 +248,5 @@ def test_ten_seeds_find_the_best_known_optimum_of_the_tractor(seed):
 def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
     """Its six modes stand on either side of a band in many ways; more seeds in docs/theory/elastic-mounts.md."""
     problem = load(PROBLEMS / "powertrain-least-force.toml")
-    problem = replace(problem, search=replace(problem.search, starts=2, seed=seed))
+    problem = replace(problem, search=replace(problem.search, starts=2, seed=seed, boxes=1))
     assert solve_joint(problem).objective.value == pytest.approx(13.106325, rel=1e-5)
