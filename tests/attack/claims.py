@@ -25,6 +25,8 @@ SAMPLED = 1e-5
 """Of how a value is read, beside the error that the result states: samples of the plain model."""
 KINKED = 1e-4
 """The same where gas acts: its kinks lie between the samples of the plain model."""
+STEEP = 2.0
+"""Times as much of a rotor, whose gas is most of what its bearings feel."""
 KEPT = 3e-5
 """Share of a limit by which a design may pass it."""
 GAP = 1e-4
@@ -151,6 +153,7 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
     value, initial = result.objective.value, result.objective.initial
     floor = 1e-9 * max(initial if np.isfinite(initial) else 0.0, _size(table))
     reading = KINKED if "gas" in table else SAMPLED
+    reading *= STEEP if "gas" in table and table["engine"]["layout"] == "rotary" else 1.0
     _judge_value(verdict, result, scene, value, reading, floor)
     rival = _rival(openings, vector, told, value, rng, most)
     verdict.rivals = rival.looked_at if rival else 0

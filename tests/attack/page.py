@@ -57,7 +57,7 @@ FOOT = """
   for more than four numbers.
 - Stars are enumerated up to 60; firing orders, optional shafts and uneven intervals of open throws are not drawn.
 - Gas is the mixed cycle alone. The plain model resolves 4096 steps of a cycle, 32768 where gas is complained of: peaks
-  to 1e-5, with gas to 1e-4.
+  to 1e-5, with gas to 1e-4, of rotors with gas to 2e-4.
 - Of elastic mounts, bump stops, time integration, ranges of speeds, mirrored mounts and decoupling are not drawn.
 - Sizes are those of one car or tractor engine before rescaling: no twenty cylinders, no hundred mounts.
 - Errors that need two problems in one process, damaged files, memory and time limits have tests of their own.
