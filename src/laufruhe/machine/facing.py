@@ -42,10 +42,15 @@ class Facing:
         """The same in another size."""
         return Facing(self.crank_radius * length, self.rod_length * length, self.ahead)
 
+    def mirrors(self, part: SliderCrank) -> bool:
+        """Whether a piston moves as it does, so that each has half of the chamber for itself."""
+        return self.ahead == 0.0 and part.path == (self.crank_radius, self.rod_length, 0.0)
+
     def swept(self, part: SliderCrank) -> Swept:
         """The chamber that a piston shares with it."""
-        own = {field.name: getattr(part, field.name) for field in fields(SliderCrank)}
-        chamber = SharedChamber(**own)
+        if self.mirrors(part):
+            return Swept(part)
+        chamber = _chamber(part)
         return Swept(part, charge=chamber, late=chamber.fires_at * part.shaft.ratio)
 
 
@@ -97,8 +102,14 @@ class SharedChamber(SliderCrank):
         return float(self.travel(math, bottom) - self.travel(math, top))
 
 
+@lru_cache(maxsize=256)
+def _chamber(part: SliderCrank) -> SharedChamber:
+    """Of a piston: one object, so that its dead centres are sought once."""
+    return SharedChamber(**{field.name: getattr(part, field.name) for field in fields(SliderCrank)})
+
+
 def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tuple[SliderCrank, ...]:
-    """Pistons that face each other and do not mirror each other, each with the chamber that both sweep.
+    """Pistons that face each other, each with the chamber that both sweep.
 
     Raises
     ------
@@ -109,9 +120,7 @@ def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tu
     for k, part in enumerate(parts):
         for other in parts:
             if other is not part and part.faces(other):
-                facing = _facing(part, other, cycle_angle)
-                mirrors = facing.ahead == 0.0 and part.path == other.path
-                found[k] = part if mirrors else replace(part, facing=facing)
+                found[k] = replace(part, facing=_facing(part, other, cycle_angle))
     return tuple(found)
 
 

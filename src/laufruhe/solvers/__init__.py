@@ -11,7 +11,7 @@ from laufruhe.errors import ModelError, SolverError
 from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import Listener, listening, tell
-from laufruhe.problem.decision import Kind
+from laufruhe.problem.decision import Kind, LeadDrive
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -101,6 +101,12 @@ def _flywheel(problem: Problem) -> Result:
     return solve_flywheel(problem)
 
 
+def _shared_leads(problem: Problem) -> Result:
+    from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
+
+    return solve_shared_leads(problem)
+
+
 def _torsion(problem: Problem) -> Result:
     from laufruhe.solvers.boxes.torsion import solve_torsion
 
@@ -143,8 +149,22 @@ def _asks_flywheel(problem: Problem) -> bool:
 def _asks_led(problem: Problem) -> bool:
     """Whether all that is asked is of loads that what each shaft carries adds up to, or of how evenly these turn."""
     felt = all(measure.channel.adds_up_by_shafts or measure.is_mass for measure in problem.measures)
-    apart = all(part.facing is None for part in problem.engine.slider_cranks) or not problem.has_gas
-    return felt and apart and _adds_points(problem) and not problem.fidelity.is_uneven
+    return felt and not _shares_gas(problem) and _adds_points(problem) and not problem.fidelity.is_uneven
+
+
+def _shares_gas(problem: Problem) -> bool:
+    """Whether gas that is felt works between two pistons, of which one may lead."""
+    names = {drive.shaft for d in problem.decisions for drive in d.drives if isinstance(drive, LeadDrive)}
+    parts = problem.engine.slider_cranks
+    led = (part for part in parts if part.shaft.name in names)
+    return problem.feels_gas and any(part.faces(other) for part in led for other in parts if other is not part)
+
+
+def _asks_shared(problem: Problem) -> bool:
+    """Whether all that is asked is of loads on the block, or on mounts that do not give way, gas between two cranks."""
+    felt = all(m.is_mass or (m.is_load and not m.is_inside) for m in problem.measures)
+    rigid = problem.engine.block is None and not problem.fidelity.is_uneven
+    return _shares_gas(problem) and felt and rigid and _adds_points(problem)
 
 
 def _asks_places(problem: Problem) -> bool:
@@ -197,6 +217,8 @@ METHODS: tuple[Method, ...] = (
            lambda problem: solve_within(problem, solve_sharply)),
     Method("boxes of leads", frozenset({_U, Kind.LEAD}), _asks_led, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_leads)),
+    Method("boxes of leads between shared chambers", frozenset({Kind.LEAD}), _asks_shared, Reach.WHOLE,
+           lambda problem: solve_within(problem, _shared_leads)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
     Method("stars, each with boxes of sizes", frozenset({_S, _U, Kind.SIZE}), _asks_sizes, Reach.WHOLE, _star_sizes),

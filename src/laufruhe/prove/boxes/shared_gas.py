@@ -1,0 +1,256 @@
+"""What no design goes under while a crank leads another that it shares chambers with, and gas works in these (P15).
+
+The mixed cycle is one function p of the volume v over its displacement, whatever the lead d: only v hangs on it. With
+the ways x_1 of the piston that stands and x_2 of the one that leads, both towards their cranks, X = x_1 + x_2,
+
+    T = A (p - p_c) X'(gamma),       dT/dd = A p'(v) v_d X' + A (p - p_c) x_2'',
+    v_d = (x_2' - x_2'(top) - v (x_2'(bottom) - x_2'(top))) / H,       H = X(bottom) - X(top),
+
+as what is least or largest moves by no more than what it is looked at. p jumps at dead centres alone, where X' = 0, so
+that T follows from its slope. Every factor is bounded on cells of d and gamma from its value in the middle and the next
+derivative. A norm then changes by no more than that of what the shafts' masses and these torques can change by.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.led_model import LedModel
+from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank, kinematics
+from laufruhe.machine.facing import Facing
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.norms import Grid, lengths
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.mounting import mounting_of
+from laufruhe.physics.seiliger_cycle import seiliger_cut_off
+from laufruhe.physics.wrench import ROLL
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Measure, load_rows, selected
+from laufruhe.problem.problem import Problem
+
+CELLS = 1440
+"""Of a turn of the crank."""
+_STEPS = 256
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Of a piston towards its crank: radius [m] and rod ratio."""
+
+    radius: float
+    ratio: float
+
+    def at(self, angle: Array | float) -> Array:
+        """[m]."""
+        return np.asarray(self.radius * kinematics.travel(np, np.asarray(angle), self.ratio))
+
+    def slope(self, angle: Array | float) -> Array:
+        """By the angle of its crank."""
+        return np.asarray(-self.radius * kinematics.piston_velocity(np, np.asarray(angle), self.ratio))
+
+    def bend(self, angle: Array | float) -> Array:
+        """Once more."""
+        return np.asarray(-self.radius * kinematics.piston_acceleration(np, np.asarray(angle), self.ratio))
+
+    @property
+    def most(self) -> tuple[float, float, float]:
+        """What its first three derivatives do not exceed: the sums of their orders' amplitudes."""
+        orders = np.abs(np.fft.rfft(self.at(math.tau * np.arange(_STEPS) / _STEPS)))[1:] * (2.0 / _STEPS)
+        h = np.arange(1, len(orders) + 1)
+        return float(h @ orders), float(h**2 @ orders), float(h**3 @ orders)
+
+
+def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -> Array:
+    """What the torque of a shared chamber changes by at the most, on cells from the dead centre of `part` on [N m].
+
+    Parameters
+    ----------
+    part
+        The piston that stands; the other leads by up to `half` [rad] more or less than where it is.
+    """
+    other, chamber, ratio = part.facing, part.swept.chamber, part.shaft.ratio
+    assert isinstance(other, Facing)
+    count = CELLS * cycle.turns
+    own, far, ahead = _Way(part.crank_radius, part.rod_ratio), _Way(*_size(other)), other.ahead
+    gamma, g = cycle.angle * (np.arange(count) + 0.5) / count, 0.5 * cycle.angle / count
+    (m1, m2, _), (n1, n2, n3) = own.most, far.most
+    top, bottom = (ratio * angle for angle in chamber.dead_centres)
+    least, room = (float(own.at(a) + far.at(a + ahead)) for a in (top, bottom))
+    room -= least
+    first, last = float(far.slope(top + ahead)), float(far.slope(bottom + ahead))
+    # both dead centres move by no more than the lead
+    grows, loose = last - first, 4.0 * half * n2
+    narrow = room - half * (abs(grows) + loose)
+    if narrow <= 0.0:
+        return np.full(count, math.inf)
+    swept = (own.at(gamma) + far.at(gamma + ahead) - least) / room
+    rate, bend = far.slope(gamma + ahead), far.bend(gamma + ahead)
+    rough = (half * 4.0 * n1 + g * (m1 + n1)) / narrow
+    off = (g + half) * n2 + 2.0 * half * n2 + rough * (abs(grows) + loose) + loose
+    moved = (np.abs(rate - first - swept * grows) + off) / narrow
+    opening = np.abs(own.slope(gamma) + rate) + g * (m2 + n2) + half * n2
+    wide = half * moved + g * opening / narrow
+    small = 1.0 / (gas.compression_ratio - 1.0)
+    over, steep = _pressed(gas, cycle, np.maximum(swept - wide, 0.0) + small, swept + wide + small,
+                           _strokes(gamma, top, bottom, g + half, cycle))  # fmt: skip
+    return half * part.piston_area * (steep * moved * opening + over * (np.abs(bend) + (g + half) * n3))
+
+
+def _size(other: Facing) -> tuple[float, float]:
+    return other.crank_radius, other.crank_radius / other.rod_length
+
+
+def _strokes(gamma: Array, top: float, bottom: float, margin: float, cycle: Cycle) -> tuple[NDArray[np.bool_], ...]:
+    """Where a chamber may be compressing, expanding, or open."""
+    since = np.mod(gamma - (bottom - math.tau) + margin, cycle.angle) - margin
+    up, down = top - bottom + math.tau, math.tau
+    ends = cycle.angle - margin
+    compressing = (since <= up + margin) | (since >= ends)
+    expanding = (since >= up - margin) & (since <= down + margin)
+    is_open = (since >= down - margin) | (since <= margin)
+    return compressing, expanding | ((since <= margin) | (since >= ends)) & (cycle.turns == 1), is_open
+
+
+def _pressed(
+    gas: Seiliger, cycle: Cycle, low: Array, high: Array, strokes: Sequence[NDArray[np.bool_]]
+) -> tuple[Array, Array]:
+    """Pressure over that behind the pistons, and its slope by volume, the most of either while volumes lie between."""
+    small = 1.0 / (gas.compression_ratio - 1.0)
+    n1, n2, cut = gas.compression_exponent, gas.expansion_exponent, small * seiliger_cut_off(gas, cycle)
+    squeezed, later = (gas.intake_pressure * ((1.0 + small) / v) ** n1 for v in (low, high))
+    burnt = np.maximum(low, cut)
+    spent, last = (gas.peak_pressure * np.minimum(1.0, cut / v) ** n2 for v in (burnt, high))
+    still = np.full_like(low, gas.intake_pressure), np.full_like(low, gas.exhaust_pressure)
+    ends = ((squeezed, later), (spent, last), still)
+    slopes = (n1 * squeezed / low, np.where(high > cut, n2 * spent / burnt, 0.0), np.zeros_like(low))
+    over, steep = np.zeros_like(low), np.zeros_like(low)
+    for here, pair, slope in zip(strokes, ends, slopes, strict=True):
+        most = np.maximum(*(np.abs(each - gas.crankcase_pressure) for each in pair))
+        over, steep = np.maximum(over, np.where(here, most, 0.0)), np.maximum(steep, np.where(here, slope, 0.0))
+    return over, steep
+
+
+class SharedGasBoxes:
+    """Bounds of boxes of leads where gas works between two cranks."""
+
+    what = "boxes of leads"
+    at_once = 1
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        still = replace(problem, points=tuple(replace(point, gas=None) for point in problem.points))
+        self._model = LedModel(still)
+        self._names = self._model.names
+        if not all(_is_known(point.gas) for point in problem.points):
+            raise ModelError("a lead between two cranks that share chambers is decided with a seiliger cycle")
+        self._stand = self._standing(problem.engine)
+        self._masses = {m: [self._moved(m, s) for s in range(len(self._names))] for m in self._measures}
+        self._gains = {m: [self._gain(m, point) for point in problem.points] for m in self._measures}
+
+    @property
+    def _measures(self) -> list[Measure]:
+        return list(dict.fromkeys(measure for measure in self.problem.measures if measure.is_load))
+
+    def _standing(self, engine: Engine) -> list[str]:
+        """Of every chamber that is shared the piston that stands."""
+        found = []
+        for part in engine.slider_cranks:
+            for other in engine.slider_cranks:
+                if other is not part and part.faces(other):
+                    led = part.shaft.name in self._names, other.shaft.name in self._names
+                    if led == (True, True):
+                        why = "come earlier both, and one that stands is needed between two that share a chamber"
+                        raise ModelError(f"{part.shaft.name} and {other.shaft.name} {why}; fix one lead")
+                    if led[1]:
+                        found.append(part.name)
+        led_parts = (part for part in engine.slider_cranks if part.shaft.name in self._names)
+        for part in led_parts:
+            if not any(part.faces(other) for other in engine.slider_cranks if other is not part):
+                why = "comes earlier with gas of its own beside chambers that are shared; fix its lead"
+                raise ModelError(f"{part.shaft.name} {why}")
+        return found
+
+    def _moved(self, measure: Measure, shaft: int) -> float:
+        """What a norm changes by at the most for each radian by which the masses of a shaft come earlier."""
+        shares = measure.shares(self.problem.points)
+        own = [signal.derivative for signal in self._model.counted(measure, shaft)]
+        return float(measure.norm.above(own, shares[shares > 0.0]))
+
+    def _gain(self, measure: Measure, point: OperatingPoint) -> Array:
+        """What a unit of roll moment does at every place that counts, shape (places,)."""
+        engine, fidelity = self.problem.engine, self.problem.fidelity
+        wrench, mounting = Spectrum(engine.cycle.base_order, np.stack([0.0 * ROLL, ROLL]).astype(complex)), None
+        if engine.mounts:
+            mounting = mounting_of(engine, fidelity)
+        forces = mounting.forces(wrench, point.speed) if mounting is not None else None
+        loads = PointLoads(point, wrench, forces, None, engine, fidelity)
+        signal = selected(replace(measure, orders=None), measure.load.signal(loads), engine)
+        return lengths(signal.coefficients[1].real)
+
+    def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
+        found = [self._bounded(0.5 * (a + b), 0.5 * (b - a)) for a, b in zip(lower, upper, strict=True)]
+        return np.array(found), np.argmax(upper - lower, axis=1)
+
+    def _bounded(self, middle: Array, half: Array) -> float:
+        try:
+            evaluation = evaluate(self.problem, self.problem.design([float(x) for x in middle]))
+        except ModelError:
+            # pistons too far apart are no reason for others to be
+            return 0.0
+        changes = self._torques(evaluation.engine, float(half.sum()))
+
+        def least(measure: Measure) -> float:
+            if not measure.is_load:
+                return evaluation.value(measure)
+            signals = evaluation.signals(measure.load)
+            if measure.norm.averages:
+                signals = [signal.averaged(signal.period / evaluation.samples) for signal in signals]
+            rows = load_rows(measure, self.problem.points, signals, evaluation.engine, evaluation.samples)
+            by_mass = float(half @ np.array(self._masses[measure]))
+            return rows.value - by_mass - self._by_gas(measure, changes)
+
+        limits = [limit for limit in self.problem.limits if limit.measure.is_load or limit.measure.is_mass]
+        if any(least(limit.measure) > limit.maximum * (1.0 + 1e-6) for limit in limits):
+            return math.inf
+        return max(sum(term.weight * least(term.measure) for term in self.problem.objective), 0.0)
+
+    def _torques(self, engine: Engine, half: float) -> list[Array]:
+        """What the torque of all shared chambers changes by at every operating point, on cells of a cycle."""
+        found = []
+        for point in self.problem.points:
+            total = np.zeros(CELLS * engine.cycle.turns)
+            gas = self.problem.fidelity.gas_of(point)
+            for part in engine.slider_cranks:
+                if part.name in self._stand and isinstance(gas, Seiliger):
+                    own = torque_change(gas, part, engine.cycle, half)
+                    place = math.floor(part.firing_angle / engine.cycle.angle * len(total))
+                    total = total + np.maximum(np.roll(own, place), np.roll(own, place + 1))
+            found.append(total)
+        return found
+
+    def _by_gas(self, measure: Measure, changes: Sequence[Array]) -> float:
+        """What a norm can change by with the torque."""
+        shares, gains, norm = measure.shares(self.problem.points), self._gains[measure], measure.norm
+        squares = [float(np.mean(each**2)) for each in changes]
+        if norm.refinement == 1:
+            return math.sqrt(
+                sum(w * float(np.mean(k**2)) * s for w, k, s in zip(shares, gains, squares, strict=True) if w)
+            )
+        tops = [
+            math.sqrt(2.0 * len(measure.orders) * square) if measure.orders is not None else float(each.max())
+            for each, square in zip(changes, squares, strict=True)
+        ]
+        twice = norm.value(Grid(np.ones(2), 2), np.array([[1.0], [-1.0]]))
+        return twice * max((float(k.max()) * t for w, k, t in zip(shares, gains, tops, strict=True) if w), default=0.0)
+
+
+def _is_known(gas: object) -> bool:
+    return gas is None or isinstance(gas, Seiliger)

@@ -1,0 +1,138 @@
+"""Leads between two cranks with gas in the chambers that both share: the bound of torques, optima, and refusals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.errors import ModelError
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.machine import Cycle, Seiliger, Shaft, SliderCrank
+from laufruhe.machine.facing import with_shared_chambers
+from laufruhe.physics.gas_loads import chamber_torque
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.boxes.shared_gas import CELLS, torque_change
+from problem_files import PROBLEMS
+
+READY = tables_of(PROBLEMS / "opposed-pistons-lead.toml")
+
+
+def problem(quantity: str, lead: Any, **more: Any) -> Problem:
+    told = {key: value for key, value in READY.items() if key != "counterweights"}
+    told["engine"] = {**told["engine"], "crank_lead": lead, **more.pop("engine", {})}
+    told |= {"objective": {"minimise": quantity}, "tolerance": 2e-3, "fidelity": {"samples": 180}, **more}
+    return load_tables({key: value for key, value in told.items() if value is not None}, Path("shared.toml"))
+
+
+def between(low: float, high: float, **more: float) -> dict[str, Any]:
+    return {"between": [low, high], **more}
+
+
+def pair(ahead: float, ratio: float, rods: tuple[float, float], radii: tuple[float, float], cycle: Cycle) -> Any:
+    """Two pistons in one cylinder, the upper one ahead."""
+    lower = SliderCrank("lower", 0.0, radii[0], radii[0] / rods[0], 1.0, bore=0.08)
+    shaft = Shaft("upper", ratio, 0.0, 1.0)
+    upper = SliderCrank(
+        "upper", 0.0, radii[1], radii[1] / rods[1], 1.0, math.pi + ratio * ahead, math.pi, bore=0.08, shaft=shaft,
+        firing_angle=-ahead % cycle.angle,
+    )  # fmt: skip
+    return with_shared_chambers((lower, upper), cycle.angle)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_torque_changes_by_no_more_than_is_told(seed: int) -> None:
+    """At every lead of a box and every angle, by the exact cycle; and by not much less."""
+    random = np.random.default_rng(seed)
+    cycle = (Cycle.TWO_STROKE, Cycle.FOUR_STROKE)[seed % 2]
+    ratio, rods, radii = float(random.choice([-1.0, 1.0])), random.uniform(0.1, 0.35, 2), random.uniform(0.03, 0.08, 2)
+    told, ahead = (tuple(rods), tuple(radii), cycle), 0.0 if seed == 5 else random.uniform(-1.2, 1.2)
+    gas = Seiliger(peak_pressure=90e5, imep=14e5, compression_ratio=float(random.uniform(12.0, 18.0)))
+    count = CELLS * cycle.turns
+    angles = np.sort(np.concatenate([cycle.angle * (np.arange(count) + s) / count for s in (0.01, 0.5, 0.99)]))
+
+    def torque(lead: float) -> np.ndarray:
+        parts = pair(lead, ratio, *told)
+        return sum(chamber_torque(gas, part, cycle, angles - part.firing_angle) for part in parts)
+
+    for half in (1e-4, 3e-3, 0.05):
+        most = np.repeat(torque_change(gas, pair(ahead, ratio, *told)[0], cycle, half), 3)
+        here, found = torque(ahead), np.zeros(len(angles))
+        for by in (-1.0, -0.6, 0.3, 1.0):
+            found = np.maximum(found, np.abs(torque(ahead + by * half) - here))
+        assert (found <= most * (1.0 + 1e-9) + 1e-9 * np.abs(here).max()).all()
+        if half < 0.01:
+            assert np.sqrt(np.mean(most**2)) < 3.0 * np.sqrt(np.mean(found**2))
+
+
+CASES = {
+    "largest lead": problem("rms roll moment", between(0, 40)),
+    "from no lead on, inside": problem("mean mount force", between(-25, 60)),
+    "with the crank": problem("mean mount force", between(5, 60, start=10), engine={"crank_ratio": 1}),
+    "a peak": problem("maximum roll moment", between(0, 40, start=5), search={"boxes": 120}),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_no_lead_is_better_than_the_bound(name: str) -> None:
+    """Of a row of leads, each given; the design is what its own file has."""
+    own = CASES[name]
+    found = laufruhe.solve(own)
+    (decision,) = own.decisions
+    grid = [
+        objective_value(own, evaluate(own, own.design([float(lead)])))
+        for lead in np.linspace(decision.lower, decision.upper, 25)
+    ]
+    assert found.certificate.lower_bound <= min(grid) * (1.0 + 1e-9)
+    assert found.objective.value <= min(grid) * (1.0 + 1e-6)
+    if own.search.boxes is None:
+        assert str(found.certificate.kind) == "global"
+    lead = math.degrees(found.decisions[0].value)
+    given = problem("rms roll moment", lead, engine={"crank_ratio": int(own.engine.shafts[1].ratio)})
+    again = replace(given, objective=own.objective)
+    assert objective_value(own, evaluate(again)) == pytest.approx(found.objective.value, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_limits_on_a_shared_lead_are_kept_or_excluded() -> None:
+    """The least roll moment under a limit on the force that the lead leaves; and a limit that nothing keeps."""
+    force = [{"limit": "rms shaking force", "max": "300 N"}]
+    own = problem("rms roll moment", between(0, 40), constraints=force)
+    found = laufruhe.solve(own)
+    assert found.limits[0].value == pytest.approx(300.0, rel=1e-3)
+    assert found.limits[0].value <= 300.0 * (1.0 + 1e-6)
+    assert str(found.certificate.kind) == "global"
+    most = objective_value(own, evaluate(own, own.design([math.radians(40.0)])))
+    none = [{"limit": "rms roll moment", "max": f"{0.9 * most} N m"}]
+    assert str(laufruhe.solve(problem("rms shaking force", between(0, 40), constraints=none)).status) == "infeasible"
+
+
+@pytest.mark.slow
+def test_gas_that_is_not_felt_hinders_no_lead() -> None:
+    """Its forces close inside: the shaking force is decided beside weights, as without gas."""
+    told = {key: READY[key] for key in ("counterweights",)}
+    with_gas, without = (
+        laufruhe.solve(problem("rms shaking force", between(3, 40), **told, **more)) for more in ({}, {"gas": None})
+    )
+    assert with_gas.objective.value == pytest.approx(without.objective.value, rel=1e-4)
+    assert str(with_gas.certificate.kind) == "global"
+
+
+@pytest.mark.parametrize(
+    ("more", "quantity", "words"),
+    [
+        ({"gas": {"model": "wiebe", "imep": "7 bar", "start": -8, "duration": 60}}, "rms roll moment", "seiliger"),
+        ({"counterweights": READY["counterweights"]}, "mean mount force", "no method decides"),
+    ],
+)
+def test_what_is_not_known_of_shared_chambers_is_one_line(more: dict[str, Any], quantity: str, words: str) -> None:
+    with pytest.raises(ModelError, match=words) as caught:
+        laufruhe.solve(problem(quantity, between(0, 40), **more))
+    assert len(str(caught.value).splitlines()) == 1
