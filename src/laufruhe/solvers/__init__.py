@@ -21,6 +21,7 @@ from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.boxes.leads import solve_leads
 from laufruhe.solvers.boxes.places import solve_places
+from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_sharply
 from laufruhe.solvers.in_order import solve_in_order
@@ -99,12 +100,6 @@ def _flywheel(problem: Problem) -> Result:
     from laufruhe.solvers.boxes.flywheel import solve_flywheel
 
     return solve_flywheel(problem)
-
-
-def _shared_leads(problem: Problem) -> Result:
-    from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
-
-    return solve_shared_leads(problem)
 
 
 def _torsion(problem: Problem) -> Result:
@@ -218,7 +213,7 @@ METHODS: tuple[Method, ...] = (
     Method("boxes of leads", frozenset({_U, Kind.LEAD}), _asks_led, Reach.WHOLE,
            lambda problem: solve_within(problem, solve_leads)),
     Method("boxes of leads between shared chambers", frozenset({Kind.LEAD}), _asks_shared, Reach.WHOLE,
-           lambda problem: solve_within(problem, _shared_leads)),
+           lambda problem: solve_within(problem, solve_shared_leads)),
     Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, _places),
     Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
     Method("stars, each with boxes of sizes", frozenset({_S, _U, Kind.SIZE}), _asks_sizes, Reach.WHOLE, _star_sizes),
