@@ -226,3 +226,10 @@ def test_a_weight_beside_the_length_of_the_rod_is_proven() -> None:
     problem = result.problem
     own = solve_unbalances(held(problem, np.array([entry.value for entry in result.decisions[1:]])))
     assert own.objective.value == pytest.approx(result.objective.value, rel=1e-6)
+
+
+def test_a_stress_itself_may_be_minimised() -> None:
+    result = laufruhe.solve(changed(FEWER, "mean shaking force", "maximum crank-pin bending stress"))
+    assert result.certificate.kind is Proof.GLOBAL
+    pin = next(entry for entry in result.decisions if entry.name == "engine.big_end.diameter")
+    assert pin.at_bound

@@ -153,6 +153,12 @@ class SizeModel:
             self._masses[key] = np.array([*(found.gear or gear).rod_masses(found.parts[0]), found.throw_unbalance])
         return self._masses[key]
 
+    def with_masses(self, masses: Array) -> Engine:
+        """The engine as given, with these in place of what its running gear adds."""
+        given = self.problem.engine
+        bare = given.moving.weighed(-1.0)
+        return _heavier(replace(given, slider_cranks=bare.parts, rotors=bare.rotors), masses)
+
     def factors(self, piece: Piece, measure: Measure, engine: Engine) -> list[Array]:
         """Of the sizes of an engine, for the rows of a piece."""
         return _factors(measure, engine, self.problem, piece.at)

@@ -107,6 +107,7 @@ def _shared(
     if any(part.shaft != CRANKSHAFT for part in engine.slider_cranks):
         raise ModelError("sections are sized of engines with one crankshaft")
     by_rod = np.array([[share(part.x) for part in engine.slider_cranks] for share in shares])
+    by_rod = by_rod.reshape(len(shares), len(engine.slider_cranks))
     total = crank_forces(engine, point, fidelity).each(partial(np.einsum, "kc,ncd->nkd", by_rod))
     for rotor in engine.rotors:
         own = np.array([share(rotor.x) for share in shares])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
@@ -118,8 +119,10 @@ class Numbers:
     def _loaded(self, part: SliderCrank) -> SliderCrank:
         """With its masses changed."""
         own = {mass: float(change) for (name, mass), change in self.pistons.items() if name == part.name}
-        # a sum of changes may leave a bound of zero by a rounding
-        return replace(part, **{mass: max(getattr(part, mass) + change, 0.0) for mass, change in own.items()})
+        # a sum of changes may leave a bound of zero by a rounding; what a rod lacks of inertia may be less than nothing
+        least = {"rod_inertia_deficit": -math.inf}
+        moved = {mass: max(getattr(part, mass) + change, least.get(mass, 0.0)) for mass, change in own.items()}
+        return replace(part, **moved)
 
 
 class Drive(Protocol):

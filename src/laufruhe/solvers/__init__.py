@@ -114,6 +114,19 @@ def _sizes(problem: Problem) -> Result:
     return solve_within(problem, solve_sizes)
 
 
+def _mounted_sizes(problem: Problem) -> Result:
+    from laufruhe.solvers.mounts.sizes import solve_mounted_sizes
+
+    return solve_mounted_sizes(problem)
+
+
+def _asks_mounted_sizes(problem: Problem) -> bool:
+    """Whether loads are minimised beside what mounts are asked for, and the rest suits boxes of sizes."""
+    others = [term for term in problem.objective if not term.measure.is_mounting]
+    limits = [limit for limit in problem.limits if not limit.measure.is_mounting]
+    return bool(others) and _asks_sizes(replace(problem, objective=tuple(others), limits=tuple(limits)))
+
+
 def _star_sizes(problem: Problem) -> Result:
     from laufruhe.solvers.stars.sizes import solve_star_sizes
 
@@ -222,6 +235,8 @@ METHODS: tuple[Method, ...] = (
     Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _smooth),
     Method("flywheel, crankshaft and the rest apart", frozenset(Kind) - {_S}, is_apart,
            Reach.ASIDE, _apart),
+    Method("local programs of sizes and mounts", frozenset({Kind.SIZE, _U, _K, _M}), _asks_mounted_sizes, Reach.ASIDE,
+           _mounted_sizes),
     Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _nothing_inside, Reach.ASIDE,
            _stars_on_mounts),
 )  # fmt: skip
@@ -319,7 +334,7 @@ def _decided(problem: Problem) -> Result:
         raise ModelError(f"no method decides {_named(kinds)} together for {asked}; fix one of them, or ask for less")
     # what is decided apart is asked once more, each part by itself
     tell(method.name)
-    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F} else ()
+    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F, Kind.SIZE} else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})
     return method.solve(problem)

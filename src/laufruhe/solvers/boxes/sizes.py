@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,7 +14,6 @@ from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.load_models.sized_model import SizeModel
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import Grid
-from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -39,54 +37,21 @@ INSIDE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class _SizeProgram(LocalProgram):
-    """Objective and rooms by the model of sizes, which is the exact one at the angles of the results.
-
-    Shares are those of every column of a decision; a column of an unbalance lies between its sizes in both senses.
-    """
+class SizeProgram(LocalProgram):
+    """Objective and rooms by the model of sizes, which is the exact one at the angles of the results."""
 
     model: SizeModel
 
     @classmethod
-    def of_sizes(cls, model: SizeModel) -> _SizeProgram:
+    def of_sizes(cls, model: SizeModel) -> SizeProgram:
         """Over the bounds of all that is open."""
-        domains = domains_of(model.problem.decisions)
-        ends = [(d.set.lower, d.set.upper) if d.width == 1 else (-d.scale, d.scale) for d in domains]
-        lower, upper = (
-            np.concatenate([np.full(d.width, pair[k]) for d, pair in zip(domains, ends, strict=True)]) for k in (0, 1)
-        )
-        return cls(model.problem, lower, upper, model)
-
-    @cached_property
-    def domains(self) -> tuple[Domain, ...]:
-        """Of all decisions."""
-        return domains_of(self.problem.decisions)
+        own = LocalProgram.of(model.problem)
+        return cls(own.problem, own.lower, own.upper, model)
 
     @cached_property
     def sized(self) -> Mask:
         """Which columns are sizes."""
         return np.concatenate([np.full(d.width, d.decision in self.model.sizes, dtype=bool) for d in self.domains])
-
-    def columns(self, shares: Array) -> Array:
-        """Of all decisions."""
-        return np.asarray(self.lower + np.clip(shares, 0.0, 1.0) * (self.upper - self.lower))
-
-    def values(self, shares: Array) -> list[Value]:
-        """Decisions, inside their sets."""
-        own = self.columns(shares)
-        inside = np.concatenate([domain.project(own) for domain in self.domains])
-        return [
-            float(inside[d.start]) if d.decision in self.model.sizes else d.complex_value(inside) for d in self.domains
-        ]
-
-    def shares(self, values: Sequence[Value] | Array) -> Array:
-        """Of the bounds, where decisions have these values."""
-        own = np.concatenate([d.columns_of(value) for d, value in zip(self.domains, values, strict=True)])
-        return np.asarray(np.clip((own - self.lower) / (self.upper - self.lower), 0.0, 1.0))
-
-    def by_decision(self, values: Array) -> dict[str, Array]:
-        """What stands for every share, by the name of its decision."""
-        return {domain.decision.name: values[domain.columns] for domain in self.domains}
 
     def numbers(self, shares: Array) -> Array:
         """The objective, then the relative room inside each limit, and inside each sector."""
@@ -94,8 +59,7 @@ class _SizeProgram(LocalProgram):
         x, u = own[self.sized], own[~self.sized]
         value = sum(term.weight * self.model.value(term.measure, x, u) for term in problem.objective)
         rooms = [limit.room(self.model.value(limit.measure, x, u))[0] - INSIDE for limit in problem.limits]
-        edges = [room for domain in self.domains for room in domain.set.rooms(own[domain.columns])]
-        return np.array([value, *rooms, *edges])
+        return np.array([value, *rooms, *self.edges(shares)])
 
     def place(self, values: Array) -> Array:
         """The best unbalances with sizes given."""
@@ -127,8 +91,8 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     """
     started = time.perf_counter()
     initial, model = evaluate(problem), SizeModel(problem)
-    _check_acts(model)
-    program = _SizeProgram.of_sizes(model)
+    check_acts(model)
+    program = SizeProgram.of_sizes(model)
     best = _proposed(program)
     boxes = _boxes(model)
 
@@ -150,7 +114,7 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     return concluded(found.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
-def _proposed(program: _SizeProgram) -> Array:
+def _proposed(program: SizeProgram) -> Array:
     """The best design of local programs, its unbalances the best with its sizes."""
     problem = program.problem
     given = program.shares(problem.start)
@@ -200,7 +164,7 @@ def _conflict(problem: Problem, boxes: SizeBoxes) -> tuple[str, ...]:
     )
 
 
-def _check_acts(model: SizeModel) -> None:
+def check_acts(model: SizeModel) -> None:
     """Refuse a size that nothing asked hangs on."""
     measures = dict.fromkeys(model.problem.measures)
     for k, decision in enumerate(model.sizes):

@@ -150,7 +150,7 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     return () if convex is None else solve_convex_mounts(convex).conflict
 
 
-def _bound(problem: Problem) -> float:
+def mounts_bound(problem: Problem) -> float:
     """What no design goes under: each kind of terms alone, for none is under zero.
 
     Mount forces by what is transmitted at least (E34), numbers of the mounts by what of them is convex (E16-E19),
@@ -184,7 +184,7 @@ def _result(
     bound = divided.bound
     # throws that move are not in the bound
     if search.moves is None and gap_of(design.value, bound, nothing) > problem.tolerance:
-        bound = max(bound, _bound(problem))
+        bound = max(bound, mounts_bound(problem))
     shown = Shown(
         bound=bound,
         reach=Reach.NEAR if divided.boxes else Reach.ASIDE,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self, TypeAlias
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.optimize import minimize, nnls
 from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
+from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side
 from laufruhe.problem.nothing import nothing_of
@@ -30,7 +32,10 @@ TRIES = 2
 
 @dataclass(frozen=True, eq=False)
 class LocalProgram:
-    """Objective and room of every limit over the shares of the bounds, 0 to 1."""
+    """Objective and room of every limit over the shares of the bounds, 0 to 1, of every column of a decision.
+
+    A column of an unbalance whose angle is open lies between its sizes in both senses.
+    """
 
     problem: Problem
     lower: Array
@@ -39,28 +44,48 @@ class LocalProgram:
     @classmethod
     def of(cls, problem: Problem) -> Self:
         """Over the bounds of all that is open."""
-        ends = (np.array([getattr(decision, end) for decision in problem.decisions]) for end in ("lower", "upper"))
-        return cls(problem, *ends)
+        domains = domains_of(problem.decisions)
+        ends = [(d.set.lower, d.set.upper) if d.width == 1 else (-d.scale, d.scale) for d in domains]
+        pairs = [pair for pair, d in zip(ends, domains, strict=True) for _ in range(d.width)]
+        return cls(problem, *(np.array([pair[k] for pair in pairs]) for k in (0, 1)))
+
+    @cached_property
+    def domains(self) -> tuple[Domain, ...]:
+        """Of all decisions."""
+        return domains_of(self.problem.decisions)
 
     def shares(self, values: Sequence[Value] | Array) -> Array:
         """Of the bounds, where decisions have these values."""
-        return np.asarray(np.clip((np.real(values) - self.lower) / (self.upper - self.lower), 0.0, 1.0))
+        own = np.concatenate([d.columns_of(value) for d, value in zip(self.domains, values, strict=True)])
+        return np.asarray(np.clip((own - self.lower) / (self.upper - self.lower), 0.0, 1.0))
+
+    def columns(self, shares: Array) -> Array:
+        """Of all decisions."""
+        return np.clip(self.lower + shares * (self.upper - self.lower), self.lower, self.upper)
 
     def values(self, shares: Array) -> list[Value]:
-        """Decisions."""
-        return list(np.clip(self.lower + shares * (self.upper - self.lower), self.lower, self.upper).tolist())
+        """Decisions, inside their sets."""
+        own = self.columns(shares)
+        inside = np.concatenate([domain.project(own) for domain in self.domains])
+        return [d.complex_value(inside) if d.decision.is_affine else float(inside[d.start]) for d in self.domains]
 
     def numbers(self, shares: Array) -> Array:
         """The objective, then the least relative room inside each limit, and inside each set that is no interval.
 
         On a resonance the objective is far off.
         """
+        edges = self.edges(shares)
         try:
             evaluation = evaluate(self.problem, self.problem.design(self.values(shares)))
             rooms = [-evaluation.standing(limit).excess for limit in self.problem.limits]
-            return np.array([objective_value(self.problem, evaluation), *rooms])
+            return np.array([objective_value(self.problem, evaluation), *rooms, *edges])
         except ModelError:
-            return np.array([math.inf, *(-1.0 for _ in self.problem.limits)])
+            return np.array([math.inf, *(-1.0 for _ in self.problem.limits), *edges])
+
+    def edges(self, shares: Array) -> list[float]:
+        """Relative rooms inside the sets that are no intervals."""
+        own = self.columns(shares)
+        return [room for domain in self.domains for room in domain.set.rooms(own[domain.columns])]
 
     def place(self, values: Array) -> Array:
         """Shares to seek a design from where boxes are least."""
@@ -68,7 +93,7 @@ class LocalProgram:
 
     def by_decision(self, values: Array) -> dict[str, Array]:
         """What stands for every share, by the name of its decision."""
-        return {d.name: values[[k]] for k, d in enumerate(self.problem.decisions)}
+        return {domain.decision.name: values[domain.columns] for domain in self.domains}
 
     def slopes(self, shares: Array) -> Array:
         """Of these numbers, by central differences inside the bounds, shape (1 + limits, n)."""

@@ -1,0 +1,121 @@
+"""Sizes of the running gear beside elastic mounts, and unbalances with both: local programs and their bound (Z15).
+
+What sizes add to the masses that move lies between two ends each. With these masses as decisions of their own, and no
+stress limited, it is a problem of loads that are affine in what is open, and of mounts: its bounds hold here too.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.load_models.sized_model import SizeModel
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.decision import Decision, Drive, MassDrive, RotorDrive
+from laufruhe.problem.measure import Measure
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Interval, Value
+from laufruhe.prove.certificate import Reach, room_of
+from laufruhe.prove.springs.proof import spring_bound
+from laufruhe.solvers.boxes.sizes import check_acts, solve_sizes
+from laufruhe.solvers.conclusion import KEPT, Design, concluded, judged
+from laufruhe.solvers.mounts.nonlinear import mounts_bound
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, searched, shown
+
+STARTS, LOOKS = 2, 6
+"""Searches, and designs looked at before these."""
+ROUGHLY = 1e-2
+MASSES = ("reciprocating_mass", "rotating_mass", "rod_inertia_deficit")
+
+
+def solve_mounted_sizes(problem: Problem) -> Result:
+    """The best local optimum of a few searches, with a bound."""
+    started = time.perf_counter()
+    initial, held = evaluate_start(problem), _on_given_mounts(problem)
+    check_acts(SizeModel(held))
+    program = LocalProgram.of(problem)
+    best = searched(program, [*_first(program, held), *looks(problem)[:LOOKS]], min(problem.search.starts, STARTS))
+    design = judged(problem, program.values(best))
+    bound = _bound(problem, design)
+    told = "local programs; bound of the mounts with any masses that the sizes may have"
+    proof = shown(program, design, bound, Reach.ASIDE, told)
+    return concluded(design, initial, proof, {"solve": time.perf_counter() - started})
+
+
+def _on_given_mounts(problem: Problem) -> Problem:
+    """Sizes and unbalances alone, and what is asked of loads and these."""
+    decisions = tuple(d for d in problem.decisions if d not in problem.mount_decisions)
+    terms = tuple(term for term in problem.objective if not term.measure.is_mounting)
+    limits = tuple(limit for limit in problem.limits if not limit.measure.is_mounting)
+    return replace(problem, decisions=decisions, objective=terms, limits=limits)
+
+
+def _first(program: LocalProgram, held: Problem) -> list[Array]:
+    """As given, and with the best sizes and unbalances on the mounts as given."""
+    problem, given = program.problem, program.shares(program.problem.start)
+    alone = solve_sizes(replace(held, tolerance=ROUGHLY, search=replace(held.search, boxes=1)))
+    if alone.status not in (Status.OPTIMAL, Status.FEASIBLE):
+        return [given]
+    found = dict(zip((d.name for d in held.decisions), _decided(held, alone), strict=True))
+    return [program.shares([found.get(d.name, d.start) for d in problem.decisions]), given]
+
+
+def _decided(held: Problem, result: Result) -> list[Value]:
+    """Values of decisions, read back from a result."""
+    told = {entry.name: entry.value for entry in result.decisions}
+    rotors = {r.name: r.unbalance for r in result.final.engine.rotors}
+    bare = {r.name: r.unbalance for r in result.initial.engine.rotors}
+    out: list[Value] = []
+    for decision in held.decisions:
+        if not decision.is_affine:
+            out.append(told[decision.name])
+            continue
+        drive = decision.rotor_drives[0]
+        moved = (rotors[drive.rotor] - bare[drive.rotor]) / drive.gain
+        out.append(decision.start + (moved.conjugate() if drive.mirrored else moved))
+    return out
+
+
+def _bound(problem: Problem, design: Design) -> float:
+    """Of masses anywhere between their ends; zero where the length of the rod, or sizes themselves, are asked about."""
+    model = SizeModel(_on_given_mounts(problem))
+    of_sizes = any(term.measure.channel.of_engine is not None or _sized(term.measure) for term in problem.objective)
+    if model.moves_rod or of_sizes or design.excess > KEPT:
+        return 0.0
+    relaxed, near = with_masses(problem, model, design.values)
+    room = room_of(design.value, problem.tolerance, nothing_of(problem, design.evaluation.engine))
+    return max(spring_bound(relaxed, design.value, room, near).bound, mounts_bound(relaxed))
+
+
+def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> tuple[Problem, list[Value]]:
+    """The problem with the masses of its sizes as decisions of their own; and what these are where sizes have values.
+
+    Limits on what sizes make of loads, and on these themselves, are left out.
+    """
+    low, high = model.mass_box
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    at = dict(zip((d.name for d in problem.decisions), values, strict=True))
+    masses = model.masses(np.array([at[d.name].real for d in model.sizes])) - middle
+    engine = model.with_masses(middle)
+    ways = engine.gear.throws if engine.gear is not None else ()
+    drives: list[tuple[Drive, ...]] = [
+        *(tuple(MassDrive(part.name, mass) for part in engine.slider_cranks) for mass in MASSES),
+        tuple(RotorDrive(name, way) for name, way in ways),
+    ]
+    moving = [k for k in range(len(half)) if half[k] > 0.0]
+    own = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, drives[k]) for k in moving]
+    others = tuple(d for d in problem.decisions if d not in model.sizes)
+    limits = tuple(x for x in problem.limits if x.measure.channel.of_engine is None and not _sized(x.measure))
+    found = replace(problem, engine=engine, decisions=(*own, *others), limits=limits)
+    return found, [*(float(masses[k]) for k in moving), *(at[d.name] for d in others)]
+
+
+def _sized(measure: Measure) -> bool:
+    """Whether factors of sizes are in it."""
+    return measure.is_load and measure.load.of_sizes is not None
