@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import laufruhe
 from laufruhe.errors import LaufruheError
+from laufruhe.fidelity.automatic import ladder
 from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.load_models.run_peaks import RunPeaks
 from laufruhe.machine import Engine
@@ -268,13 +269,44 @@ def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
     assert result.objective.value < objective_value(problem, other)
 
 
+def test_fidelities_of_a_run_up_have_its_loads() -> None:
+    """Without operating points there is no run."""
+    asked = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
+    assert all(own.points for _, own in ladder(limited(**asked)))
+    assert any(not own.points for _, own in ladder(limited(objective={"minimise": "static sag"})))
+
+
+def three(**more: Any) -> dict[str, Any]:
+    """Three cylinders in line."""
+    engine = {**tables_of(READY)["engine"], "cylinders": 3, "cylinder_spacing": "120 mm"}
+    weights = [
+        {"name": name, "x": x, "radius": "70 mm", "mass": {"between": ["0 kg", "1 kg"]}, "angle": {"between": [0, 360]}}
+        for name, x in (("front", "120 mm"), ("rear", "-120 mm"))
+    ]
+    return {"engine": engine | more, "counterweights": weights}
+
+
 @pytest.mark.slow
+def test_the_star_that_starts_with_least_travel_is_proven() -> None:
+    """Both stars with their weights, each solved by itself: the better one is found, and bounds both."""
+    asked = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
+    opened = laufruhe.solve(limited(**asked, **three(throws="open", firing_order="open")))
+    assert opened.certificate.kind is Proof.GLOBAL
+    given = [
+        laufruhe.solve(limited(**asked, **three(throws=throws, firing_order=order)))
+        for throws, order in (([0, 240, 120], [1, 3, 2]), ([0, 120, 240], [1, 2, 3]))
+    ]
+    values = [result.objective.value for result in given]
+    assert max(values) > 1.001 * min(values)
+    assert opened.objective.value == pytest.approx(min(values), rel=1e-4)
+    # as a limit between both it leaves one star
+    limit = ("run-up travel", f"{0.5e3 * (values[0] + values[1])} mm")
+    held = laufruhe.solve(limited(limit, mounts=mounts(), **three(throws="open", firing_order="open")))
+    assert held.certificate.kind is Proof.GLOBAL
+    assert held.limits[0].value <= held.limits[0].limit * (1.0 + 1e-5)
+
+
 def test_what_is_beside_mounts_and_weights_is_checked_alone() -> None:
-    """A crank star: the search of stars knows nothing of run-ups, and says so; a run-up is not its objective."""
-    star = {"throws": "open", "firing_order": "open", "cylinder_spacing": "120 mm"}
-    engine = {**tables_of(READY)["engine"], **star}
-    spread = {"engine": engine, "mounts": mounts(), "counterweights": []}
+    """A crank star on open mounts: the search of stars knows nothing of run-ups there, and says so."""
     with pytest.raises(LaufruheError, match="run-up travel is minimised over unbalances and mounts, not over star"):
-        laufruhe.solve(
-            limited(objective={"minimise": "run-up travel"}, **spread | {"engine": engine | {"cylinders": 3}})
-        )
+        laufruhe.solve(limited(objective={"minimise": "run-up travel"}, **three(throws="open", firing_order="open")))

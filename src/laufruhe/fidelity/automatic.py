@@ -86,7 +86,7 @@ def ladder(problem: Problem) -> list[tuple[str, Problem]]:
     """Every fidelity that a trade sets side by side, those that differ on this problem (F13)."""
     scale = Scale(problem, reference(problem))
     rungs = [(name, problem.at(fidelity)) for knob in KNOBS for name, fidelity in knob.rungs(scale)]
-    if not problem.load_terms:
+    if not problem.load_terms and not any(term.measure.channel.is_checked for term in problem.objective):
         return [("mounts alone, no loads", replace(problem, points=())), *rungs]
     return rungs + [(f"auto {tolerance:g}", automatic(problem, tolerance)) for tolerance in TRIED]
 

@@ -8,15 +8,17 @@ model tells (E28b).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.run_look import run_measures
 from laufruhe.load_models.run_rows import RunRows
+from laufruhe.machine.mount import every_spring
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.measure import Limit, Term
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.solvers.conclusion import broken_limits, with_limits
 from laufruhe.solvers.cones.run_limits import solve_run_cones
 from laufruhe.solvers.result import Result, Status
@@ -76,7 +78,7 @@ def _designed(
 ) -> Result | None:  # fmt: skip
     """A design that is made for them; None where no method does that."""
     if problem.phasing is not None:
-        return None
+        return _of_stars(problem, problem.phasing, decide) if kinds <= _LINEAR | {Kind.STAR} else None
     rows = RunRows.of(problem, run_measures(problem)) if kinds <= _LINEAR else None
     if rows is not None:
         return solve_run_cones(problem, limits, terms, rows, decide)
@@ -85,3 +87,12 @@ def _designed(
     from laufruhe.solvers.mounts.runs import solve_run_mounts
 
     return solve_run_mounts(problem, relaxed)
+
+
+def _of_stars(problem: Problem, phasing: Phasing, decide: Decide) -> Result | None:
+    """Each star that fires evenly by itself; None where throws may leave these, or mounts have bump stops."""
+    if phasing.continuous or not all(math.isinf(spring.stop_gap) for _, spring in every_spring(problem.engine.mounts)):
+        return None
+    from laufruhe.solvers.stars.phasing import by_each_order, every_star
+
+    return by_each_order(problem, phasing, every_star(phasing), lambda own, _: decide(replace(own, phasing=None)))

@@ -15,6 +15,7 @@ from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, error_bound, reference
 from laufruhe.fidelity.mount_knobs import TIME_ORDERS, TIME_SAMPLES
 from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.load_models.run_look import asks_runs
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
@@ -165,7 +166,8 @@ def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
     both together the stars that rank first. Boxes that prove no more than a design are left out.
     """
     try:
-        if problem.phasing is None and len(problem.unbalances) == len(problem.decisions):
+        plain = problem.phasing is None and not asks_runs(problem)
+        if plain and len(problem.unbalances) == len(problem.decisions):
             model = AffineModel(problem)
             x = solve_cones(model.at(samples or model.full_samples)).x
             return None if x is None else problem.design([domain.complex_value(x) for domain in model.domains])

@@ -79,8 +79,7 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
         told = solve_told_alike(problem, alone, solve_phasing) if is_even and families_of(alone)[0] else None
         return _uneven(problem, phasing, None if told is None or told.objective is None else told)
     if problem.feels_order and is_even and phasing.shares_throws:
-        pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
-        stars = [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]
+        stars = every_star(phasing)
         result = by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
         if not phasing.continuous:
             return result
@@ -124,8 +123,15 @@ def _with_more_angles(problem: Problem, families: Sequence[Family], result: Resu
 
 def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
     """Throws as given: the best of their firing orders, and of the sets of shafts."""
-    star = Candidate(phasing.throws or (), None, *phasing.least_geometry)
-    return by_each_order(problem, phasing, [(star, None)])
+    return by_each_order(problem, phasing, every_star(phasing))
+
+
+def every_star(phasing: Phasing) -> list[Star]:
+    """Throws as given, or all that fire evenly, images included."""
+    if phasing.throws is not None:
+        return [(Candidate(phasing.throws, None, *phasing.least_geometry), None)]
+    pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
+    return [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]
 
 
 def by_each_order(
