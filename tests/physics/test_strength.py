@@ -18,7 +18,8 @@ from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import MEASURES, Measure
+from laufruhe.problem.measure import MEASURES, Limit, Measure
+from laufruhe.problem.problem import Problem
 from problem_files import loaded
 
 POINT = OperatingPoint("", 300.0)
@@ -190,6 +191,35 @@ def test_stresses_are_measures_of_a_problem() -> None:
     part = problem.engine.slider_cranks[0]
     pull = (part.reciprocating_mass * (1.0 + part.rod_ratio) + part.rotating_mass) * part.crank_radius * point.speed**2
     assert bolts == pytest.approx(pull / Bolts(2, 0.008).area, rel=1e-6)
+
+
+def test_eyes_of_the_rod_are_limits_on_its_pull(tmp_path: Path) -> None:
+    """Textbook, eqs. 95 to 97, sections given: F/(2 A), F r/(2 W) of the masses' pull, which two bolts carry alike."""
+    allowed, area, arm, modulus = 40e6, 0.8e-4, 0.012, 0.4e-6
+    free = '[[operating_points]]\nname = "exchange"\nspeed = "3000 rpm"\ngas = false\n[gas]'
+    limits = "".join(
+        f'[[constraints]]\nlimit = "{name}"\noperating_points = ["exchange"]\nmax = "{most} N"\n'
+        for name, most in (
+            ("maximum rod force", 2.0 * area * allowed), ("maximum rod force", 2.0 * modulus * allowed / arm),
+            ("maximum crank-pin force", 2.0 * area * allowed),
+        )
+    )  # fmt: skip
+    problem = loaded(tmp_path, TEXT.replace("[gas]", free) + limits + '[objective]\nminimise = "rms shaking force"\n')
+    found = {limit.measure.name: problem_limit(problem, limit) for limit in problem.limits}
+    part, speed = problem.engine.slider_cranks[0], problem.points[1].speed
+    small = part.reciprocating_mass * (1.0 + part.rod_ratio) * part.crank_radius * speed**2
+    large = small + part.rotating_mass * part.crank_radius * speed**2
+    assert sorted(found.values()) == pytest.approx(sorted([small, large]), rel=1e-6)
+    # Z8 with the section of one bolt in place of A
+    bolts = evaluate(problem).value(Measure(*MEASURES["maximum bolt stress"], points=("exchange",)))
+    assert bolts == pytest.approx(large / (2.0 * Bolts(1, 0.008).area), rel=1e-6)
+    stresses = [small / (2.0 * area), small * arm / (2.0 * modulus), large / (2.0 * area)]
+    kept = [evaluate(problem).value(limit.measure) <= limit.maximum for limit in problem.limits]
+    assert kept == [stress <= allowed for stress in stresses]
+
+
+def problem_limit(problem: Problem, limit: Limit) -> float:
+    return evaluate(problem).value(limit.measure)
 
 
 def test_masses_follow_the_sizes() -> None:
