@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -118,7 +118,7 @@ class Program:
     roots
         Of the heads, where these are what is minimised, in place of their prices.
     tops
-        What heads without a price are not over; none where all have prices.
+        What heads are not over, infinite where that is not known; empty where it is of none.
     aim
         What is minimised beside the heads: of every s, and of the w of every mode.
     sets
@@ -136,7 +136,7 @@ class Program:
     sets: Sequence[Array] = ()
     roots: Sequence[Root] = ()
     shapes: Sequence[Shapes] = ()
-    tops: Array | None = None
+    tops: Array = field(default_factory=lambda: np.zeros(0))
     aim: Array | None = None
 
     @property
@@ -200,7 +200,7 @@ def follows(program: Program, found: Multipliers) -> float:
             left[order][0] += first
             left[order][:, 0] += first
     for cap, price in zip(program.caps, _shared(program, prices, found.caps), strict=True):
-        if program.tops is not None and math.isfinite(program.tops[cap.head]):
+        if len(program.tops) and math.isfinite(program.tops[cap.head]):
             bound -= cap.share(price) * float(program.tops[cap.head])
         for order, rows in cap.rows:
             left[order] += np.einsum("pad,ab,pbe->de", rows, price, rows, optimize=True)
@@ -281,7 +281,7 @@ def _shared(program: Program, prices: Array, multipliers: Sequence[Array]) -> li
     for cap, price in zip(caps, found, strict=True):
         taken[cap.head] += cap.share(price)
     factors = np.where(taken > 0.0, prices / np.where(taken > 0.0, taken, 1.0), 0.0)
-    if tops is not None:
+    if len(tops):
         # what is limited has any price
         factors = np.where(np.isfinite(tops), 1.0, factors)
     return [factors[cap.head] * price for cap, price in zip(caps, found, strict=True)]

@@ -301,7 +301,9 @@ def _motion_at_most(mounts: OpenMounts, loads: ComplexArray, omega: float) -> fl
         lost = max(lost, even + omega * mounts.damping, key=lambda each: float(np.linalg.eigvalsh(each)[0]))
     rise = mounts.dynamic.impedance(np.array([omega]), mounts.root.T)[0].real
     top = mounts.highest + max(float(np.linalg.eigvalsh(rise)[-1]), 0.0)
-    room = max(float(np.linalg.eigvalsh(lost)[0]), omega**2 - top)
+    # at rest stiffness carries all of the load
+    moving = max(float(np.linalg.eigvalsh(lost)[0]), omega**2 - top)
+    room = moving if omega > 0.0 else mounts.lowest
     return float(np.linalg.norm(loads, axis=1).sum()) / room if room > 0.0 else math.inf
 
 

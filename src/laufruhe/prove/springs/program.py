@@ -154,7 +154,7 @@ class Stated:
             columns = np.concatenate([self._moment(order) for order, _ in budget.matrices])
             block = np.concatenate([column(matrix) for _, matrix in budget.matrices])[None]
             self._add(block, columns, np.array([budget.most]), clarabel.NonnegativeConeT(1))
-        if program.tops is not None:
+        if len(program.tops):
             held = np.flatnonzero(np.isfinite(program.tops))
             self._add(np.eye(len(held)), held, program.tops[held], clarabel.NonnegativeConeT(len(held)))
         at = 0

@@ -13,6 +13,7 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -21,6 +22,7 @@ from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
 from laufruhe.prove.springs.bound import Cap, Program, Proposed, Root, follows, pulls
 from laufruhe.prove.springs.columns import columns_of
 from laufruhe.prove.springs.conditions import Held, conditions
+from laufruhe.prove.springs.limits import limits_of
 from laufruhe.prove.springs.lines import Felt, Line, line_of, squared
 from laufruhe.prove.springs.mirrored import mirrored_parts
 from laufruhe.prove.springs.modes import modes_of, shapes_of
@@ -34,7 +36,7 @@ EFFORT = 5
 # of what is to be shown, the share that small orders may take
 NEEDED = 0.3
 # share of what a solver takes for the least that its multipliers should prove
-NEAR = 0.97
+NEAR = 0.9995
 # share of the bounds of unbalances that says what is large beside the best design
 WIDE = 0.3
 
@@ -72,9 +74,16 @@ class SpringBoxes:
         # loads of the block are those of all mounts, and known where no unbalance is open
         rest = [] if problem.unbalances else [t for t in problem.load_terms if not t.measure.on_mounts]
         self._constant = sum(t.weight * known.value(t.measure) for t in rest)
-        told = [(t.weight, asked(problem, t.measure, self._model, known, columns, self._parts)) for t in terms]
-        self.columns, fewer = columns[0].seen_by([order.loads[1:] for _, each in told for order in each.orders])
+
+        def orders_of(measure: Measure, parts: Sequence[OpenMounts] = self._parts) -> Asked:
+            return asked(problem, measure, self._model, known, columns, parts)
+
+        told = [(t.weight, orders_of(t.measure)) for t in terms]
+        limits = limits_of(problem, known, orders_of, lambda measure: orders_of(measure, self._parts[:1]))
+        loads = [order.loads[1:] for _, each in told for order in each.orders]
+        self.columns, fewer = columns[0].seen_by([*loads, *limits.loads])
         self._terms = [(weight, each.of_columns(fewer)) for weight, each in told]
+        self.limits = limits.of_columns(fewer, self._parts)
         self._heads = [heads_of(each, self._parts) for _, each in self._terms]
         self._least = [np.zeros(len(heads)) for heads in self._heads]
 
@@ -231,8 +240,10 @@ class _Box:
 
     def _line(self, head: Head, order: Order) -> tuple[Line, list[Held]]:
         """Of an order, and what it has to keep."""
+        return self._line_of(order, self.each.at_most(order, head, self.most))
+
+    def _line_of(self, order: Order, felt: Felt) -> tuple[Line, list[Held]]:
         if id(order) not in self._stated:
-            felt = self.each.at_most(order, head, self.most)
             mounts = self.parts[order.part]
             line = self.search.line(mounts, order, felt, self.lower, self.upper)
             self._stated[id(order)] = line, conditions(0, mounts, line)
@@ -252,8 +263,9 @@ class _Box:
 
     def under_all(self, heads: Sequence[Head]) -> Program:
         """What no design goes over of which none of the heads is over the whole."""
-        tops = [((self.most / head.share + head.loss) / head.unit) ** 2 for head in heads]
-        return replace(self._program(heads, np.zeros(len(heads)))[0], tops=np.array(tops))
+        own = [((self.most / head.share + head.loss) / head.unit) ** 2 for head in heads]
+        program, _ = self._program(heads, np.zeros(len(heads)))
+        return replace(program, tops=np.append(own, program.tops[len(own) :]))
 
     def _program(
         self, heads: Sequence[Head], prices: Array, ends: tuple[Array, Array] | None = None
@@ -272,10 +284,13 @@ class _Box:
             if ends is not None:
                 own = lengths_of(head, self.each, lines[first:], at)
                 roots.append(Root(prices[number], float(ends[0][number]), float(ends[1][number]), own))
+        more = self.search.limits.added(heads, len(heads), self._line_of, lines)
+        lines += more.lines
         program = Program(
             tuple(line.size for line in lines), tuple(line.reaches for line in lines), self.mounts.numbers,
-            lines[0].columns, 0.0 * prices if roots else prices, caps, held, (), self.search.columns.sets, roots,
-            self.modes,
+            lines[0].columns, np.append(0.0 * prices if roots else prices, np.zeros(len(more.tops))),
+            [*caps, *more.caps], [*held, *more.held], more.budgets, self.search.columns.sets, roots, self.modes,
+            np.append(np.full(len(heads), math.inf), more.tops),
         )  # fmt: skip
         return program, lines
 
@@ -289,7 +304,7 @@ class _Box:
     def _pull(self, parts: Sequence[int], lines: Sequence[Line], found: Proposed) -> Array:
         """By decision, what of the products is not that of s, in forces that count."""
         pull, s = np.zeros(len(self.lower)), found.middle
-        for part, line, moments in zip(parts, lines, found.moments, strict=True):
+        for part, line, moments in zip(parts, lines, found.moments, strict=False):
             size = float(np.sum(squared(self.each.felt(line) / line.unit) * moments)) or 1.0
             mounts = self.parts[part]
             for spring, (seen, added) in zip(mounts.springs, line.springs, strict=True):

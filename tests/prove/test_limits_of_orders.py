@@ -1,0 +1,99 @@
+"""Limits of forces, travel and transmissibility of a running engine in the relaxation of spring forces (E61)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from laufruhe.files.reader import load
+from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.springs.bound import follows
+from laufruhe.prove.springs.limits import Limits
+from laufruhe.prove.springs.program import Stated
+from laufruhe.prove.springs.search import SpringBoxes
+from prove.test_spring_bound import powertrain
+
+ASKED = {
+    "rms": {"limit": "rms mount travel", "operating_points": ["idle"], "orders": [2, 4]},
+    "mean": {"limit": "mean mount force", "operating_points": ["idle"], "mounts": ["engine"], "orders": [2]},
+    "maximum": {"limit": "maximum mount travel", "operating_points": ["idle"], "orders": [2]},
+    "ratio": {"limit": "transmissibility", "operating_points": ["idle"], "orders": [2]},
+    "ratio of all": {"limit": "transmissibility", "operating_points": ["idle"], "orders": [2, 4]},
+}
+UNITS = {"rms": " m", "mean": " N", "maximum": " m"}
+
+
+def limited(name: str, most: float) -> Problem:
+    """Three springs of the powertrain open, force at speed against something at idle."""
+    tables = powertrain("2", "3 Hz", 3)
+    tables["operating_points"] = [{"name": "idle", "speed": "800 rpm"}, {"name": "fast", "speed": "1500 rpm"}]
+    tables["objective"] |= {"operating_points": ["fast"], "minimise": "rms mount travel"}
+    tables["fidelity"] = {"samples": 144}
+    tables["constraints"].append({**ASKED[name], "max": f"{most:.9g}{UNITS.get(name, '')}"})
+    return load(tables)
+
+
+def asked_limit(problem: Problem) -> Any:
+    return next(limit for limit in problem.limits if limit.maximum < np.inf)
+
+
+def drawn(problem: Problem, count: int) -> list[tuple[np.ndarray, float, float]]:
+    """Designs that keep the other limit, what each is worth, and what it has of the one that is asked."""
+    generator, given, found = np.random.default_rng(2), evaluate(problem), []
+    low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
+    for share in generator.random((count, len(low))):
+        x = low * (high / low) ** share
+        each = remounted(given, problem.design(x.tolist()))
+        if each.excess(problem.limits) <= 0.0:
+            found.append((x, objective_value(problem, each), each.value(asked_limit(problem).measure)))
+    return found
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_no_design_that_keeps_a_limit_is_under_the_bound(name: str) -> None:
+    """Beside multipliers of a solver also spoilt ones; without the limit there is less to prove, or as much."""
+    designs = drawn(limited(name, 1e6), 150)
+    problem = limited(name, float(np.quantile([each for *_, each in designs], 0.12)))
+    generator, most = np.random.default_rng(9), asked_limit(problem).maximum
+    kept = [(x, value, each) for x, value, each in designs if each <= most]
+    assert len(kept) > 5
+    least, near = min(value for _, value, _ in kept), max(kept, key=lambda each: each[2])[0]
+    boxes = SpringBoxes(problem, 1.3 * least, 1e-3, near.tolist())
+    assert boxes.limits.norms or boxes.limits.ratios
+    bound = boxes.relaxed(boxes.lower, boxes.upper)[0]
+    program, _ = boxes.left(boxes.lower, boxes.upper)
+    boxes.limits = Limits((), ())
+    without = boxes.relaxed(boxes.lower, boxes.upper)[0]
+    assert (1.0 - 1e-3) * without <= bound <= least
+    # least s of all that is better than the best known
+    own = replace(program, aim=np.eye(program.numbers)[0])
+    told = Stated(own).answer(own, True).multipliers
+    half, middle = 0.5 * (boxes.upper - boxes.lower), 0.5 * (boxes.upper + boxes.lower)
+    smallest = min((x[0] - middle[0]) / half[0] for x, value, _ in kept if value <= 1.3 * least)
+    assert follows(own, told) <= smallest
+    for by in (0.5, 1.0, 2.0):
+        worse = replace(
+            told, caps=[m * generator.uniform(0.0, by) for m in told.caps],
+            budgets=told.budgets * generator.uniform(0.0, by), held=[m * generator.uniform(0.0, by) for m in told.held],
+        )  # fmt: skip
+        assert follows(own, worse) <= smallest
+
+
+def test_a_limit_that_holds_the_best_design_back_raises_the_bound() -> None:
+    """Least force at speed is soft; a limit at idle that the soft ones break."""
+    raised = []
+    for name in ("rms", "ratio"):
+        designs = drawn(limited(name, 1e6), 150)
+        problem = limited(name, 0.98 * min(designs, key=lambda each: each[1])[2])
+        kept = [(value, x) for x, value, each in designs if each <= asked_limit(problem).maximum]
+        if kept:
+            least, x = min(kept, key=lambda each: each[0])
+            boxes = SpringBoxes(problem, 1.2 * least, 1e-3, x.tolist())
+            with_limit = boxes.relaxed(boxes.lower, boxes.upper)[0]
+            boxes.limits = Limits((), ())
+            raised.append(with_limit / boxes.relaxed(boxes.lower, boxes.upper)[0])
+    assert max(raised) > 1.001
