@@ -197,6 +197,21 @@ def test_a_stiffness_is_designed_for_beside_bump_stops() -> None:
 
 
 @pytest.mark.slow
+def test_weights_beside_stops_that_none_meets_are_those_of_the_cones() -> None:
+    """With stops beyond reach of the proven best, that design stays one: the search finds none much worse."""
+    shaft = tables_of(PROBLEMS / "soft-single-run-up.toml")["balancer_shafts"]
+    weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
+    asked = {"objective": {"minimise": "run-up force"}, "balancer_shafts": shaft, "counterweights": [weight]}
+    proven = laufruhe.solve(limited(mounts=mounts(), **asked))
+    assert proven.certificate.kind is Proof.GLOBAL
+    assert proven.final.value(OF_RUNS[1]) < 0.9e-3
+    stopped = laufruhe.solve(limited(mounts=mounts(STOP), **asked))
+    assert stopped.certificate.kind is Proof.LOCAL
+    assert stopped.objective.initial > 1.05 * proven.objective.initial
+    assert stopped.objective.value == pytest.approx(proven.objective.value, rel=1e-3)
+
+
+@pytest.mark.slow
 def test_the_least_travel_of_a_start_over_weights_is_proven() -> None:
     """A convex problem: no random design near or far is better than its bound."""
     problem = load_tables(

@@ -25,7 +25,7 @@ from laufruhe.physics.time_model import time_model
 
 HIGHEST = 12.0
 """Last order of the loads that is followed: those beyond shake the block by less than what the steps leave open."""
-STRETCHES, TOLERANCE = 60, 1e-4
+STRETCHES, FOLLOWED, RESOLVED = 60, 1e-4, 1e-6
 MOST_SWINGS = 2e3
 COARSEST = 4.0
 """Times as long as usual that steps may be."""
@@ -60,8 +60,8 @@ def _found_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: 
                 return _envelope(response, first, last)
         # a mode that swings a million times in a run is followed, not resolved
         stiff = seconds * mounting.modes.frequencies[-1] > MOST_SWINGS
-        method: Literal["RK45", "Radau"] = "Radau" if stiff else "RK45"
-        return run_through(mounting, inertia, gas, first, last, seconds, STRETCHES, method, TOLERANCE)
+        followed: tuple[Literal["DOP853", "Radau"], float] = ("Radau", FOLLOWED) if stiff else ("DOP853", RESOLVED)
+        return run_through(mounting, inertia, gas, first, last, seconds, STRETCHES, *followed)
 
     return through(0.0, run.speed, run.up), through(run.speed, 0.0, run.down)
 
