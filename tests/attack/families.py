@@ -830,14 +830,21 @@ def sizes(rng: Generator) -> Table:
         table["counterweights"] = counterweights(rng, size, weights)
     if shafts:
         table["balancer_shafts"] = balancers(rng, size, shafts)
-    table["fidelity"], table["search"] = {"samples": 180}, {"boxes": 60}
+    table["fidelity"], table["search"] = {"samples": 240}, {"boxes": 60}
     if rng.random() < 0.1:
         table["objective"] = {"minimise": "running-gear mass"}
     else:
         kinds = ("shaking force", "mount force", "main-bearing force", "crank-pin force")
         table = with_objective(rng, table, channels=kinds, norms=SMOOTH)
+        # what turns with the throws is in no second order, and not on the pins
+        for term in table["objective"].get("terms", [table["objective"]]):
+            key = "quantity" if "quantity" in term else "minimise"
+            term[key] = term[key].replace("crank-pin force", "main-bearing force")
+            if term.get("orders") == [2]:
+                del term["orders"]
     stresses = [{"limit": f"maximum {name}", "side": "max", "unit": unit} for name, unit in SIZED.items()]
     stresses.append({"limit": "throw clearance", "side": "min", "unit": "m"})
+    stresses += [{"limit": f"{norm} main-bearing force", "side": "max", "unit": "N"} for norm in ("mean", "rms")]
     if weights:
         stresses.append({"limit": "counterweight mass", "side": "max", "unit": "kg"})
     return limits_at(rng, table, stresses, 0.9)

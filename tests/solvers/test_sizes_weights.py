@@ -233,3 +233,14 @@ def test_a_stress_itself_may_be_minimised() -> None:
     assert result.certificate.kind is Proof.GLOBAL
     pin = next(entry for entry in result.decisions if entry.name == "engine.big_end.diameter")
     assert pin.at_bound
+
+
+def test_a_mean_that_nothing_meets_at_many_angles_is_named() -> None:
+    """Programs of boxes look at few angles of a mean first, which excludes nothing."""
+    limit = '[[constraints]]\nname = "smooth"\nlimit = "mean shaking force"\nmax = "600 N"\n[fidelity]'
+    text = changed(
+        changed(TOGETHER, 'minimise = "mean shaking force"', 'minimise = "running-gear mass"'), "[fidelity]", limit
+    )
+    result = laufruhe.solve(changed(text, "samples = 180", "samples = 360"))
+    assert result.status is Status.INFEASIBLE
+    assert "smooth" in result.conflict

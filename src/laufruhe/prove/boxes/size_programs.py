@@ -70,6 +70,9 @@ class SizePrograms:
         """What the dual rows of a box's program say; None where they say nothing."""
         program = self.program(lower, upper, reach)
         x, found = self._ask(program, exactly)
+        if x is None and not exactly:
+            # that a few rows of a mean cannot be met says nothing of all of them
+            x, found = self._ask(program, True)
         if x is not None:
             return self._together(program, best_bound(program, x, found).multipliers) if program.terms else None
         stripped = replace(program, terms=())
