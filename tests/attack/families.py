@@ -710,6 +710,27 @@ def leads(rng: Generator) -> Table:
                                   {"limit": "mean roll moment", "side": "max", "unit": "N m"}], 0.4)  # fmt: skip
 
 
+def shared_leads(rng: Generator) -> Table:
+    """Opposed pistons with gas between them, the lead of one crank open."""
+    engine = opposed_piston(rng)
+    engine.pop("rod_inertia_deficit", None)
+    least = -float(round(rng.uniform(1.0, 25.0), 1)) if rng.random() < 0.5 else 0.0
+    engine |= {
+        "cycle": "two-stroke", "bore": q(rng.uniform(0.06, 0.1), "m"), "throws": throws(rng, int(rng.integers(1, 3))),
+        "crank_lead": {"between": [least, float(round(rng.uniform(10.0, 40.0), 1))]},
+    }  # fmt: skip
+    peak = rng.uniform(75.0, 110.0)
+    table: Table = {
+        "engine": engine, "operating_points": points(rng, 2), "mounts": rigid_mounts(rng), "tolerance": 1e-3,
+        "gas": {
+            "model": "seiliger", "compression_ratio": float(round(rng.uniform(12.0, 16.0), 2)),
+            "peak_pressure": q(peak, "bar"), "imep": q(peak * rng.uniform(0.14, 0.25), "bar"),
+        },
+    }  # fmt: skip
+    table = with_objective(rng, table, 1, channels=("mount force", "roll moment"))
+    return limits_at(rng, table, [{"limit": "rms shaking force", "side": "max", "unit": "N"}], 0.3)
+
+
 def banks(rng: Generator) -> Table:
     """A vee twin whose bank angle or split pin is open, and weights on its crank."""
     engine = {
@@ -875,6 +896,7 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "places": places,
     "leads": leads,
     "bank angle": banks,
+    "shared leads": shared_leads,
     "sizes": sizes,
 }
 

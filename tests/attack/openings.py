@@ -257,6 +257,8 @@ class Openings:
             return decided[".".join(path)]
         if path[0] == "main_bearings":
             return decided[f"{_at(self.table, path[:-1])['name']}.{path[-1]}"]
+        if path[-1] == "crank_lead":
+            return math.degrees(decided["crank lead"])
         if path[0] == "engine":
             throws, bank, split = self._angles(engine)
             if path[1] == "throws":

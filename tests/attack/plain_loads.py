@@ -85,6 +85,8 @@ class Mechanism:
     knuckle: Knuckle | None = None
     lever: Lever | None = None
     shape: Shape | None = None
+    partner: tuple[float, float, float] | None = None
+    """Radius and rod of another piston in the same cylinder, and by how much it comes first."""
     bore: float = 0.0
     shank: float = 0.0
     """Mass of a straight rod between its pins."""
@@ -240,10 +242,37 @@ def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
         from attack.plain_rotary import spectrum
 
         return spectrum(gas, m)
+    if m.partner is not None:
+        return shared_torque(gas, m, turns)
     area = 0.25 * math.pi * m.bore**2
     over = seiliger(gas, m, turns) - number(gas.get("crankcase_pressure", ATMOSPHERE))
     rise = slope(travel(m, angles(turns, FINE)).astype(complex), turns).real
     return np.fft.rfft(-area * over * rise)[: SAMPLES // 2 + 1] / FINE
+
+
+def shared_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
+    """The same of a chamber between two pistons, from the dead centre of one: its volume is what both leave."""
+    assert m.partner is not None
+    radius, rod, ahead = m.partner
+    far, step = _with(m, radius=radius, rod=rod), 1e-4
+
+    def left(angle: Any) -> Any:
+        return -travel(m, np.asarray(angle)) - travel(far, np.asarray(angle) + ahead)
+
+    def turning(around: float) -> float:
+        return brentq(lambda a: float(left(a + step) - left(a - step)), around - 1.2, around + 1.2, xtol=1e-13)
+
+    top, bottom = turning(-0.5 * ahead), turning(np.pi - 0.5 * ahead)
+    v = left(angles(turns, FINE))
+    share = np.clip((v - left(top)) / (left(bottom) - left(top)), 0.0, 1.0)
+    since = np.mod(angles(turns, FINE) - top, 2.0 * np.pi * turns)
+    down, up = bottom - top, 2.0 * np.pi
+    strokes = np.where(since < down, 0.5, 1.5)
+    if turns == 2:
+        strokes = np.searchsorted([down, up, up + down], since, side="right") + 0.5
+    over = mixed_cycle(gas, share, strokes, 2 * turns) - number(gas.get("crankcase_pressure", ATMOSPHERE))
+    area = 0.25 * math.pi * m.bore**2
+    return np.fft.rfft(area * over * slope(v.astype(complex), turns).real)[: SAMPLES // 2 + 1] / FINE
 
 
 def chamber_pressure(told: dict[str, Any], x: np.ndarray, grows: np.ndarray) -> np.ndarray:
@@ -407,9 +436,13 @@ def _opposed(e: dict[str, Any]) -> list[Mechanism]:
     lower = _inline(e)
     ratio, lead = int(e.get("crank_ratio", -1)), math.radians(e.get("crank_lead", 0.0))
     centre = complex(number(e["crank_distance"]))
-    return lower + [
+    upper = [
         _with(m, centre=centre, ratio=ratio, bank=math.pi, throw=math.pi + ratio * (m.throw + lead)) for m in lower
     ]
+    if "bore" in e:
+        fires = [(m.bank - m.throw) % (2.0 * math.pi) for m in lower]
+        lower = [_with(m, partner=(m.radius, m.rod, lead), fires=at) for m, at in zip(lower, fires, strict=True)]
+    return lower + upper
 
 
 def _parts(e: dict[str, Any]) -> list[Mechanism]:
