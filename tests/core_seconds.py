@@ -26,11 +26,11 @@ _PROPERTY = "core-seconds"
 
 def add_options(parser: pytest.Parser) -> None:
     parser.addoption("--core-seconds", metavar="FILE", help="write what every test takes of one core to FILE")
-    parser.addoption("--relist", action="store_true", help=f"write {LISTED.name} anew, for the tests that run")
+    parser.addoption("--relist", choices=("anew", "more"), help=f"write {LISTED.name}: for all that run, or add to it")
 
 
 def mark_listed(config: pytest.Config, items: Iterable[pytest.Item]) -> None:
-    listed = set() if config.getoption("--relist") else set(listed_now())
+    listed = set() if config.getoption("--relist") == "anew" else set(listed_now())
     for item in items:
         if item.nodeid in listed:
             item.add_marker("slow")

@@ -24,7 +24,7 @@ def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     (tmp_path / HERE).parent.mkdir(parents=True)
     (tmp_path / HERE).write_text("def test_a_run_lists_what_took_longer():\n")
     monkeypatch.setattr(core_seconds, "LISTED", path)
-    config: Any = SimpleNamespace(getoption=lambda name: name == "--relist")
+    config: Any = SimpleNamespace(getoption=lambda name: "anew" if name == "--relist" else None)
     run = CoreSeconds(config)
     for name, seconds, marks in (("now quick", 0.01, ()), ("now slow", 0.9, ()), ("marked", 0.9, ("slow",))):
         for share in (0.25, 0.75):
@@ -41,11 +41,11 @@ def test_a_run_lists_what_took_longer(told: CoreSeconds) -> None:
 
 
 def test_what_is_listed_is_marked_unless_it_is_measured_anew(told: CoreSeconds) -> None:
-    for relist in (False, True):
+    for relist in (None, "more", "anew"):
         marked: list[str] = []
         items: Any = [
             SimpleNamespace(nodeid=f"{OWN}[{name}]", add_marker=marked.append) for name in ("not run", "other")
         ]
         config: Any = SimpleNamespace(getoption=lambda name, relist=relist: relist)
         mark_listed(config, items)
-        assert marked == ([] if relist else ["slow"])
+        assert marked == ([] if relist == "anew" else ["slow"])

@@ -11,6 +11,9 @@ import pytest
 from shared import once
 from structure import source_shape
 
+# all share what takes seconds to measure; `make test` and the hook before a commit look at it
+pytestmark = pytest.mark.slow
+
 RULES = {
     "long_files": f"files over {source_shape.FILE_LINES} lines",
     "long_functions": f"functions over {source_shape.FUNCTION_LINES} lines",
