@@ -88,7 +88,7 @@ def test_no_design_goes_under_the_bound(name: str, quantity: str) -> None:
 
 def test_mechanisms_whose_rods_are_not_modelled_are_refused_by_name() -> None:
     yoke = {key: value for key, value in ENGINE.items() if key not in ("rod", "rod_length", "rod_ratio")}
-    yoke |= {"drive": "swinging-yoke", "pivot_distance": "200 mm", "return_ratio": 1.6}
+    yoke |= {"drive": "swinging-yoke", "pivot_distance": "200 mm", "return_ratio": 1.6, "throws": [0, 240, 120]}
     with pytest.raises(ModelError, match="loads of its rod are not modelled"):
         laufruhe.solve(problem_of({"engine": yoke, "gas": None}, "mean main-bearing force"))
 

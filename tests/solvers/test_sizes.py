@@ -269,7 +269,7 @@ def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
-        (changed(TEXT, "throws = [0]", 'throws = [{ between = [0, 90] }]'), "no method decides|engine.throws"),
+        (changed(TEXT, "throws = [0]", 'throws = [{ between = [0, 90] }]'), "with throws that are given|engine.throws"),
         (changed(TEXT, '"0.5 kg"', '{ between = ["0.1 kg", "1 kg"] }'), "no method decides piston and size together"),
         (TEXT + '[[counterweights]]\nname = "b"\nbalance_factor = 0.5\n', "counts masses that follow from sizes"),
         (changed(TEXT, "samples = 360", 'crank_inertia = "1 kg m^2"'), "even crank speed|no method"),
