@@ -254,3 +254,18 @@ def test_banks_that_share_throws_are_decided_order_by_order() -> None:
     assert result.certificate.kind is Proof.GLOBAL
     assert result.certificate.lower_bound <= min(star.value for star in result.phasing.ranking) * (1.0 + 1e-12)
     assert "72 of 72 firing order(s) of 9 stars" in result.certificate.method
+
+
+def test_heat_of_an_absorber_tells_firing_orders_apart() -> None:
+    """Each order by itself is the judge; a limit that none keeps is proven to be one."""
+    damper = {"name": "damper", "on": "pulley", "inertia": "0.01 kg m^2", "damping": "2 N m s/rad"}
+    torsion = tables()["torsion"] | {"absorbers": [damper]}
+    limit = {"limit": "absorber heat", "max": "1 MW"}
+    free = laufruhe.solve(problem_of(tables(torsion=torsion, constraints=[limit])))
+    heat = free.limits[0].value
+    tight = laufruhe.solve(problem_of(tables(torsion=torsion, constraints=[{**limit, "max": f"{0.999 * heat} W"}])))
+    if tight.status is Status.OPTIMAL:
+        assert tight.limits[0].value < heat
+        assert tight.objective.value > free.objective.value
+    none = laufruhe.solve(problem_of(tables(torsion=torsion, constraints=[{**limit, "max": "1e-6 W"}])))
+    assert none.status is Status.INFEASIBLE

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from laufruhe.errors import ModelError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models import turned_loads, uneven_model
 from laufruhe.load_models.mount_loads import MovedThrows
@@ -54,12 +55,12 @@ LOADS = (
 )  # fmt: skip
 
 
-def problem_of(engine: dict[str, Any], objective: str, throws: int = 3, **told: Any) -> Problem:
+def problem_of(engine: dict[str, Any], quantity: str, throws: int = 3, **told: Any) -> Problem:
     """An engine with a bearing on either side of every throw; a key of `told` that is None is left out."""
     half = 62.5 * throws
     bare = {key: value for key, value in THREE["engine"].items() if key not in ("firing_order", "throws")}
     whole = {key: value for key, value in THREE.items() if key not in ("constraints", "counterweights")}
-    whole |= {"engine": bare | engine, "objective": {"minimise": objective}, "fidelity": {"samples": 192}}
+    whole |= {"engine": bare | engine, "objective": {"minimise": quantity}, "fidelity": {"samples": 192}}
     whole["search"] = {"boxes": 60}
     whole["main_bearings"] = [
         {"x": f"{half - 125 * k} mm", "diameter": "80 mm", "width": "32 mm"} for k in range(throws + 1)
@@ -239,3 +240,62 @@ def test_stored_work_bounds_the_degree_of_irregularity(inertia: float) -> None:
         shares.append(least / exact)
     if inertia > 10.0:
         assert min(shares) > 0.93
+
+
+ELASTIC: dict[str, Any] = {
+    "mounts": {"kind": "elastic", "loss_factor": 0.1, "places": [
+        {"name": name, "position": [f"{x} mm", f"{y} mm", "0 mm"], "stiffness": ["200 N/mm", "200 N/mm", stiffness]}
+        for name, x, y, stiffness in (
+            ("left", 250, 250, {"between": ["100 N/mm", "600 N/mm"]}), ("right", 250, -250, "400 N/mm"),
+            ("rear", -900, 0, "400 N/mm"),
+        )
+    ]},
+    "block": {"mass": "300 kg", "centre_of_gravity": ["-200 mm", "0 mm", "100 mm"],
+              "inertia": ["20 kg m^2", "45 kg m^2", "40 kg m^2"]},
+    "constraints": [{"limit": "static sag", "max": "8 mm"}],
+}  # fmt: skip
+BOTH = {"terms": [{"quantity": "mean main-bearing force", "weight": 0.1}, {"quantity": "rms mount force"},
+                  {"quantity": "rms shaft twist", "weight": 1e5}]}  # fmt: skip
+
+
+@pytest.mark.slow
+def test_firing_orders_beside_a_spring_that_is_open() -> None:
+    """Bearings, twist and mounts in one sum: every order at every stiffness of a grid is worse than the bound."""
+    told = ELASTIC | {"counterweights": None, "objective": BOTH}
+    crank = {"throws": "open", "firing_order": "open", "cylinders": 3}
+    result = laufruhe.solve(problem_of(crank, "", **told))
+    values = []
+    for order in ([1, 2, 3], [1, 3, 2]):
+        fixed = problem_of({"firing_order": order}, "", **told)
+        decision = fixed.mount_decisions[0]
+        for stiffness in np.linspace(decision.lower, decision.upper, 21):
+            own = evaluate(fixed, fixed.design([float(stiffness)], [decision]))
+            if own.excess(fixed.limits) <= 0.0:
+                values.append(objective_value(fixed, own))
+    assert result.certificate.lower_bound <= min(values) * (1.0 + 1e-9)
+    assert result.objective.value <= min(values) * (1.0 + 1e-6)
+    assert result.certificate.gap < 0.05
+
+
+@pytest.mark.slow
+def test_throws_that_move_beside_a_spring_that_is_open() -> None:
+    """No worse than any throw and stiffness of a grid by more than the tolerance of a local search."""
+    told = ELASTIC | {"counterweights": None, "objective": BOTH}
+    crank = {"throws": [0, {"between": [100, 140]}, 240], "firing_order": [1, 3, 2]}
+    problem = problem_of(crank, "", **told)
+    result = laufruhe.solve(problem)
+    assert result.status is Status.FEASIBLE
+    values = []
+    start = starts_of(problem.phasing, None, True)[0]
+    for angle in np.radians(np.linspace(100, 140, 9)):
+        own = problem.phasing.realise(replace(start, throws=(0.0, float(angle), start.throws[2])))
+        decision = own.mount_decisions[0]
+        for stiffness in np.linspace(decision.lower, decision.upper, 9):
+            found = evaluate(own, own.design([float(stiffness)], [decision]))
+            if found.excess(own.limits) <= 0.0:
+                values.append(objective_value(own, found))
+    assert result.objective.value <= min(values) * (1.0 + 1e-4)
+    assert result.certificate.lower_bound <= min(values)
+    even = [{"quantity": "degree of irregularity", "weight": 1e4}, {"quantity": "rms mount force"}]
+    with pytest.raises(ModelError, match=r"no method decides stiffness and star together .* degree of irregularity"):
+        laufruhe.solve(problem_of(crank, "", **told | {"objective": {"terms": even}}))

@@ -128,6 +128,11 @@ class Measure:
         return self.is_load and self.load.feels_order
 
     @property
+    def is_told_apart(self) -> bool:
+        """Whether it is a number of what drives the crankshaft's twist, that no sum over the cylinders gives."""
+        return self.channel.of_loads and self.channel.is_number and not self.is_mounting
+
+    @property
     def is_twist(self) -> bool:
         """Whether it is of the crankshaft's twist, which rotors do not load."""
         return self.is_load and not self.load.feels_unbalances

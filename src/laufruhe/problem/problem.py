@@ -242,6 +242,8 @@ class Problem:
     def feels_order(self) -> bool:
         """Whether anything asked changes with the firing order of one star: twist, and all inside with gas."""
         felt = [measure.load for measure in self.measures if measure.feels_order]
+        if any(measure.is_told_apart for measure in self.measures):
+            return True
         return (self.has_gas and bool(felt)) or not all(load.feels_unbalances for load in felt)
 
     @property

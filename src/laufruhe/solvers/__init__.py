@@ -189,12 +189,15 @@ def _adds_points(problem: Problem) -> bool:
 
 
 def _asks_stars(problem: Problem) -> bool:
-    """Whether stars may be told apart by all that is asked: by loads, and by masses."""
-    return _asks_loads(problem) and _adds_points(problem)
+    """Whether stars may be told apart by all that is asked: by loads, masses, and what each by itself is known for."""
+    return _adds_points(problem) and not any(m.is_mounting and m.channel.of_loads for m in problem.measures)
 
 
-def _nothing_inside(problem: Problem) -> bool:
-    return _adds_points(problem) and not any(map(_is_inside, problem.measures))
+def _asks_stars_on_mounts(problem: Problem) -> bool:
+    """Whether stars on open mounts are told apart by all that is asked; how evenly they turn while they are even."""
+    moves = problem.phasing is not None and problem.phasing.continuous
+    numbers = (m.channel.is_number and not m.is_mounting for m in problem.measures)
+    return problem.engine.block is not None and _adds_points(problem) and not (moves and any(numbers))
 
 
 def _is_inside(measure: Measure) -> bool:
@@ -237,7 +240,7 @@ METHODS: tuple[Method, ...] = (
            Reach.ASIDE, _apart),
     Method("local programs of sizes and mounts", frozenset({Kind.SIZE, _U, _K, _M}), _asks_mounted_sizes, Reach.ASIDE,
            _mounted_sizes),
-    Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _nothing_inside, Reach.ASIDE,
+    Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _asks_stars_on_mounts, Reach.ASIDE,
            _stars_on_mounts),
 )  # fmt: skip
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""

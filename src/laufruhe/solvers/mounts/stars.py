@@ -81,7 +81,7 @@ def solve_star_mounts(problem: Problem) -> Result:
     started = time.perf_counter()
     ranking, count = _stars(problem, phasing)
     stars = [(replace(star, firing_order=order.order), steps) for star, steps in ranking
-             for order in told_orders(problem, phasing, star, steps)]  # fmt: skip
+             for order in told_orders(problem, _only(phasing, star, steps), star, steps)]  # fmt: skip
     designs = count - len(ranking) + len(stars)
     ranked = time.perf_counter()
     found = _solved_shortly(problem, phasing, stars)
@@ -100,7 +100,9 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
         return [(replace(star, left_out=phasing.without(built)), None) for built in sets], len(sets)
     if phasing.throw_bounds is not None:
         return [], 0
-    families, _ = families_of(phasing)
+    # of throws that cylinders share every firing order is looked at later
+    by_firing = problem.feels_order and not phasing.shares_throws
+    families, _ = families_of(phasing, by_firing)
     if sum(family.size for family in families) > MOST_LISTED:
         raise ModelError(f"more than {MOST_LISTED} stars are open together with mounts; fix the firing order")
     on_given = replace(phasing, realise=lambda candidate: _on_given_mounts(phasing.realise(candidate)))
@@ -122,7 +124,8 @@ def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> t
         model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, nothing_of(given)
     )
     stars: list[tuple[float, Star]] = [
-        (s.value, (family.candidate(phasing, s.star, phasing.without(s.built)), s.star)) for s in found.solved
+        (s.value, (family.candidate(phasing, s.star, phasing.without(s.built)), family.steps_of(s.star)))
+        for s in found.solved
     ]
     return stars, found.designs
 
@@ -252,8 +255,14 @@ def _entry(phasing: Phasing, found: StarDesign, proven: bool) -> RankedStar:
     certificate = found.result.certificate
     bound = certificate.lower_bound if certificate is not None else 0.0
     proven = proven and certificate is not None and certificate.kind is Proof.GLOBAL
-    only = phasing if found.steps else replace(phasing, firing_order=found.candidate.firing_order)
-    return ranked_star(only, found.candidate, found.steps, found.value, bound, proven)
+    return ranked_star(
+        _only(phasing, found.candidate, found.steps), found.candidate, found.steps, found.value, bound, proven
+    )
+
+
+def _only(phasing: Phasing, star: Candidate, steps: tuple[int, ...] | None) -> Phasing:
+    """What is open of a star: its firing orders, or nothing where it is one of them."""
+    return phasing if steps else replace(phasing, firing_order=star.firing_order or phasing.firing_order)
 
 
 def _none(problem: Problem, found: list[StarDesign], given: Evaluation, designs: int) -> Result:

@@ -42,6 +42,10 @@ class Family:
         """The design of a star, with the first of its firing orders."""
         return phasing.star(steps, self.space.phases, self.geometry, left_out)
 
+    def steps_of(self, star: Sequence[int]) -> tuple[int, ...] | None:
+        """Steps of the throws of one of its stars; None of a firing order."""
+        return tuple(map(int, star))
+
     def told(self, phasing: Phasing, candidate: Candidate) -> Phasing:
         """What is open of one of its stars: the firing order, where it is."""
         del candidate
@@ -65,6 +69,10 @@ class FiringFamily(Family):
     def candidate(self, phasing: Phasing, steps: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
         """The design of a firing order."""
         return phasing.fired(steps, self.geometry, left_out)
+
+    def steps_of(self, star: Sequence[int]) -> None:
+        """Its steps are slots of the cycle."""
+        del star
 
     def told(self, phasing: Phasing, candidate: Candidate) -> Phasing:
         """Nothing: its firing order is the design's own."""

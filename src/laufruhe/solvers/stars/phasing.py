@@ -75,10 +75,11 @@ def solve_phasing(problem: Problem) -> Result:
 def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
     if of_wheel(problem):
-        alone = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
-        told = solve_told_alike(problem, alone, solve_phasing) if is_even and families_of(alone)[0] else None
+        even = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
+        told = solve_told_alike(problem, even, solve_phasing) if is_even and families_of(even)[0] else None
         return _uneven(problem, phasing, None if told is None or told.objective is None else told)
-    if problem.feels_order and is_even and phasing.shares_throws:
+    alone = phasing.shares_throws or any(measure.is_told_apart for measure in problem.measures)
+    if problem.feels_order and is_even and alone:
         stars = every_star(phasing)
         result = by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
         if not phasing.continuous:

@@ -154,6 +154,8 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> S
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
     problem = with_work(replace(phasing.realise(start), phasing=None))
+    # what is a number of each crank by itself is judged, and in no program
+    problem = replace(problem, limits=problem.load_limits)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, intervals)
     if not moves.size or _is_nothing(best):
         return best
