@@ -15,7 +15,7 @@ import numpy as np
 
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.load_models.sized_model import Piece
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
 
 TERMS, BETWEEN = 20, (0.13, 0.71)
 """Terms of a series, and where between its ends it is held against the exact model."""
@@ -75,7 +75,9 @@ class RodSeries:
         return (2.0 / length - ends[0] - ends[1]) / (ends[0] - ends[1])
 
 
-def rod_series(pieces: Callable[[float], Sequence[Piece]], start: float, low: float, high: float) -> list[RodSeries]:
+def rod_series(
+    pieces: Callable[[float], Sequence[Piece]], start: float, low: float, high: float, kept: Sequence[Mask]
+) -> list[RodSeries]:
     """Every piece of a measure between two lengths of the rod.
 
     Parameters
@@ -84,6 +86,8 @@ def rod_series(pieces: Callable[[float], Sequence[Piece]], start: float, low: fl
         Of a length, with all their rows.
     start
         The length whose factors all rows get.
+    kept
+        Rows of each that no bend passes between the lengths; the others count as nothing, which is never too much.
 
     Raises
     ------
@@ -91,19 +95,23 @@ def rod_series(pieces: Callable[[float], Sequence[Piece]], start: float, low: fl
         If the series of a load does not end: a bend of it moves with the length.
     """
     given = pieces(start)
-    told = [_like(given, pieces(length)) for length in _lengths(low, high)]
+    told = [_like(given, pieces(length), kept) for length in _lengths(low, high)]
     found = []
     for k, piece in enumerate(given):
         constant, slope = (np.stack([getattr(each[k], part) for each in told]) for part in ("constant", "slope"))
         found.append(RodSeries(piece, low, high, constant, slope, np.zeros(0)))
     between = [low + share * (high - low) for share in BETWEEN]
-    exact = [_like(given, pieces(length)) for length in between]
+    exact = [_like(given, pieces(length), kept) for length in between]
     return [_with_rest(own, between, [each[k] for each in exact]) for k, own in enumerate(found)]
 
 
-def _like(given: Sequence[Piece], found: Sequence[Piece]) -> list[AffineNorm]:
-    """Pieces at another length with the factors that they are given with."""
-    return [own.scaled(piece.given) if piece.given else own.affine for piece, own in zip(given, found, strict=True)]
+def _like(given: Sequence[Piece], found: Sequence[Piece], kept: Sequence[Mask]) -> list[AffineNorm]:
+    """Pieces at another length with the factors that they are given with, rows that are not kept at nothing."""
+    alike = [own.scaled(piece.given) if piece.given else own.affine for piece, own in zip(given, found, strict=True)]
+    return [
+        replace(own, constant=own.constant * rows[:, None], slope=own.slope * rows[:, None, None])
+        for own, rows in zip(alike, kept, strict=True)
+    ]
 
 
 def _with_rest(own: RodSeries, lengths: Sequence[float], exact: Sequence[AffineNorm]) -> RodSeries:

@@ -17,7 +17,7 @@ import numpy as np
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.machine.running_gear import ROD_LENGTH, Size
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.spectrum import Spectrum
@@ -27,6 +27,8 @@ from laufruhe.problem.measure import Measure, Rows, bends_of, load_rows, mass_ro
 from laufruhe.problem.problem import Problem
 
 MASSES, MOST_KEPT = 4, 4096
+BETWEEN, BESIDE, SAME = 7, 0.02, 1e-9
+"""Lengths of the rod at which bends are looked for, how much farther they are taken to move, and no move [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +184,34 @@ class SizeModel:
         bends = bends_of(measure, own, self.problem.engine)
         return lambda at: self._cut_up(measure, at, bends)
 
+    def still_rows(self, measure: Measure) -> list[Mask]:
+        """Of the whole pieces of a measure the rows past whose angles no bend moves with the length of the rod.
+
+        Raises
+        ------
+        ValueError
+            If a load has other bends at another length.
+        """
+        pieces = self.whole_pieces(measure)(self._given[ROD_LENGTH])
+        if not measure.is_load:
+            return [np.ones(len(own.affine.constant), dtype=bool) for own in pieces]
+        given, low, high = self._given[ROD_LENGTH], *self.rod_span
+        lengths = [given, *np.linspace(low, high, BETWEEN)]
+        base = self.problem.engine.cycle.base_order
+        found = [over(base, self._each_alone(float(each))[0].signals(measure.load)) for each in lengths]
+        bends = bends_of(measure, found[0], self.problem.engine)
+        steps = measure.norm.refinement * self.problem.fidelity.samples
+        kept = [
+            _unswept([own[k] for own in found], np.append(found[0][k].period * np.arange(steps) / steps, bends[k]))
+            for k in range(len(self.problem.points))
+        ]
+        # of every operating point as many places with these angles
+        counts = [len(own.affine.constant) // len(own.at) for own in pieces]
+        return [
+            np.concatenate([np.resize(kept[k], count) for k, _, _ in own.at])
+            for own, count in zip(pieces, counts, strict=True)
+        ]
+
     def pieces(self, measure: Measure, rod_length: float | None = None) -> tuple[Piece, ...]:
         """A measure of loads at a length of the rod, that of the start unless told: the largest of these."""
         length = self.problem.engine.slider_cranks[0].rod_length if rod_length is None else rod_length
@@ -255,6 +285,21 @@ class SizeModel:
             scalar = told is None and (not piece.given or piece.given[0].size == 1)
             pieces.append(piece.pruned(*self._span) if scalar else piece)
         return tuple(pieces)
+
+
+def _unswept(signals: Sequence[Spectrum], angles: Array) -> Mask:
+    """Angles that no bend of a signal at several lengths passes on the way from one to the next."""
+    period = signals[0].period
+    own = [np.zeros(0) if each.corners is None else each.corners.angles for each in signals]
+    if len({len(each) for each in own}) > 1:
+        raise ValueError("a load has other bends at another length of the rod")
+    # what stands at zero may be told as a whole period
+    turned = np.array([np.sort(np.mod(each + SAME, period)) - SAME for each in own])
+    low, high = turned.min(axis=0, initial=period), turned.max(axis=0, initial=-period)
+    wide = BESIDE * (high - low)
+    moved = high - low > 2.0 * SAME
+    over = (angles[:, None] > (low - wide)[moved]) & (angles[:, None] < (high + wide)[moved])
+    return np.asarray(~over.any(axis=1))
 
 
 def _heavier(engine: Engine, masses: Array) -> Engine:

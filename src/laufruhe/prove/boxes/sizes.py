@@ -63,6 +63,8 @@ class SizeBoxes:
 
     def __init__(self, model: SizeModel, ask: Ask | None = None) -> None:
         self.model, problem = model, model.problem
+        # no row is left out for a bend that passes it
+        self.is_whole = True
         # for each size whether masses grow with it or fall
         self._light = self._ways(lambda x: np.abs(self.model.masses(x)))
         self.terms = [(term.weight, self._number(term.measure, 1.0)) for term in problem.objective]
@@ -98,7 +100,9 @@ class SizeBoxes:
             still = tuple(Bundle(Still(piece, piece.affine)) for piece in pieces)
             return Number(measure, sense, self._ways(factors), still)
         start = self.model.problem.engine.slider_cranks[0].rod_length
-        series = rod_series(self.model.whole_pieces(measure), start, *self.model.rod_span)
+        kept = self.model.still_rows(measure)
+        self.is_whole = self.is_whole and all(rows.all() for rows in kept)
+        series = rod_series(self.model.whole_pieces(measure), start, *self.model.rod_span, kept)
         return Number(measure, sense, self._ways(factors), tuple(map(Bundle, series)))
 
     def _ways(self, numbers: Callable[[Array], Array]) -> Ways:

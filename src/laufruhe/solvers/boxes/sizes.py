@@ -110,7 +110,7 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     if boxes is not None and found.excludes_all:
         return none_within(problem, initial, _conflict(problem, boxes), {"solve": time.perf_counter() - started})
     told = _why(problem) if boxes is None else f"local programs; lower bound on {found.divided.boxes} boxes of sizes"
-    proof = shown(program, found.design, found.bound, Reach.ASIDE if boxes is None else Reach.WHOLE, told)
+    proof = shown(program, found.design, found.bound, _reach(boxes), told)
     return concluded(found.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
@@ -157,6 +157,13 @@ def _boxes(model: SizeModel) -> SizeBoxes | None:
         return None
 
 
+def _reach(boxes: SizeBoxes | None) -> Reach:
+    """What such boxes can prove."""
+    if boxes is None:
+        return Reach.ASIDE
+    return Reach.WHOLE if boxes.is_whole else Reach.NEAR
+
+
 def _conflict(problem: Problem, boxes: SizeBoxes) -> tuple[str, ...]:
     """Limits that no sizes keep together, as far as boxes tell."""
     return smallest_conflict(
@@ -176,5 +183,5 @@ def check_acts(model: SizeModel) -> None:
 
 def _why(problem: Problem) -> str:
     has_rod = any(decision.name == "engine.rod_length" for decision in problem.decisions)
-    why = "local programs; bends of a load move with the length of the rod, and nothing bounds it"
+    why = "local programs; nothing bounds what the length of the rod makes of a load"
     return why if has_rod else "local programs"
