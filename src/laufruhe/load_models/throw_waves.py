@@ -24,7 +24,7 @@ from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base, orders_equal
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure, load_rows, mass_rows, selected
+from laufruhe.problem.measure import Measure, mass_rows, selected
 from laufruhe.problem.problem import Problem
 
 _NOTHING, _FEW = 1e-10, 24
@@ -227,21 +227,19 @@ class ThrowWaves:
         self, measure: Measure, own: Sequence[NDArray[np.complex128]], samples: int
     ) -> NDArray[np.complex128]:  # fmt: skip
         """Rows of every order of coefficients at the operating points, shape (orders, k, d)."""
-        places = [round(order / self.base) for order in self.times]
-        nowhere, found = [np.zeros(0)] * len(own), []
-        for h, j in enumerate(places):
-            rows = []
-            for turn in (1.0, -1.0j):
-                alone = []
-                for values in own:
-                    coefficients = np.zeros((j + 1, *values.shape[1:]), complex)
-                    coefficients[j] = turn * values[h]
-                    one = Spectrum(self.base, coefficients)
-                    alone.append(averaged(self.problem, measure, one, samples))
-                engine = self.problem.engine
-                rows.append(load_rows(measure, self.problem.points, alone, engine, samples, nowhere).vectors)
-            found.append(rows[0] + 1j * rows[1])
-        return np.array(found)
+        steps, times = [round(order / self.base) for order in self.times], np.array([float(t) for t in self.times])
+        angles = math.tau / float(self.base) * np.arange(samples) / samples
+        waves, blocks = np.exp(1j * np.outer(times, angles)), []
+        for values, share in zip(own, measure.shares(self.problem.points), strict=True):
+            series = np.zeros((max(steps) + 1, *values.shape[1:]), complex)
+            series[steps] = values
+            one = averaged(self.problem, measure, Spectrum(self.base, series), samples)
+            # as load_rows has them: what counts of every place, at one angle after the other
+            counted = selected(measure, one, self.problem.engine).coefficients[steps]
+            if share > 0.0 and counted.shape[1]:
+                rows = np.einsum("hpd,hs->hpsd", counted, waves)
+                blocks.append(rows.reshape(len(steps), -1, counted.shape[-1]))
+        return np.concatenate(blocks, axis=1) if blocks else np.zeros((len(steps), 1, 1), complex)
 
     def _turned(self, part: Moving) -> NDArray[np.complex128]:
         """Every order back to theta = 0 and no whole turns, shape (orders, 1, 1)."""
