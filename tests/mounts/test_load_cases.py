@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from scipy.optimize import differential_evolution, minimize
 
 from laufruhe.errors import InputError
+from laufruhe.files.reader import load
 from laufruhe.machine import Mount
 from laufruhe.machine.load_case import LoadCase
 from laufruhe.physics import mount_numbers
@@ -17,6 +19,7 @@ from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.static_cases import case_wrench, settled, stops_of
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.prove.certificate import Proof
+from laufruhe.prove.mounts.box_cases import held_loads
 from laufruhe.prove.mounts.box_numbers import RANGES
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
@@ -133,6 +136,28 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
         ratios.append(float(least) / min(remounted(given, engine).value(measure) for engine in drawn))
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
+
+
+@pytest.mark.parametrize("name", ["powertrain-joined-springs", "powertrain-hydraulic"])
+@pytest.mark.parametrize("asked", ["static travel", "static mount force"])
+def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, asked: str) -> None:
+    """Boxes of every size, at random and at corners."""
+    tables = tomllib.loads((Path(__file__).parents[2] / "problems" / f"{name}.toml").read_text(encoding="utf-8"))
+    tables["mounts"]["stop"] = {"gap": "4 mm", "stiffness": "1200 N/mm"}
+    tables["load_cases"] = [{"name": "bump", "times_weight": [0.2, 0, -3]}, {"name": "torque", "torque": "350 N m"}]
+    tables["constraints"] = [{"limit": asked, "max": "1 m" if asked == "static travel" else "1 MN"}]
+    problem, generator, ratios = load(tables), np.random.default_rng(1), []
+    given, measure = evaluate(problem), problem.mount_limits[0].measure
+    model = BoxModel(problem, given)
+    for width in (0.2, 0.05, 0.01, 0.2, 0.05, 0.01):
+        centre = model.lower * (model.upper / model.lower) ** generator.random(len(model.lower))
+        low, high = (np.clip(centre * (1.0 + side * width), model.lower, model.upper) for side in (-1.0, 1.0))
+        shares = generator.random((4, len(low)))
+        drawn = [problem.design((low + s * (high - low)).tolist()) for s in (*shares, *np.round(shares))]
+        least = min(remounted(given, engine).value(measure) for engine in drawn)
+        ratios.append(float(held_loads(model, measure, low[None], high[None])[0]) / least)
+    assert max(ratios) <= 1.0 + 1e-9
+    assert np.median(ratios) > 0.95
 
 
 LIMIT = '[[constraints]]\nlimit = "static travel"\nmax = "9 mm"\n[search]\nstarts = 4\n'
