@@ -18,6 +18,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified, room_of
+from laufruhe.prove.throws.firing_share import firing_bound
 from laufruhe.solvers.conclusion import no_star, with_star
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.answers import Answer, Decided, searched
@@ -243,8 +244,11 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         why = f"each of the {len(fired)} best star(s) breaks a limit between the angles that the search looks at"
         return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
     value = result.objective.value if result.objective else best.value
+    angles = (phasing.bank, phasing.split)
+    is_one = not any(pair is not None and pair[0] < pair[1] for pair in angles)
+    shared = firing_bound(problem, result.final) if is_one and result.objective else 0.0
     certificate = certified(
-        value, answer.bound, nothing_of(problem), problem.tolerance, Reach.WHOLE,
+        value, max(answer.bound, shared), nothing_of(problem), problem.tolerance, Reach.WHOLE,
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]

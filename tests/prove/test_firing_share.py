@@ -1,0 +1,66 @@
+"""What all even stars share bounds each of them, with any weights."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from laufruhe.files.reader import load_tables
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.throws.firing_share import firing_bound
+from laufruhe.solvers import solve
+from laufruhe.solvers.stars.phasing import every_star
+from problem_files import PROBLEMS
+
+
+def problem(name: str, quantity: str = "mean mount force", **engine: Any) -> Problem:
+    told = tomllib.loads((PROBLEMS / f"compare-{name}.toml").read_text(encoding="utf-8"))
+    told["engine"] |= engine
+    return load_tables({**told, "objective": {"minimise": quantity}}, Path("star.toml"))
+
+
+CASES = [
+    ("inline", "mean mount force", {"cylinders": 5}),
+    ("inline", "maximum mount force", {"cylinders": 6}),
+    ("vee", "rms mount force", {"cylinders": 6, "bank_angle": 60, "split_pin_angle": 60}),
+    ("inline", "peak to peak roll moment", {"cylinders": 7}),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "quantity", "engine"), CASES)
+def test_no_even_star_with_any_weights_goes_under_it(name: str, quantity: str, engine: dict[str, Any]) -> None:
+    own = problem(name, quantity, **engine)
+    random, found = np.random.default_rng(3), []
+    stars = every_star(own.phasing)
+    for k in random.choice(len(stars), 4):
+        realised = replace(own.phasing.realise(stars[int(k)][0]), phasing=None)
+        for size in (0.0, 0.02, 0.3):
+            values = [complex(*random.normal(0.0, 0.1 * size, 2)) for _ in realised.unbalances]
+            design = evaluate(realised, realised.design(values, realised.unbalances))
+            bound = firing_bound(own, design)
+            found.append(bound)
+            assert objective_value(realised, design) >= bound * (1.0 - 1e-9) > 0.0
+    assert found == pytest.approx([found[0]] * len(found), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_six_in_line_reaches_it() -> None:
+    own = problem("inline", cylinders=6)
+    found = solve(own)
+    assert found.objective.value == pytest.approx(firing_bound(own, found.final), rel=1e-6)
+    assert str(found.certificate.kind) == "global"
+
+
+def test_shafts_that_turn_with_the_firing_leave_nothing_known() -> None:
+    """Four cylinders fire twice a turn, as the shafts of the second order turn."""
+    own = problem("inline", cylinders=4)
+    (candidate, _), *_ = every_star(own.phasing)
+    realised = replace(own.phasing.realise(candidate), phasing=None)
+    assert firing_bound(own, evaluate(realised)) == 0.0
