@@ -291,6 +291,21 @@ def test_fidelities_of_a_run_up_have_its_loads() -> None:
     assert any(not own.points for _, own in ladder(limited(objective={"minimise": "static sag"})))
 
 
+@pytest.mark.slow
+def test_errors_of_run_ups_are_told_and_hold_at_finer_steps() -> None:
+    """What stands between steps is no more than what is told, by those of SciPy; all orders stay for a run."""
+    asked = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
+    problem = limited(("run-up force", "1 kN"), **asked)
+    result = laufruhe.evaluate(problem)
+    assert 1e-4 < result.error_estimate < 1e-2
+    assert result.limits[0].error_estimate == pytest.approx(result.error_estimate)
+    exact = by_scipy(problem.engine, problem)[1]
+    value = result.objective.value
+    assert value * (1.0 - 1e-6) <= exact <= value * (1.0 + result.error_estimate)
+    auto = {"fidelity": {"kinematics": "auto", "tolerance": 1e-2}}
+    assert limited(("run-up force", "1 kN"), mounts=mounts(), **auto).fidelity.orders is None
+
+
 def three(**more: Any) -> dict[str, Any]:
     """Three cylinders in line."""
     engine = {**tables_of(READY)["engine"], "cylinders": 3, "cylinder_spacing": "120 mm"}

@@ -77,7 +77,8 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
 
 def automatic(problem: Problem, tolerance: float, engine: Engine | None = None) -> Problem:
     """The problem at the fidelity chosen for it."""
-    if not problem.load_terms:
+    if not problem.load_terms or any(measure.channel.is_checked for measure in problem.measures):
+        # nothing tells what run-ups lose with an order
         return problem.at(replace(problem.fidelity, tolerance=tolerance))
     return problem.at(choose(problem, tolerance, engine).fidelity)
 

@@ -18,6 +18,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.runs import missed_share
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
@@ -50,6 +51,9 @@ def relative(bound: float, value: float) -> float:
 
 def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
     """What the samples of an evaluation miss of a measure at most [its unit] (F7, F8); nothing of what has none."""
+    run = evaluation.engine.run
+    if measure.channel.is_checked and run is not None:
+        return missed_share(run) * evaluation.value(measure)
     if not measure.is_load:
         return 0.0
     shares = measure.shares([loads.point for loads in evaluation.loads])

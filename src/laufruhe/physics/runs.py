@@ -98,6 +98,13 @@ def sweep_of(first: float, last: float, seconds: float, coarser: int = 1) -> Swe
     return Sweep(first, (last - first) / seconds, seconds / count, count)
 
 
+def missed_share(run: Run) -> float:
+    """Share of a largest value that may stand between steps, of motion without orders beyond the highest (E28)."""
+    wanted = STEPS_PER_PERIOD * run.speed * HIGHEST * (max(run.up, run.down) / STRETCHES) / math.tau
+    steps = STEPS_PER_PERIOD * min(1.0, MOST_STEPS / wanted)
+    return 1.0 / math.cos(math.pi / steps) - 1.0 if steps > 2.0 else math.inf
+
+
 def _elastic(engine: Engine) -> ElasticMounting:
     if engine.block is None:
         raise ModelError("a run-up through resonance needs elastic mounts")

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from laufruhe.fidelity.automatic import choose
-from laufruhe.fidelity.error_bounds import error_bound, reference, sampling_error
+from laufruhe.fidelity.error_bounds import error_bound, missed, reference, relative, sampling_error
 from laufruhe.numerics.budget import in_time, passed
-from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
 
@@ -20,6 +20,17 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
 
     A fidelity chosen by hand is taken as wanted, so that only its samples are judged.
     """
+    runs = [term for term in problem.objective if term.measure.channel.is_checked]
+    loads = _error_of_loads(problem, evaluation)
+    if not runs or evaluation.resonance:
+        return loads
+    share = sum(term.weight * evaluation.value(term.measure) for term in problem.load_terms) * loads
+    between = sum(term.weight * missed(term.measure, evaluation) for term in runs)
+    return relative(share + between, objective_value(problem, evaluation))
+
+
+def _error_of_loads(problem: Problem, evaluation: Evaluation) -> float:
+    """Relative error of the terms that are loads alone."""
     if not problem.load_terms:
         return 0.0
     if problem.fidelity.tolerance is None:
@@ -38,8 +49,8 @@ def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result
     if asked is None or result.certificate is None:
         return result
     for _ in () if passed() else in_time(range(_ROUNDS)):
-        result = replace(result, error_estimate=error_of(result.problem, result.final))
-        if result.error_estimate <= asked:
+        # steps of a run-up are those of every fidelity
+        if _error_of_loads(result.problem, result.final) <= asked:
             break
         better = choose(problem, asked, result.final.engine).fidelity
         if better == result.problem.fidelity:

@@ -57,6 +57,9 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
         if relaxed.status not in (Status.OPTIMAL, Status.FEASIBLE) or not (broken or terms):
             # without what is asked of run-ups nothing is missing
             return with_limits(relaxed, problem.limits)
+        if relaxed.problem.fidelity != problem.fidelity:
+            # its bound is of the physics that it was found accurate by
+            problem = problem.at(relaxed.problem.fidelity)
     designed = _designed(problem, kinds, limits, terms, relaxed, decide)
     if designed is not None:
         return designed

@@ -24,7 +24,7 @@ def tables(result: Result) -> list[Grid]:
     title = "Limits" if changed(result) else "Limits, and the design as given"
     notes = [PRICES] if any(limit.shadow_price for limit in limits) else []
     notes += [
-        f"Samples over the cycle may have missed {100.0 * limit.error_estimate:.1g} % of '{limit.name}'."
+        f"Samples may have missed {100.0 * limit.error_estimate:.1g} % of '{limit.name}'."
         for limit in limits
         if limit.error_estimate > TOLD
     ]

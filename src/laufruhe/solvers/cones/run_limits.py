@@ -45,6 +45,12 @@ def solve_run_cones(
             domain.columns_of(value)
             for domain, value in zip(domains_of(problem.decisions), unbalances_of(problem, result), strict=True)
         ]) if result.decisions else None  # fmt: skip
+        found = result.problem.fidelity
+        if found != problem.fidelity:
+            # steps are of the physics that the answer was found accurate by
+            again = problem.at(found)
+            more = RunRows.of(again, [*rows.constants])
+            return solve_run_cones(again, limits, terms, more or rows, decide)
         if x is None or result.status is Status.INFEASIBLE or steps.has_all(x):
             break
         steps.add(x)
