@@ -117,7 +117,7 @@ class Bundle:
 
     def __init__(self, lengths: Lengths) -> None:
         self.piece, self.lengths = lengths.piece, lengths
-        self.nodes = np.zeros((0, *lengths.pulled(np.zeros_like(lengths.constant[0])).shape))
+        self.nodes = np.zeros((0, len(lengths.constant), 1 + lengths.slope.shape[-1]))
 
     @property
     def count(self) -> int:
