@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from typing import Any
 
@@ -12,10 +13,10 @@ from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.springs.bound import follows
-from laufruhe.prove.springs.limits import Limits
+from laufruhe.prove.springs.limits import ANYTHING, Limits
 from laufruhe.prove.springs.program import Stated
-from laufruhe.prove.springs.search import SpringBoxes
-from prove.test_spring_bound import powertrain
+from laufruhe.prove.springs.search import SpringBoxes, _Box
+from prove.test_spring_bound import POWERTRAIN, powertrain
 
 ASKED = {
     "rms": {"limit": "rms mount travel", "operating_points": ["idle"], "orders": [2, 4]},
@@ -97,3 +98,27 @@ def test_a_limit_that_holds_the_best_design_back_raises_the_bound() -> None:
             boxes.limits = Limits((), ())
             raised.append(with_limit / boxes.relaxed(boxes.lower, boxes.upper)[0])
     assert max(raised) > 1.001
+
+
+@pytest.mark.parametrize("name", ["powertrain-hydraulic", "powertrain-joined-springs", "tractor-four-elastic"])
+def test_transmissibility_of_lines_is_that_of_the_model(name: str) -> None:
+    """Forces of an order and of the same at rest, at the middle of a box of no size."""
+    tables = tomllib.loads(POWERTRAIN.with_name(f"{name}.toml").read_text(encoding="utf-8"))
+    tables["constraints"] = [{"limit": "transmissibility", "orders": [2], "max": "1e3"}]
+    free = load(tables)
+    value = evaluate(free).value(free.mount_limits[0].measure)
+    tables["constraints"][0]["max"] = f"{1.01 * value:.9g}"
+    problem = load(tables)
+    boxes = SpringBoxes(problem, 2.0 * objective_value(problem, evaluate(problem)), 1e-3, problem.start)
+    near = np.array([d.start_number for d in problem.mount_decisions])
+    box = _Box(boxes, boxes._terms[0][1], np.inf, near * (1.0 - 1e-9), near * (1.0 + 1e-9))
+    found = []
+    for ratio in boxes.limits.ratios:
+        (order,) = ratio.orders
+        sizes = []
+        for each in (order, replace(order, omega=0.0)):
+            line, _ = box._line_of(each, ANYTHING)
+            v = np.concatenate([[1.0], boxes.columns.near, np.zeros(line.size - 1 - line.columns)])
+            sizes.append(float(np.linalg.norm(line.forces @ v) * line.unit))
+        found.append(sizes[0] / sizes[1])
+    assert max(found) == pytest.approx(value, rel=1e-7)
