@@ -63,6 +63,21 @@ class Cap:
 
 
 @dataclass(frozen=True, eq=False)
+class Goal:
+    """Designs of which the sum of roots at their prices and of s at these is not over a number.
+
+    Attributes
+    ----------
+    root
+        Number of that which is minimised alone; none where it is what a program aims at.
+    """
+
+    along: Array
+    most: float
+    root: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Budget:
     """A sum of functions linear in moments that is not over a number: order and matrix, shape (d, d)."""
 
@@ -121,6 +136,8 @@ class Program:
         What heads are not over, infinite where that is not known; empty where it is of none.
     aim
         What is minimised beside the heads: of every s, and of the w of every mode.
+    goal
+        The root that is minimised in place of all, where their sum with `along` of every s is not over `most`.
     sets
         Matrices C with <C, (1, u)(1, u)'> not over zero for unbalances allowed, shape (1 + columns, 1 + columns).
     """
@@ -138,6 +155,7 @@ class Program:
     shapes: Sequence[Shapes] = ()
     tops: Array = field(default_factory=lambda: np.zeros(0))
     aim: Array | None = None
+    goal: Goal | None = None
 
     @property
     def aims(self) -> tuple[Array, list[Array]]:
@@ -160,6 +178,7 @@ class Multipliers:
     links: Sequence[Array]
     lines: Array
     lengths: Sequence[Sequence[Array]]
+    goal: float
     shapes: Sequence[Priced] = ()
 
 
@@ -190,9 +209,14 @@ def follows(program: Program, found: Multipliers) -> float:
     left, slopes, bound = [np.zeros((d, d)) for d in program.sizes], np.zeros(program.numbers), 0.0
     aim, aims = program.aims
     slopes += aim
-    prices = np.array(program.prices, dtype=float)
+    prices, times, goal = np.array(program.prices, dtype=float), 1.0, program.goal
+    if goal is not None:
+        times = max(found.goal, 0.0)
+        slopes += times * goal.along
+        bound -= times * goal.most
     for number, (root, line, along) in enumerate(zip(program.roots, found.lines, found.lengths, strict=True)):
-        share, taken = _of_root(root, float(line), along)
+        alone = float(goal is not None and number == goal.root)
+        share, taken = _of_root(times * root.price + alone, float(line), along)
         prices[number] = share * root.slope
         bound += share * root.offset
         for (order, rows), vectors in zip(root.rows, taken, strict=True):
@@ -227,13 +251,13 @@ def follows(program: Program, found: Multipliers) -> float:
     return bound - float(np.abs(slopes).sum()) + least
 
 
-def _of_root(root: Root, line: float, along: Sequence[Array]) -> tuple[float, list[Array]]:
-    """What of its price the line has, and vectors of its lengths, none longer than the rest of the price."""
+def _of_root(price: float, line: float, along: Sequence[Array]) -> tuple[float, list[Array]]:
+    """What of the price of a root its line has, and vectors of its lengths, none longer than the rest of the price."""
     line = max(line, 0.0)
     longest = max((float(np.linalg.norm(each, axis=1).max()) for each in along), default=0.0)
     if line + longest <= 0.0:
-        return root.price, [np.zeros_like(each) for each in along]
-    factor = root.price / (line + longest)
+        return price, [np.zeros_like(each) for each in along]
+    factor = price / (line + longest)
     return factor * line, [factor * each for each in along]
 
 

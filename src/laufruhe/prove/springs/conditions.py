@@ -100,27 +100,36 @@ def held(order: int, given: Array, slopes: Array, seen: ComplexArray, pressed: C
 def _place_sides(order: int, numbers: int, place: Place, seen: ComplexArray, moved: ComplexArray) -> list[Held]:
     """1 + s and 1 - s, bordered by all turns and moments that s multiplies (E52)."""
     found = []
-    size = np.abs(seen).max(axis=1, keepdims=True)
-    size = np.where(size > 0.0, size, 1.0)
-    own, theirs = ((rows / size) for rows in (seen, moved))
-    plain = np.concatenate([own.real, own.imag])
-    count, d = plain.shape
+    plain, rows = _rows(seen, moved)
     for sign in (1.0, -1.0):
-        pressed = plain + sign * np.concatenate([theirs.real, theirs.imag])
-        moments = np.zeros((1 + count, 1 + count, d, d))
-        moments[0, 1:, 0] += 0.5 * pressed
-        moments[0, 1:, :, 0] += 0.5 * pressed
-        moments[1:, 0] = moments[0, 1:]
-        across = np.einsum("ax,by->abxy", plain, pressed)
-        across = across + across.transpose(1, 0, 2, 3)
-        moments[1:, 1:] = 0.25 * (across + across.transpose(0, 1, 3, 2))
         slopes = np.zeros((numbers, 1, 1))
         slopes[place.number] = sign
-        found.append(Held(order, _bordered(np.eye(1), count), _bordered(slopes, count), moments))
-    rows = np.concatenate([theirs.real, theirs.imag])
+        moments = _bordering(plain, plain + sign * rows)
+        found.append(Held(order, _bordered(np.eye(1), len(plain)), _bordered(slopes, len(plain)), moments))
     squares = [np.einsum("ax,by->abxy", each, each) for each in (plain, rows)]
     left = squares[0] - squares[1]
     return [*found, _between(order, numbers, 0.5 * (left + left.transpose(0, 1, 3, 2)))]
+
+
+def _rows(seen: ComplexArray, moved: ComplexArray) -> tuple[Array, Array]:
+    """Real and imaginary parts of both, each row in its size."""
+    size = np.abs(seen).max(axis=1, keepdims=True)
+    size = np.where(size > 0.0, size, 1.0)
+    plain, rows = (np.concatenate([each.real, each.imag]) for each in (seen / size, moved / size))
+    return plain, rows
+
+
+def _bordering(plain: Array, pressed: Array) -> Array:
+    """What of moments is in one number bordered by what it multiplies, shape (1 + n, 1 + n, d, d)."""
+    count, d = plain.shape
+    moments = np.zeros((1 + count, 1 + count, d, d))
+    moments[0, 1:, 0] += 0.5 * pressed
+    moments[0, 1:, :, 0] += 0.5 * pressed
+    moments[1:, 0] = moments[0, 1:]
+    across = np.einsum("ax,by->abxy", plain, pressed)
+    across = across + across.transpose(1, 0, 2, 3)
+    moments[1:, 1:] = 0.25 * (across + across.transpose(0, 1, 3, 2))
+    return moments
 
 
 def _limits_of_stiffness(order: int, mounts: OpenMounts, line: Line) -> list[Held]:

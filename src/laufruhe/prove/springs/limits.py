@@ -115,7 +115,7 @@ class Limits:
             for head in each.heads:
                 at = [number(order, each.asked.at_most(order, head, each.most)) for order in head.orders]
                 found.caps += head.caps(count + len(found.tops), each.asked, [whole[k] for k in at], at)
-                found.tops.append(((each.most / head.share + head.loss) / head.unit) ** 2)
+                found.tops.append((head.at_most(each.most / head.share) / head.unit) ** 2)
         for ratio in self.ratios:
             moving = [number(order, ANYTHING) for order in ratio.orders]
             still = [number(replace(order, omega=0.0), ANYTHING) for order in ratio.orders]

@@ -28,6 +28,8 @@ from laufruhe.prove.springs.open_mounts import OpenMounts
 LEFT_OUT, MOST_ORDERS = 1e-6, 12
 # share of the strongest order that others may take of it before its shape is not relied upon
 SMALL = 0.03
+# what the cosine of an order shows of a mean
+COSINE = 0.5
 # share of a norm that may be left out with a half of the motions
 ASIDE = 0.005
 NOTHING = 1e-13
@@ -104,8 +106,10 @@ class Asked:
             reach = most / math.sqrt(0.5 * self.shares[order.point] / len(self.mounts))
         else:
             # the longer half axis is at least the root of half the squares
+            # of a mean every order has half of its amplitude at least
+            factor, loss = (head.factor, head.loss) if head.whole else (COSINE, 0.0)
             times = math.sqrt(2.0) if head.whole else len(self.mounts)
-            reach = times * (most / head.share + head.loss) / head.factor
+            reach = times * (most / head.share + loss) / factor
         least = float(self.factors.min())
         return Felt(self.mounts, reach / least if least > 0.0 else math.inf, self.is_travel)
 
@@ -212,6 +216,8 @@ class Head:
         Of the norm.
     unit
         What the root is counted in: about what the best design has.
+    beside, phases
+        Of a mean the odd multiples of its order, and samples to a turn of it (E58).
     """
 
     orders: tuple[Order, ...]
@@ -220,6 +226,20 @@ class Head:
     loss: float
     whole: bool
     factor: float
+    beside: tuple[tuple[Order, int], ...] = ()
+    phases: int = 0
+
+    def at_most(self, norm: float) -> float:
+        """What the root is not over where the norm is not: of a mean with multiples beside it by its cosine."""
+        return norm * self.factor / COSINE if self.beside else norm + self.loss
+
+    def shifted(self, shift: int) -> tuple[float, list[float]]:
+        """What an average over two samples so far apart leaves of the root, and what it takes of every multiple."""
+        if not self.phases:
+            return 1.0, []
+        turn = math.pi / self.phases
+        taken = [2.0 / self.phases / math.sin(k * turn) * abs(math.cos(k * shift * turn)) for _, k in self.beside]
+        return math.cos(shift * turn), taken
 
     def caps(self, number: int, asked: Asked, lines: Sequence[Line], at: Sequence[int]) -> list[Cap]:
         """Over the lines of its orders, whose numbers are told."""
@@ -293,13 +313,15 @@ def _strongest(asked: Asked, p: int, parts: Sequence[OpenMounts]) -> Head:
     odd = [other for other in own[1:] if other.place % (2 * order.place) == order.place]
     phases = asked.samples // math.gcd(asked.samples, order.place) if asked.samples else 0
     stays = bool(phases) and asked.samples % (2 * order.place) == 0 and not asked.is_bent
+    if norm.sums_lengths and not norm.joins_points:
+        return _mean(asked, order, odd, phases if stays else 0)
     loss = sum(
-        most_felt(parts[other.part], other.loads, other.omega, asked.is_travel, asked.mounts)
+        most_of(asked, other, parts)
         # of a square wave that is sampled
         * (2.0 / phases / math.sin(math.pi * (other.place // order.place) / phases) if mean and stays else 1.0)
         for other in odd
     )
-    loss *= float(asked.factors.max()) / (len(asked.mounts) if mean else 1)
+    loss /= len(asked.mounts) if mean else 1
     if mean:
         factor, size = (2.0 / phases / math.tan(math.pi / phases) if stays else 0.5), float(lengths.mean())
         plain = 0.5
@@ -310,3 +332,17 @@ def _strongest(asked: Asked, p: int, parts: Sequence[OpenMounts]) -> Head:
     if not stays or (loss > SMALL * factor * size and not mean) or (factor * size - loss) < plain * size:
         factor, loss = plain, 0.0
     return Head((order,), float(asked.shares[p]), factor * size or 1.0, loss * swing, not mean, factor)
+
+
+def _mean(asked: Asked, order: Order, odd: Sequence[Order], phases: int) -> Head:
+    """Of an order by a square wave in so many samples, its odd multiples beside it; else by its cosine (E45, E58)."""
+    size = float(np.linalg.norm(order.felt, axis=1).mean())
+    factor = 2.0 / phases / math.tan(math.pi / phases) if phases else COSINE
+    beside = tuple((other, other.place // order.place) for other in odd) if phases else ()
+    return Head((order,), float(asked.shares[order.point]), factor * size or 1.0, 0.0, False, factor, beside, phases)
+
+
+def most_of(asked: Asked, order: Order, parts: Sequence[OpenMounts]) -> float:
+    """What the sum over mounts of an order is not over for any design."""
+    felt = most_felt(parts[order.part], order.loads, order.omega, asked.is_travel, asked.mounts)
+    return float(asked.factors.max()) * felt

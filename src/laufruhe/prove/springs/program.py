@@ -72,6 +72,7 @@ class Stated:
             self._held(limit)
         for number, root in enumerate(program.roots):
             self._root(number, root)
+        self._goal()
         for number, shapes in enumerate(program.shapes):
             self._shapes(number, shapes)
 
@@ -225,6 +226,16 @@ class Stated:
                 columns = np.concatenate([[at], first])
                 self._add(block, columns, np.zeros(1 + count), clarabel.SecondOrderConeT(1 + count))
 
+    def _goal(self) -> None:
+        """The sum of roots at their prices, and of s, is not over a number."""
+        import clarabel
+
+        goal = self.program.goal
+        if goal is not None:
+            columns = np.concatenate([self.roots[:-1], self.first + np.arange(self.program.numbers)])
+            block = np.concatenate([[root.price for root in self.program.roots], goal.along])[None]
+            self._add(block, columns.astype(np.intp), np.array([goal.most]), clarabel.NonnegativeConeT(1))
+
     def _held(self, limit: Held) -> None:
         """E43."""
         import clarabel
@@ -235,15 +246,13 @@ class Stated:
         block = np.concatenate([-column(limit.slopes).T.reshape(len(i), -1), own], axis=1)
         self._add(block, columns, column(limit.constant), clarabel.PSDTriangleConeT(limit.size))
 
-    def answer(self, program: Program, scaled: bool, enough: float = 1e-5) -> Proposed:
-        """As multipliers and moments of a program with the same conditions."""
-        from scipy.sparse import csc_array, vstack
-
-        first, settings = self.first, {**_SETTINGS, "equilibrate_enable": scaled, "tol_gap_rel": enough}
+    def _cost(self, program: Program) -> Array:
+        """Of heads or roots, of s and of shapes."""
+        first = self.first
         cost = np.zeros(int(self.shapes[-1]))
         cost[: len(program.prices)] = program.prices
-        for at, root in zip(self.roots, program.roots, strict=False):
-            cost[at] = root.price
+        for number, (at, root) in enumerate(zip(self.roots, program.roots, strict=False)):
+            cost[at] = root.price if program.goal is None else float(number == program.goal.root)
         aim, aims = program.aims
         cost[first : first + program.numbers] = aim
         for at, own in zip(self.shapes, aims, strict=False):
@@ -251,6 +260,14 @@ class Stated:
             cost[at + np.cumsum(np.arange(1, 6))] = own * math.sqrt(0.5)
         for order, size in enumerate(program.sizes):
             cost[self._moment(order)] = -ASIDE * _diagonal(size)
+        return cost
+
+    def answer(self, program: Program, scaled: bool, enough: float = 1e-5) -> Proposed:
+        """As multipliers and moments of a program with the same conditions."""
+        from scipy.sparse import csc_array, vstack
+
+        first, settings = self.first, {**_SETTINGS, "equilibrate_enable": scaled, "tol_gap_rel": enough}
+        cost = self._cost(program)
         found = answered(cost, csc_array(vstack(self.rows)), np.concatenate(self.right), self.cones, settings)
         z, x = np.nan_to_num(np.array(found.z)), np.nan_to_num(np.array(found.x))
         parts = np.split(z, np.cumsum([len(right) for right in self.right])[:-1])
@@ -265,6 +282,7 @@ class Stated:
             rows = 4 + len(shapes.matrices) + 2 * program.numbers
             shaped.append(self._priced(shapes, after[len(after) - rows :]))
             after = after[: len(after) - rows]
+        goal, after = (0.0, after) if program.goal is None else (float(after[-1][0]), after[:-1])
         counts = [2 + sum(len(rows) for _, rows in root.rows) for root in program.roots]
         starts = len(after) - sum(counts) + np.cumsum([0, *counts])
         along = [after[start : start + count] for start, count in zip(starts, counts, strict=False)]
@@ -275,7 +293,9 @@ class Stated:
         held = [_matrix(part, limit.size) for part, limit in zip(rest, program.held, strict=True)]
         lines = _numbers([parts[0] for parts in along])
         lengths = [_lengths(root, parts[2:]) for root, parts in zip(program.roots, along, strict=True)]
-        multipliers = Multipliers(caps, held, _numbers(budgets), _numbers(sets), linked, lines, lengths, shaped[::-1])
+        multipliers = Multipliers(
+            caps, held, _numbers(budgets), _numbers(sets), linked, lines, lengths, goal, shaped[::-1]
+        )
         moments = [_matrix(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
         middle = np.clip(x[first : first + program.numbers], -1.0, 1.0)
         return Proposed(multipliers, middle, moments, float(cost @ x), [self._found(x, k) for k in range(len(shaped))])

@@ -20,6 +20,8 @@ from laufruhe.prove.springs.search import SpringBoxes
 LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
 # relaxations where none are asked for, and how many times those that were needed so far have to be left for a level
 MOST_RELAXED, AHEAD = 100, 3
+# the same where odd multiples hide a mean: whole boxes alone are worth it
+FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 12
 # of the largest, pulls of sides that are not narrowed; of what is to be shown, what a round of these has to bring
 LITTLE, PROGRESS = 0.1, 0.1
 
@@ -43,7 +45,7 @@ def spring_bound(problem: Problem, value: float, room: float, near: Sequence[Val
         most = boxes.most_boxes
         if not most or not boxes.is_sampled_fully:
             return Divided(0.0, 0)
-        if boxes.modes:
+        if boxes.modes or boxes.takes_off:
             return _by_levels(boxes, room)
         found = divide(boxes, boxes.lower, boxes.upper, value, room, most)
     except np.linalg.LinAlgError:
@@ -60,10 +62,10 @@ def is_bounded(problem: Problem) -> bool:
 
 def _by_levels(boxes: SpringBoxes, room: float) -> Divided:
     """Show that no design is under a value, and then under one that is nearer to that of the best (E59)."""
-    asked_for = boxes.problem.search.boxes
-    most = MOST_RELAXED if asked_for is None else asked_for
+    asked_for, few = boxes.problem.search.boxes, not boxes.modes
+    most = (FEW_RELAXED if few else MOST_RELAXED) if asked_for is None else asked_for
     bound, spent, places = boxes.look(boxes.lower, boxes.upper)[0], 1, tuple[Array, ...]()
-    for share in LEVELS:
+    for share in (*(FIRST if few else ()), *LEVELS):
         shown = boxes.value - max(share * boxes.value, NEARLY * room)
         if shown <= bound:
             continue
@@ -108,10 +110,14 @@ class _Narrowing(Halving):
             over = self.spent >= self._most or passed()
             if over or not pull.any() or best - before < PROGRESS * (self.enough - before):
                 return best, Box(lower, upper, int(np.argmax(pull)))
-            found, solved = narrowed(self._search, lower, upper, pull)
+            whole = np.array_equal(lower, self._search.lower) and np.array_equal(upper, self._search.upper)
+            little = 0.0 if whole and not self._search.modes else LITTLE
+            found, solved = narrowed(self._search, lower, upper, pull, little)
             self.spent += solved
             if found is None:
                 return None
+            if whole:
+                self._search.lower, self._search.upper = found
             lower, upper = found
 
     def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
@@ -125,7 +131,9 @@ class _Narrowing(Halving):
         return found
 
 
-def narrowed(boxes: SpringBoxes, lower: Array, upper: Array, pull: Array) -> tuple[tuple[Array, Array] | None, int]:
+def narrowed(
+    boxes: SpringBoxes, lower: Array, upper: Array, pull: Array, little: float = LITTLE
+) -> tuple[tuple[Array, Array] | None, int]:
     """A box without what the relaxation shows to hold no better design, none where that is all of it (E59).
 
     Of every side the least and the largest number that leave room for one, as multipliers prove them. Sides that hardly
@@ -143,7 +151,7 @@ def narrowed(boxes: SpringBoxes, lower: Array, upper: Array, pull: Array) -> tup
     middle[count:], half[count:] = 0.0, 1.0
     sides = [(j, side) for j, side in enumerate(mounts.straight) if side is not None]
     sides += [(numbers + k, count + k) for k in range(len(lower) - count)]
-    sides = [(number, side) for number, side in sides if pull[side] > LITTLE * pull.max()]
+    sides = [(number, side) for number, side in sides if pull[side] > little * pull.max()]
     whole = np.eye(numbers + len(lower) - count)
     found = aimed(program, (sign * whole[number] for number, _ in sides for sign in (1.0, -1.0)))
     for solved, (_, side) in enumerate(sides, 1):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
@@ -19,24 +18,23 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
-from laufruhe.prove.springs.bound import Cap, Program, Proposed, Root, follows, pulls
+from laufruhe.prove.springs.bound import Program
+from laufruhe.prove.springs.box import SpringBox
 from laufruhe.prove.springs.columns import columns_of
-from laufruhe.prove.springs.conditions import Held, conditions
 from laufruhe.prove.springs.limits import limits_of
-from laufruhe.prove.springs.lines import Felt, Line, line_of, squared
+from laufruhe.prove.springs.lines import Felt, Line, line_of
 from laufruhe.prove.springs.mirrored import mirrored_parts
-from laufruhe.prove.springs.modes import modes_of, shapes_of
+from laufruhe.prove.springs.modes import modes_of
 from laufruhe.prove.springs.open_mounts import OpenMounts, open_mounts
-from laufruhe.prove.springs.orders import Asked, Head, Order, asked, heads_of, lengths_of
-from laufruhe.prove.springs.program import proposed
+from laufruhe.prove.springs.orders import Asked, Head, Order, asked, heads_of
 
 # what all relaxations may cost together, a number of moments squared being one, and how many they may be
-WORK, MOST_BOXES = 4e7, 100
+WORK, MOST_BOXES = 6e7, 100
 EFFORT = 5
 # of what is to be shown, the share that small orders may take
 NEEDED = 0.3
-# share of what a solver takes for the least that its multipliers should prove
-NEAR = 0.9995
+# share of a mean that is worth narrowing what hides it
+LARGE = 0.03
 # share of the bounds of unbalances that says what is large beside the best design
 WIDE = 0.3
 
@@ -86,6 +84,7 @@ class SpringBoxes:
         self.limits = limits.of_columns(fewer, self._parts)
         self._heads = [heads_of(each, self._parts) for _, each in self._terms]
         self._least = [np.zeros(len(heads)) for heads in self._heads]
+        self.felt_at_most: dict[int, float] = {}
 
     def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
         """The mounts of a box for all motions, and where they mirror each other for both halves of them (E57)."""
@@ -94,9 +93,23 @@ class SpringBoxes:
         return (whole, *mirrored_parts(whole))
 
     @property
+    def mount_numbers(self) -> int:
+        """How many numbers of mounts are open."""
+        return len(self.problem.mount_decisions)
+
+    @property
     def stiffness_alone(self) -> bool:
         """Whether nothing else is open."""
         return self._plain is not None
+
+    @property
+    def takes_off(self) -> bool:
+        """Whether odd multiples of the orders of a mean keep it from being shown by these (E58)."""
+        if not any(head.beside for head in self._heads[0]):
+            return False
+        weight, each = self._terms[0]
+        box = SpringBox(self, each, self._room(weight), self.lower, self.upper)
+        return box.taken_off(self._heads[0]) > LARGE
 
     @property
     def at_once(self) -> int:
@@ -146,7 +159,7 @@ class SpringBoxes:
         total, pull = self._constant, np.zeros(len(lower))
         for k, (weight, each) in enumerate(self._terms):
             whole = not self.places and k == 0
-            box = _Box(self, each, self._room(weight), lower, upper)
+            box = SpringBox(self, each, self._room(weight), lower, upper)
             least, own, middle = box.least(self._heads[k], self._least[k])
             total += weight * least
             pull += own
@@ -158,8 +171,8 @@ class SpringBoxes:
     def left(self, lower: Array, upper: Array) -> tuple[Program, OpenMounts]:
         """Conditions of designs of a box of which the first term leaves that they are better than the best known."""
         weight, each = self._terms[0]
-        box = _Box(self, each, self._room(weight), lower, upper)
-        return box.under_all(self._heads[0]), box.mounts
+        box = SpringBox(self, each, self._room(weight), lower, upper)
+        return box.under_all(self._heads[0], self._least[0]), box.mounts
 
     def under(self, value: float) -> SpringBoxes:
         """The same for designs that are better than a value, orders left out that this hardly needs."""
@@ -167,6 +180,7 @@ class SpringBoxes:
         found.value = found.enough = value
         found._heads = [[replace(head, orders=self._needed(head, value)) for head in heads] for heads in self._heads]
         found._least = [np.zeros(len(heads)) for heads in self._heads]
+        found.felt_at_most = {}
         return found
 
     def _needed(self, head: Head, value: float) -> tuple[Order, ...]:
@@ -191,153 +205,3 @@ class SpringBoxes:
         loads = np.column_stack([load, WIDE * order.loads[1:].T])
         near = np.linalg.solve(k + 1j * (h + c) - order.omega**2 * np.eye(mounts.size), loads)
         return line_of(mounts, order.loads, order.omega, near, felt)
-
-
-class _Box:
-    """One box, for designs of which a norm is not over a number."""
-
-    def __init__(self, search: SpringBoxes, each: Asked, most: float, lower: Array, upper: Array) -> None:
-        self.search, self.each, self.most, self.lower, self.upper = search, each, most, lower, upper
-        self.parts = search.parts(lower, upper)
-        self.mounts = self.parts[0]
-        self._stated: dict[int, tuple[Line, list[Held]]] = {}
-        self.modes = tuple(
-            shapes_of(self.mounts, mode, lower[own], upper[own])
-            for mode, own in zip(search.modes, search.own, strict=True)
-        )
-
-    def least(self, heads: Sequence[Head], known: Array) -> tuple[float, Array, Array | None]:
-        """What a norm is not under on the box, how far each side keeps it from being so, and where it stands.
-
-        Of several heads each is bounded by itself; the roots of all are then at least straight lines between what
-        they are at least and at most, and these are bounded together (E54).
-        """
-        pull, most = np.zeros(len(self.lower)), self.most
-        if not heads:
-            return 0.0, pull, None
-        if len(heads) == 1:
-            bound, pull, middle = self._together(heads, np.ones(1))
-            found = heads[0].unit * math.sqrt(max(bound, 0.0)) - heads[0].loss
-            return min(max(found, 0.0), most), pull, middle
-        alone = np.maximum(self._alone(heads), known)
-        if np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper):
-            known[:] = alone
-        shares, losses = np.array([h.share for h in heads]), np.array([h.loss for h in heads])
-        floor = float(shares @ np.maximum(alone - losses, 0.0))
-        if floor >= most:
-            return most, pull, None
-        units = np.array([h.unit for h in heads])
-        highest = (most - (floor - shares * np.maximum(alone - losses, 0.0))) / shares + losses
-        least, top = alone / units, highest / units
-        bound, pull, middle = self._together(heads, shares * units, (least, top))
-        total = bound - float(shares @ losses)
-        return max(min(total, most), floor), pull, middle
-
-    def _alone(self, heads: Sequence[Head]) -> Array:
-        """Of every head by itself."""
-        found = [self._together([head], np.ones(1))[0] for head in heads]
-        return np.array([head.unit * math.sqrt(max(b, 0.0)) for head, b in zip(heads, found, strict=True)])
-
-    def _line(self, head: Head, order: Order) -> tuple[Line, list[Held]]:
-        """Of an order, and what it has to keep."""
-        return self._line_of(order, self.each.at_most(order, head, self.most))
-
-    def _line_of(self, order: Order, felt: Felt) -> tuple[Line, list[Held]]:
-        if id(order) not in self._stated:
-            mounts = self.parts[order.part]
-            line = self.search.line(mounts, order, felt, self.lower, self.upper)
-            self._stated[id(order)] = line, conditions(0, mounts, line)
-        return self._stated[id(order)]
-
-    def _together(
-        self, heads: Sequence[Head], prices: Array, ends: tuple[Array, Array] | None = None
-    ) -> tuple[float, Array, Array | None]:
-        """Least sum of the squares of heads at these prices, or of their roots between ends."""
-        # a solver works best where what it minimises is of size one
-        size = float(prices.sum())
-        program, lines = self._program(heads, prices / size, ends)
-        bound, found = _best(program)
-        middle = self._design(found.middle) if self.search.stiffness_alone else None
-        parts = [order.part for head in heads for order in head.orders]
-        return size * bound, self._pull(parts, lines, found), middle
-
-    def under_all(self, heads: Sequence[Head]) -> Program:
-        """What no design goes over of which none of the heads is over the whole."""
-        own = [((self.most / head.share + head.loss) / head.unit) ** 2 for head in heads]
-        program, _ = self._program(heads, np.zeros(len(heads)))
-        return replace(program, tops=np.append(own, program.tops[len(own) :]))
-
-    def _program(
-        self, heads: Sequence[Head], prices: Array, ends: tuple[Array, Array] | None = None
-    ) -> tuple[Program, list[Line]]:
-        """Of these heads at these prices, and the lines of its orders."""
-        caps: list[Cap] = []
-        lines: list[Line] = []
-        held: list[Held] = []
-        roots: list[Root] = []
-        for number, head in enumerate(heads):
-            first, stated = len(lines), [self._line(head, order) for order in head.orders]
-            lines += [line for line, _ in stated]
-            held += [replace(limit, order=k) for k, (_, limits) in enumerate(stated, first) for limit in limits]
-            at = range(first, len(lines))
-            caps += head.caps(number, self.each, lines[first:], at)
-            if ends is not None:
-                own = lengths_of(head, self.each, lines[first:], at)
-                roots.append(Root(prices[number], float(ends[0][number]), float(ends[1][number]), own))
-        more = self.search.limits.added(heads, len(heads), self._line_of, lines)
-        lines += more.lines
-        program = Program(
-            tuple(line.size for line in lines), tuple(line.reaches for line in lines), self.mounts.numbers,
-            lines[0].columns, np.append(0.0 * prices if roots else prices, np.zeros(len(more.tops))),
-            [*caps, *more.caps], [*held, *more.held], more.budgets, self.search.columns.sets, roots, self.modes,
-            np.append(np.full(len(heads), math.inf), more.tops),
-        )  # fmt: skip
-        return program, lines
-
-    def _design(self, s: Array) -> Array:
-        """Open numbers at s, where every number is one of them."""
-        out = 0.5 * (self.lower + self.upper)[: len(self.search.problem.mount_decisions)]
-        for j, follows_ in enumerate(self.mounts.keys):
-            out[follows_[0]] += 0.5 * (self.upper - self.lower)[follows_[0]] * s[j]
-        return out
-
-    def _pull(self, parts: Sequence[int], lines: Sequence[Line], found: Proposed) -> Array:
-        """By decision, what of the products is not that of s, in forces that count."""
-        pull, s = np.zeros(len(self.lower)), found.middle
-        for part, line, moments in zip(parts, lines, found.moments, strict=False):
-            size = float(np.sum(squared(self.each.felt(line) / line.unit) * moments)) or 1.0
-            mounts = self.parts[part]
-            for spring, (seen, added) in zip(mounts.springs, line.springs, strict=True):
-                apart = added - np.tensordot(s, spring.slopes(len(s)), 1) @ seen
-                share = max(float(np.sum(squared(apart) * moments)), 0.0) / size
-                self._spread(pull, [j for j, _ in spring.terms], share)
-            for place, (seen, moved) in zip(mounts.places, line.places, strict=True):
-                apart = np.split(moved - s[place.number] * seen, 2)[1]
-                self._spread(pull, [place.number], max(float(np.sum(squared(apart) * moments)), 0.0) / size)
-        for shapes, priced, own, moments in zip(
-            self.modes, found.multipliers.shapes, self.search.own, found.shapes, strict=True
-        ):
-            of_numbers, of_shapes = pulls(shapes, priced, s, moments)
-            pull[own] += of_shapes
-            for j, share in enumerate(of_numbers):
-                self._spread(pull, [j], float(share))
-        return pull
-
-    def _spread(self, pull: Array, numbers: Sequence[int], share: float) -> None:
-        """Over the decisions that numbers follow, by how much of their bounds is left."""
-        follows_ = sorted({j for number in numbers for j in self.mounts.keys[number]})
-        left = (self.upper - self.lower) / (self.search.upper - self.search.lower)
-        best = max(follows_, key=lambda j: left[j])
-        pull[best] += share
-
-
-def _best(program: Program) -> tuple[float, Proposed]:
-    """What follows from what a solver says; it is asked again where that is far under what it takes for the least."""
-    best: tuple[float, Proposed] | None = None
-    for found in proposed(program):
-        bound = follows(program, found.multipliers)
-        best = (bound, found) if best is None or bound > best[0] else best
-        if bound >= NEAR * found.least:
-            break
-    assert best is not None
-    return best

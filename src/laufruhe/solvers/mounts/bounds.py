@@ -10,7 +10,7 @@ from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import Divided
+from laufruhe.prove.best_first import NEARLY, Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.mounts.subdivision import divided_bound, divides
 from laufruhe.prove.springs.proof import spring_bound
@@ -54,8 +54,11 @@ def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value]
     return Divided(max(few.bound, many.bound), few.boxes + many.boxes, many.places or few.places)
 
 
-def bounded_under(result: Result, value: float) -> Result:
-    """A result with what boxes prove of its mounts, designs worse than a value known from elsewhere left out."""
+def bounded_under(result: Result, value: float, enough: float = math.inf) -> Result:
+    """A result with what boxes prove of its mounts, designs worse than a value known from elsewhere left out.
+
+    No more is proven than is enough.
+    """
     problem, certificate = result.problem, result.certificate
     if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
         return result
@@ -63,7 +66,8 @@ def bounded_under(result: Result, value: float) -> Result:
     own = iter(unbalances_of(problem, result))
     near = [next(own) if d.is_affine else mounts[d.name] for d in problem.decisions]
     nothing = nothing_of(problem, result.final.engine)
-    found = spring_bound(problem, value, room_of(value, problem.tolerance, nothing), near)
+    room = max(room_of(value, problem.tolerance, nothing), (value - min(enough, value)) / NEARLY)
+    found = spring_bound(problem, value, room, near)
     if found.bound <= certificate.lower_bound:
         return result
     text = f"{certificate.method}; bounds of mounts looked at in {found.boxes} box{'es' if found.boxes > 1 else ''}"

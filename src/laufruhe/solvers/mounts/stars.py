@@ -180,17 +180,21 @@ def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[St
     least = _least(found)
     if len(found) < designs or phasing.continuous or not 0.0 < least < math.inf:
         return found
-    pieces = [(k, each.result) for k, each in enumerate(found)]
-    out = list(found)
-    for k, result in in_turn(partial(_bounded_one, value=least), pieces, "bounds of stars on their mounts"):
+    first = bounded_under(found[0].result, least)
+    out = [replace(found[0], result=first), *found[1:]]
+    # what of all stars is known is what is known of the one with the least bound
+    enough = first.certificate.lower_bound if first.certificate is not None else least
+    pieces = [(k, each.result) for k, each in enumerate(found)][1:]
+    work = partial(_bounded_one, value=least, enough=enough)
+    for k, result in in_turn(work, pieces, "bounds of stars on their mounts"):
         out[k] = replace(out[k], result=result)
     return out
 
 
-def _bounded_one(piece: tuple[int, Result], value: float) -> tuple[int, Result]:
+def _bounded_one(piece: tuple[int, Result], value: float, enough: float) -> tuple[int, Result]:
     """Of a star, and which it is."""
     number, result = piece
-    return number, bounded_under(result, value)
+    return number, bounded_under(result, value, enough)
 
 
 def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[StarDesign]:

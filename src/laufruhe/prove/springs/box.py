@@ -1,0 +1,278 @@
+"""One box of mounts, bounded by the forces of their springs (E42-E45, E52-E54, E57, E58, E62)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.budget import passed
+from laufruhe.prove.springs.bound import Cap, Program, Proposed, Root, follows, pulls
+from laufruhe.prove.springs.columns import Columns
+from laufruhe.prove.springs.conditions import Held, conditions
+from laufruhe.prove.springs.high_orders import AtMost, felt_at_most
+from laufruhe.prove.springs.limits import Limits
+from laufruhe.prove.springs.lines import Felt, Line, squared
+from laufruhe.prove.springs.means import Mean, mean_of
+from laufruhe.prove.springs.modes import Mode, shapes_of
+from laufruhe.prove.springs.open_mounts import OpenMounts
+from laufruhe.prove.springs.orders import Asked, Head, Order, lengths_of, most_of
+from laufruhe.prove.springs.program import aimed, proposed
+
+# share of what a solver takes for the least that its multipliers should prove,
+# and where that is of a mean, which its own ends hold back more
+NEAR, ROUGH = 0.9995, 0.97
+# rounds that the roots of a mean narrow each other in, and share of it under which one is left as it is
+ROUNDS, SMALL = 2, 0.03
+
+
+class Searched(Protocol):
+    """What boxes have in common.
+
+    Attributes
+    ----------
+    lower, upper
+        Of all that is divided.
+    own
+        Where the numbers of every mode stand.
+    felt_at_most
+        By order, what designs that count have of it.
+    """
+
+    lower: Array
+    upper: Array
+    modes: tuple[Mode, ...]
+    own: list[slice]
+    columns: Columns
+    limits: Limits
+    felt_at_most: dict[int, float]
+
+    @property
+    def stiffness_alone(self) -> bool:
+        """Whether nothing else is open."""
+
+    @property
+    def mount_numbers(self) -> int:
+        """How many numbers of mounts are open."""
+
+    def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
+        """The mounts of a box, whole and in halves."""
+
+    def line(self, mounts: OpenMounts, order: Order, felt: Felt, lower: Array, upper: Array) -> Line:
+        """Of an order over a box."""
+
+
+class SpringBox:
+    """One box, for designs of which a norm is not over a number."""
+
+    def __init__(self, search: Searched, each: Asked, most: float, lower: Array, upper: Array) -> None:
+        self.search, self.each, self.most, self.lower, self.upper = search, each, most, lower, upper
+        self.parts = search.parts(lower, upper)
+        self.mounts = self.parts[0]
+        self._stated: dict[int, tuple[Line, list[Held]]] = {}
+        self._taken: dict[tuple[int, ...], list[list[AtMost]]] = {}
+        self.modes = tuple(
+            shapes_of(self.mounts, mode, lower[own], upper[own])
+            for mode, own in zip(search.modes, search.own, strict=True)
+        )
+
+    def least(self, heads: Sequence[Head], known: Array) -> tuple[float, Array, Array | None]:
+        """What a norm is not under on the box, how far each side keeps it from being so, and where it stands.
+
+        Of several heads each is bounded by itself; the roots of all are then at least straight lines between what
+        they are at least and at most, and these are bounded together (E54).
+        """
+        pull, most = np.zeros(len(self.lower)), self.most
+        if not heads:
+            return 0.0, pull, None
+        if len(heads) == 1 and not heads[0].beside:
+            bound, pull, middle = self._together(heads, np.ones(1))
+            found = heads[0].unit * math.sqrt(max(bound, 0.0)) - heads[0].loss
+            return min(max(found, 0.0), most), pull, middle
+        roots = self._alone(heads, known)
+        if np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper):
+            roots = self._together_again(heads, roots)
+            known[:] = roots
+        mean = self._mean(heads, roots)
+        if mean.floor >= most:
+            return most, pull, None
+        bound, pull, middle = self._together(heads, mean.prices, mean)
+        return max(min(bound + mean.constant, most), mean.floor), pull, middle
+
+    def _alone(self, heads: Sequence[Head], known: Array) -> Array:
+        """What every root is at least by itself."""
+        found = [self._together([head], np.ones(1), near=ROUGH)[0] for head in heads]
+        units = np.array([head.unit for head in heads])
+        return np.array(np.maximum(units * np.sqrt(np.maximum(found, 0.0)), known))
+
+    def _together_again(self, heads: Sequence[Head], known: Array) -> Array:
+        """What every root is at least with the others in what is left of the norm (E58)."""
+        least, units = known.copy(), np.array([head.unit for head in heads])
+        for _ in range(ROUNDS):
+            for k in range(len(heads)):
+                mean = self._mean(heads, least)
+                if mean.floor < self.most and mean.prices[k] > SMALL * mean.prices.sum() and not passed():
+                    least[k] = max(least[k], units[k] * self._together(heads, mean.prices, mean, k)[0])
+                    self._narrow(heads, heads[k], least)
+        return least
+
+    def _narrow(self, heads: Sequence[Head], head: Head, least: Array) -> None:
+        """What designs that are no worse than the best known have at most of odd multiples."""
+        shapes = np.zeros(5 * len(self.modes))
+        for (order, _), line in zip(head.beside, self._of_head(head), strict=True):
+            if np.any(line.slopes):
+                found = next(aimed(self.under_all(heads, least), [np.append(-line.slopes, shapes)]))
+                known = self.search.felt_at_most.get(id(order), math.inf)
+                self.search.felt_at_most[id(order)] = min(known, line.constant - found)
+        self._taken.clear()
+
+    def _mean(self, heads: Sequence[Head], least: Array) -> Mean:
+        """A mean as roots of heads, which are not under these."""
+        key = tuple(map(id, heads))
+        if key not in self._taken:
+            self._taken[key] = [self._of_head(head) for head in heads]
+        return mean_of(heads, self._taken[key], least, self.most, self.mounts.numbers)
+
+    def taken_off(self, heads: Sequence[Head]) -> float:
+        """Share of the mean that odd multiples of its orders may hide."""
+        size = sum(head.share * head.unit for head in heads)
+        mean = self._mean(heads, np.array([head.unit for head in heads]))
+        return 1.0 - (float(mean.prices.sum()) + mean.constant) / size
+
+    def _of_head(self, head: Head) -> list[AtMost]:
+        """What is felt of odd multiples at most, in the mean over mounts."""
+        found = []
+        for order, _ in head.beside:
+            mounts = self.parts[order.part]
+            plain = most_of(self.each, order, self.parts)
+            line = (
+                None
+                if self.each.is_travel or np.any(order.loads[1:])
+                else felt_at_most(mounts, order.loads[0], order.omega)
+            )
+            known = AtMost(plain, np.zeros(mounts.numbers))
+            if line is not None:
+                line = line.times(float(self.each.factors.max()))
+                known = line if line.largest < plain else known
+            known = known.times(1.0 / len(self.each.mounts))
+            found.append(replace(known, most=self.search.felt_at_most.get(id(order), math.inf)))
+        return found
+
+    def _line(self, head: Head, order: Order) -> tuple[Line, list[Held]]:
+        """Of an order, and what it has to keep."""
+        return self._line_of(order, self.each.at_most(order, head, self.most))
+
+    def _line_of(self, order: Order, felt: Felt) -> tuple[Line, list[Held]]:
+        if id(order) not in self._stated:
+            mounts = self.parts[order.part]
+            line = self.search.line(mounts, order, felt, self.lower, self.upper)
+            self._stated[id(order)] = line, conditions(0, mounts, line)
+        return self._stated[id(order)]
+
+    def _together(
+        self,
+        heads: Sequence[Head],
+        prices: Array,
+        mean: Mean | None = None,
+        root: int | None = None,
+        near: float = NEAR,
+    ) -> tuple[float, Array, Array | None]:
+        """Least sum of the squares of heads at these prices, or of their roots; or of one root, in its unit."""
+        # a solver works best where what it minimises is of size one
+        size = float(prices.sum())
+        program, lines = self._program(heads, prices / size, mean)
+        if mean is not None:
+            goal = None if root is None else mean.goal(size, self.most, root)
+            aim = np.append(mean.along / size, np.zeros(5 * len(self.modes))) if root is None else None
+            program = replace(program, aim=aim, goal=goal)
+        bound, found = _best(program, near if mean is None else ROUGH)
+        middle = self._design(found.middle) if self.search.stiffness_alone else None
+        orders = [order for head in heads for order in head.orders]
+        return bound if root is not None else size * bound, self._pull(orders, lines, found), middle
+
+    def under_all(self, heads: Sequence[Head], known: Array) -> Program:
+        """Conditions of designs of which a norm is not over the whole."""
+        if len(heads) == 1 and not heads[0].beside:
+            own = [(head.at_most(self.most / head.share) / head.unit) ** 2 for head in heads]
+            program, _ = self._program(heads, np.zeros(len(heads)))
+            return replace(program, tops=np.append(own, program.tops[len(own) :]))
+        mean = self._mean(heads, known)
+        size = float(mean.prices.sum())
+        return replace(self._program(heads, mean.prices / size, mean)[0], goal=mean.goal(size, self.most))
+
+    def _program(self, heads: Sequence[Head], prices: Array, mean: Mean | None = None) -> tuple[Program, list[Line]]:
+        """Of these heads at these prices, and the lines of its orders."""
+        caps: list[Cap] = []
+        lines: list[Line] = []
+        held: list[Held] = []
+        roots: list[Root] = []
+        for number, head in enumerate(heads):
+            first, stated = len(lines), [self._line(head, order) for order in head.orders]
+            lines += [line for line, _ in stated]
+            held += [replace(limit, order=k) for k, (_, limits) in enumerate(stated, first) for limit in limits]
+            at = range(first, len(lines))
+            caps += head.caps(number, self.each, lines[first:], at)
+            if mean is not None:
+                own = lengths_of(head, self.each, lines[first:], at)
+                roots.append(Root(prices[number], float(mean.least[number]), float(mean.top[number]), own))
+        more = self.search.limits.added(heads, len(heads), self._line_of, lines)
+        lines += more.lines
+        program = Program(
+            tuple(line.size for line in lines), tuple(line.reaches for line in lines), self.mounts.numbers,
+            lines[0].columns, np.append(0.0 * prices if roots else prices, np.zeros(len(more.tops))),
+            [*caps, *more.caps], [*held, *more.held], more.budgets, self.search.columns.sets, roots, self.modes,
+            np.append(np.full(len(heads), math.inf), more.tops),
+        )  # fmt: skip
+        return program, lines
+
+    def _design(self, s: Array) -> Array:
+        """Open numbers at s, where every number is one of them."""
+        out = 0.5 * (self.lower + self.upper)[: self.search.mount_numbers]
+        for j, follows_ in enumerate(self.mounts.keys):
+            out[follows_[0]] += 0.5 * (self.upper - self.lower)[follows_[0]] * s[j]
+        return out
+
+    def _pull(self, orders: Sequence[Order], lines: Sequence[Line], found: Proposed) -> Array:
+        """By decision, what of the products is not that of s, in forces that count."""
+        pull, s = np.zeros(len(self.lower)), found.middle
+        for order, line, moments in zip(orders, lines, found.moments, strict=False):
+            size = float(np.sum(squared(self.each.felt(line) / line.unit) * moments)) or 1.0
+            mounts = self.parts[order.part]
+            for spring, (seen, added) in zip(mounts.springs, line.springs, strict=True):
+                apart = added - np.tensordot(s, spring.slopes(len(s)), 1) @ seen
+                share = max(float(np.sum(squared(apart) * moments)), 0.0) / size
+                self._spread(pull, [j for j, _ in spring.terms], share)
+            for place, (seen, moved) in zip(mounts.places, line.places, strict=True):
+                apart = np.split(moved - s[place.number] * seen, 2)[1]
+                self._spread(pull, [place.number], max(float(np.sum(squared(apart) * moments)), 0.0) / size)
+        for shapes, priced, own, moments in zip(
+            self.modes, found.multipliers.shapes, self.search.own, found.shapes, strict=True
+        ):
+            of_numbers, of_shapes = pulls(shapes, priced, s, moments)
+            pull[own] += of_shapes
+            for j, share in enumerate(of_numbers):
+                self._spread(pull, [j], float(share))
+        return pull
+
+    def _spread(self, pull: Array, numbers: Sequence[int], share: float) -> None:
+        """Over the decisions that numbers follow, by how much of their bounds is left."""
+        follows_ = sorted({j for number in numbers for j in self.mounts.keys[number]})
+        left = (self.upper - self.lower) / np.maximum(self.search.upper - self.search.lower, 1e-300)
+        best = max(follows_, key=lambda j: left[j])
+        pull[best] += share
+
+
+def _best(program: Program, near: float) -> tuple[float, Proposed]:
+    """What follows from what a solver says; it is asked again where that is far under what it takes for the least."""
+    best: tuple[float, Proposed] | None = None
+    for found in proposed(program):
+        bound = follows(program, found.multipliers)
+        best = (bound, found) if best is None or bound > best[0] else best
+        if bound >= near * found.least:
+            break
+    assert best is not None
+    return best
