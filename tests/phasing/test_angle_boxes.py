@@ -10,11 +10,16 @@ import numpy as np
 import pytest
 
 from laufruhe.files.reader import load_tables
-from laufruhe.load_models.angle_waves import AngleWaves
+from laufruhe.machine.firing import firing_turns, intervals_of
+from laufruhe.machine.firing_windows import FiringWindow
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
+from laufruhe.solvers.stars.design import StarDesign, solve_fixed
+from laufruhe.solvers.throws.search import ThrowSearch
+from laufruhe.solvers.throws.windows import design_at, firing_of, windows_of
 from problem_files import PROBLEMS, changed
 
 TWIN = """
@@ -81,23 +86,104 @@ def _at(problem: Problem, angle: float, of_bank: bool, order: tuple[int, ...] = 
     return replace(phasing.realise(Candidate((throw,), order, *geometry)), phasing=None)
 
 
-@pytest.mark.parametrize("gas", ["", GAS])
-@pytest.mark.parametrize(("text", "of_bank"), [(TWIN, True), (SPLIT, False)])
-@pytest.mark.parametrize("name", ["rms shaking force", "rms roll moment", "rms rocking couple"])
-def test_waves_are_those_of_the_exact_model(text: str, of_bank: bool, gas: str, name: str) -> None:
-    """At every angle, from waves that were taken at one of them."""
-    problem = _read(text + gas + MOUNTS + WEIGHTS + _objective(name))
-    measure, here = problem.objective[0].measure, math.radians(50.0)
-    there = _at(problem, here, of_bank)
-    layout = problem.phasing.layout(*((here, 0.0) if of_bank else (math.radians(60.0), here)))
-    waves = AngleWaves(there, layout, (0, 1), of_bank)
-    norm = waves.norm(measure, waves.samples(measure, 96))
-    for degrees in (20.0, 40.0, 77.0, 90.0, 120.0):
-        half = 0.5 * math.radians(degrees)
-        turned = np.einsum("h,hkd->kd", np.exp(1j * waves.numbers * half), norm.waves[0]).real
-        found = measure.norm.value(norm.fixed.grid, norm.fixed.constant + turned)
-        wanted = evaluate(_at(problem, 2.0 * half, of_bank)).value(measure)
-        assert found == pytest.approx(wanted, rel=1e-6, abs=norm.left_out)
+VEE = changed(TWIN, "cylinders = 2", "cylinders = 4")
+VEE = changed(VEE, "firing_order = [1, 2]", 'firing_order = "open"')
+VEE = changed(changed(VEE, "min = 225, max = 495", 'largest_deviation = "100 deg"'), SECOND, "")
+BOTH = changed(VEE, "bank_angle =", "split_pin_angle = { between = [-30, 60] }\nbank_angle =")
+SIX = changed(changed(VEE, "cylinders = 4", "cylinders = 6"), "100 deg", "30 deg")
+COUPLE = "rms rocking couple"
+SHAFT = """[[balancer_shafts]]
+name = "shaft"
+ratio = -1
+position = ["20 mm", "30 mm"]
+[[balancer_shafts.unbalances]]
+x = "40 mm"
+unbalance = "0.02 kg m"
+angle = 20
+"""
+
+
+def _drawn(rng: np.random.Generator, window: FiringWindow) -> Array | None:
+    """Random throws and angles that keep a window."""
+    low, high = window.box
+    for k in rng.permutation(len(low)):
+        here = np.arange(len(low)) == k
+        at = rng.uniform(low[k], high[k])
+        box = window.within(np.where(here, at, low), np.where(here, at, high))
+        if box is None:
+            return None
+        low, high = box
+    return np.asarray(0.5 * (low + high))
+
+
+def _design(problem: Problem, window: FiringWindow, angles: Array) -> Candidate:
+    return replace(design_at(problem.phasing, angles), firing_order=window.order)
+
+
+@pytest.mark.parametrize(
+    ("text", "gas", "name"),
+    [
+        *((text, "", name) for text in (TWIN, SPLIT, VEE, BOTH, SIX + SHAFT) for name in ("rms shaking force", COUPLE)),
+        *((text, GAS, "rms roll moment") for text in (VEE, BOTH)),
+    ],
+    ids=range(12),
+)
+def test_waves_and_windows_are_those_of_the_exact_model(text: str, gas: str, name: str) -> None:
+    """At random angles of every kind: loads, and the firing intervals that a window tells."""
+    problem = _read(text + gas + MOUNTS + _objective(name))
+    phasing, measure, rng = problem.phasing, problem.objective[0].measure, np.random.default_rng(3)
+    windows, firing = windows_of(problem, phasing), firing_of(phasing)
+    waves = ThrowSearch(problem, phasing, windows, lambda _: None, None).roots[0][0].programs.waves
+    norm, seen = waves.norm(measure, waves.samples(measure, 96)), 0
+    for window in (windows[k] for k in rng.integers(len(windows), size=6)):
+        angles = _drawn(rng, window)
+        if angles is None:
+            continue
+        design, seen = _design(problem, window, angles), seen + 1
+        there = replace(phasing.realise(design), phasing=None)
+        matrix, constants = firing.rows(window)
+        turns = firing_turns(phasing.layout_of(design), design.throws, design.firing_order)
+        assert matrix @ angles + constants == pytest.approx(intervals_of(phasing.cycle, turns), abs=1e-9)
+        rows = norm.fixed.constant.copy()
+        for part, wave in zip(waves.parts, norm.waves, strict=True):
+            lap = 0 if part.cylinder is None else window.laps[part.cylinder]
+            own = np.array([angles[part.pin], *angles[waves.throws :]])
+            turned = np.exp(1j * (waves.orders @ own - math.tau * lap * waves.orders[:, 0]))
+            rows += np.einsum("h,hkd->kd", turned, wave).real
+        found = norm.fixed.norm.value(norm.fixed.grid, rows)
+        assert found == pytest.approx(evaluate(there).value(measure), rel=1e-6, abs=norm.left_out)
+    assert seen > 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "rest"),
+    [
+        (VEE, WEIGHTS + _objective("rms mount force")),
+        (BOTH, GAS + _objective("mean mount force")),
+        (SIX + SHAFT, _objective("rms mount force")),
+    ],
+)
+def test_no_design_in_a_box_of_throws_and_angles_goes_under_its_bound(text: str, rest: str) -> None:
+    """Small and large boxes around random designs, unbalances at their proven optimum."""
+    problem, rng, seen = _read(text + MOUNTS + rest), np.random.default_rng(4), 0
+    phasing, windows = problem.phasing, windows_of(problem, problem.phasing)
+    programs = ThrowSearch(problem, phasing, windows, lambda _: None, None).roots[0][0].programs
+    for width in (2.0, 2.0, 2.0, 10.0, 10.0, 40.0, 40.0, 400.0):
+        window = windows[rng.integers(len(windows))]
+        angles = _drawn(rng, window)
+        if angles is None:
+            continue
+        reach = math.radians(width) * rng.uniform(0.0, 1.0, (2, len(angles)))
+        box = programs.box(programs.program(window), angles - reach[0], angles + reach[1], 0.0, math.inf)
+        design = _design(problem, window, angles)
+        value = StarDesign(design, solve_fixed(replace(phasing.realise(design), phasing=None))).value
+        assert box is not None
+        assert box.bound <= value * (1.0 + 1e-9)
+        assert np.all((box.lower <= angles + 1e-9) & (angles <= box.upper + 1e-9))
+        assert box.bound >= (0.9 if width < 5.0 else 0.0) * value
+        seen += 1
+    assert seen > 2
 
 
 CASES = [
@@ -162,11 +248,15 @@ def test_intervals_bound_the_bank_angle() -> None:
     assert str(none.status) == "infeasible"
 
 
-def test_what_knows_where_the_crank_stands_has_no_boxes() -> None:
-    """A weight at an angle of its own is not turned with the crank: the certificate says no more than it did."""
+@pytest.mark.slow
+def test_what_knows_where_the_crank_stands_is_bounded_too() -> None:
+    """A weight at an angle of its own does not turn with the crank: throws are then turned by the bank angle."""
     fixed = '[[counterweights]]\nname = "still"\nx = "50 mm"\nunbalance = "0.01 kg m"\nangle = 30\n'
-    result = solve(_read(TWIN + MOUNTS + WEIGHTS + fixed + _objective("rms shaking force")))
-    assert "boxes" not in result.certificate.method
+    problem = _read(TWIN + MOUNTS + WEIGHTS + fixed + _objective("rms shaking force"))
+    result = solve(problem)
+    grid = [solve(_at(problem, angle, True)).objective.value for angle in np.linspace(*problem.phasing.bank, 7)]
+    assert result.certificate.lower_bound <= min(grid) * (1.0 + 1e-9)
+    assert result.certificate.gap <= 2e-4
 
 
 def test_weights_that_know_how_far_pins_are_apart_have_no_boxes() -> None:

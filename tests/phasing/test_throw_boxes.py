@@ -165,7 +165,7 @@ def test_waves_add_up_to_the_exact_loads(tmp_path, name):
         rows = norm.fixed.constant.copy()
         for part, wave in zip(waves.parts, norm.waves, strict=True):
             lap = 0 if part.cylinder is None else window.laps[part.cylinder]
-            turned = np.exp(1j * waves.numbers * (throws[part.pin] - math.tau * lap))
+            turned = np.exp(1j * waves.orders[:, 0] * (throws[part.pin] - math.tau * lap))
             rows += np.einsum("h,hkd->kd", turned, wave).real
         design = given.design([0.0] * len(given.decisions))
         if any(not np.isclose(d.set.lower, 0.0) for d in given.unbalances if d.set.width == 1):
@@ -211,29 +211,30 @@ def test_every_way_to_fire_is_in_one_window(tmp_path, layout, cycle, count):
     assert kept > 50
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_an_arc_is_never_less_than_its_least(seed):
+@pytest.mark.parametrize("beside", [0, 1, 2])
+@pytest.mark.parametrize("seed", range(3))
+def test_arcs_are_never_less_than_their_least(seed, beside):
+    """A sum over throws that share open angles, at random angles of a box: above the least, and inside what is kept."""
     rng = np.random.default_rng(seed)
-    orders = np.array([0.5, 1.0, 2.0, 3.5, 6.0])
+    orders = np.column_stack([[0.5, 1.0, 2.0, 3.5, 6.0], rng.uniform(-4.0, 4.0, (5, beside))])
     waves = rng.standard_normal((3, 5)) + 1j * rng.standard_normal((3, 5))
-    slopes = rng.standard_normal(3)
-    lower = rng.uniform(-3.0, 3.0, 3)
-    upper = lower + rng.uniform(0.0, 2.0, 3) * [1.0, 0.01, 0.0]
+    slopes, shared = rng.standard_normal(3), rng.standard_normal(beside)
+    lower = rng.uniform(-3.0, 3.0, 3 + beside)
+    upper = lower + rng.uniform(0.0, 1.0, 3 + beside) * np.array([1.0, 0.01, 0.0, *[1.0] * beside])
+    angles = rng.uniform(lower, upper, (20000, 3 + beside))
+    angles[:8000] = np.where(rng.random((8000, 3 + beside)) < 0.5, lower, upper)
+    values = angles[:, :3] @ slopes + angles[:, 3:] @ shared
+    for p in range(3):
+        turned = angles[:, [p, *range(3, 3 + beside)]] @ orders.T
+        values += (np.exp(1j * turned) @ waves[p]).real
     for followed in (5, 3):
-        arcs = ArcBox(orders[:followed], lower, upper).functions(waves, slopes)
-        angles = np.linspace(lower, upper, 4001).T
-        values = (waves[:, None] * np.exp(1j * angles[:, :, None] * orders)).sum(axis=-1).real + slopes[
-            :, None
-        ] * angles
-        assert np.all(arcs.least <= values.min(axis=1) + 1e-12)
+        arcs = ArcBox(orders[:followed], lower, upper).functions(waves, slopes, shared)
+        assert arcs.least <= values.min() + 1e-12
         low, high = arcs.kept(0.3)
-        better = values < values.min(axis=1)[:, None] + 0.0
-        less = values - arcs.least[:, None] < 0.3
-        assert not better.any()
-        assert np.all((angles >= low[:, None] - 1e-12) | ~less)
-        assert np.all((angles <= high[:, None] + 1e-12) | ~less)
+        less = angles[values - arcs.least < 0.3]
+        assert np.all((less >= low - 1e-12) & (less <= high + 1e-12))
         if followed == 5:
-            assert np.all(arcs.least >= values.min(axis=1) - 0.03)
+            assert arcs.least >= values.min() - (0.03, 0.1, 0.5)[beside]
 
 
 BOUNDED = 'throws = [0, { between = [60, 180] }, { between = [170, 300] }]\nrotating_mass = "0.7 kg"\n'
@@ -264,7 +265,7 @@ def test_steps_over_the_cycle_do_not_hold_a_bound_back(tmp_path):
     """One throw and gas: the first 96 steps alone cost 4 % of the mean force, and the bound comes nearer than that."""
     engine = BOUNDED.replace("{ between = [60, 180] }", "120")
     rest = engines.MOUNTS + GAS + engines.MOUNT_FORCE
-    result = solve(engines.problem(tmp_path, 3, "two-stroke", engine, "", rest, samples=96))
+    result = solve(engines.problem(tmp_path, 3, "two-stroke", engine, "", rest, samples=720))
     assert result.certificate.gap < 3e-3
     assert "boxes" in result.certificate.method
 

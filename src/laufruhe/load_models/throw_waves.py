@@ -11,24 +11,25 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.errors import ModelError
+from laufruhe.load_models.affine import MOST_NUMBERS, AffineModel, AffineNorm
 from laufruhe.load_models.lone_parts import lone, motored, only_rotors, working
 from laufruhe.machine import Engine
 from laufruhe.machine.firing_windows import lateness
 from laufruhe.machine.layouts import Layout
-from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.arrays import Array, ComplexArray, Mask
+from laufruhe.numerics.norms.norm import amplitudes, mean_square
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base, orders_equal
-from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Measure, mass_rows, selected
 from laufruhe.problem.problem import Problem
 
 _NOTHING, _FEW = 1e-10, 24
 _MANY = 96
+_LISTED = 4096
 PEAK_STEPS = 2
 """Parts of a step about which peaks are averaged: none is more than the peak, however short."""
 
@@ -69,7 +70,7 @@ class WaveNorm:
     """
 
     fixed: AffineNorm
-    waves: NDArray[np.complex128]
+    waves: ComplexArray
     left_out: float
 
 
@@ -89,7 +90,10 @@ def averaged(problem: Problem, measure: Measure, signal: Spectrum, samples: int)
 class ThrowWaves:
     """Norms of a problem as waves of its throws.
 
-    Waves of time have the orders `times`, those of the angles `orders`: the same ones where throws turn.
+    Attributes
+    ----------
+    orders
+        Of the throw, and of every angle that is open beside throws, in each wave, shape (waves, 1 + open).
 
     Parameters
     ----------
@@ -101,10 +105,10 @@ class ThrowWaves:
         Throw that every rotor turns with; rotors left out stand still.
     """
 
-    share_left_out: ClassVar[tuple[float, float]] = 1e-4, 1e-3
+    share_left_out: tuple[float, float] = 1e-4, 1e-3
     """Of the moving parts' root mean square, that orders left out may hold, of the first few next to nothing; bounds
     are lowered by it. Of many orders more: inside the crankcase a pressure that jumps has no end of them."""
-    _followed: ClassVar[tuple[float, float]] = 1e-4, 3e-5
+    _followed: tuple[float, float] = 1e-4, 3e-5
 
     def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
         self.problem, self.layout = problem, layout
@@ -115,10 +119,10 @@ class ThrowWaves:
         self.parts = _moving(engine, layout, rides, inside)
         self._alone = [evaluate(self._acting(part), part.engine) for part in self.parts]
         self.rest = AffineModel(replace(motored(problem), engine=only_rotors(engine, still, inside)), keep_all=True)
-        self.times = self.orders = self._kept()
-        self.numbers = np.array([float(order) for order in self.orders])
+        self.times = self._kept()
+        self.orders = np.array([[float(order)] for order in self.times])
         self._turning = [as_order(abs(rotor.shaft.ratio)) for rotor in still]
-        self.base = common_base([order for order in (*self.orders, *self._turning, Fraction(1)) if order])
+        self.base = common_base([order for order in (*self.times, *self._turning, Fraction(1)) if order])
         self.rest.base = self.base
 
     def _acting(self, part: Moving) -> Problem:
@@ -141,7 +145,11 @@ class ThrowWaves:
 
     def _signals(self, measure: Measure, k: int) -> list[Spectrum]:
         """What counts of one moving part's loads at every operating point that counts."""
-        found, engine = self._alone[k], self.problem.engine
+        return self.counted(measure, self._alone[k])
+
+    def counted(self, measure: Measure, found: Evaluation) -> list[Spectrum]:
+        """What counts of loads at every operating point that counts."""
+        engine = self.problem.engine
         shares = measure.shares(self.problem.points)
         return [
             selected(measure, signal, engine)
@@ -175,15 +183,24 @@ class ThrowWaves:
 
     def _left_out(self, measure: Measure, k: int, samples: int) -> float:
         """Of one part."""
+        return self.tail(measure, self._signals(measure, k), samples)
+
+    def tail(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> float:
+        """What the orders that are left out of signals amount to at most, those beyond the last included."""
         total, kept = 0.0, np.array([float(order) for order in self.times])
-        for signal in self._signals(measure, k):
+        for one in signals:
+            # of what bends at an angle so many orders are listed that those beyond are next to nothing
+            signal = one if one.corners is None else one.extended(_LISTED)
             out = ~orders_equal(signal.orders, kept)
-            sizes = np.linalg.norm(signal.coefficients[out], axis=-1)
+            rest = replace(signal, coefficients=np.where(out[:, None, None], signal.coefficients, 0.0))
             if measure.norm.is_euclidean or measure.norm.averages:
-                # neither is more than the root mean square, at the place where that is largest
-                total = max(total, float(np.sqrt(np.square(sizes).sum(axis=0)).max(initial=0.0)))
+                # neither is more than the root mean square, nor rows of averages more than their lengths
+                most = np.sqrt(mean_square(rest))
+                if measure.norm.averages:
+                    most = np.minimum(most, _averaged(signal, out, samples * float(self.base)))
+                total = max(total, float(most.max(initial=0.0)))
                 continue
-            whole = sizes.sum(axis=0)
+            whole = amplitudes(rest)
             if averages(self.problem, measure):
                 whole = _averaged(signal, out, PEAK_STEPS * samples * float(self.base))
             # no peak, nor any peak to peak, is more than twice the sum of the lengths
@@ -195,17 +212,33 @@ class ThrowWaves:
         fixed = self.rest.norm(
             measure, samples, averaged=True, peaks=PEAK_STEPS if averages(self.problem, measure) else 0
         )
+        count = len(self.parts) * len(self.orders) * fixed.constant.size
+        if count > MOST_NUMBERS:
+            raise ModelError(f"{2e-6 * count:.0f} million numbers at once")
         waves = np.zeros((len(self.parts), len(self.orders), *fixed.constant.shape), complex)
-        for k, part in enumerate(self.parts):
-            if measure.is_mass and part.cylinder is None:
-                h = self.orders.index(Fraction(1))
-                waves[k, h] = self._weights(measure, part) * self._turned(part)[h]
-            if not measure.is_load:
-                continue
-            waves[k] = self._waves(measure, self._alone[k].signals(measure.load), samples) * self._turned(part)
+        for k in range(len(self.parts)):
+            self.add(waves[k], measure, k, samples)
         return WaveNorm(fixed, waves, self.left_out(measure, samples))
 
-    def _weights(self, measure: Measure, part: Moving) -> NDArray[np.complex128]:
+    def add(self, waves: ComplexArray, measure: Measure, k: int, samples: int) -> None:
+        """Rows of one part to those of its waves, shape (waves, k, d)."""
+        if self.acts(measure, k):
+            waves[:] = self.own_rows(measure, k, samples)
+
+    def acts(self, measure: Measure, k: int) -> bool:
+        """Whether a part has to do with a measure."""
+        return measure.is_load or (measure.is_mass and self.parts[k].cylinder is None)
+
+    def own_rows(self, measure: Measure, k: int, samples: int) -> ComplexArray:
+        """Rows of every order of a part at theta = 0 and no whole turns, shape (orders, k, d)."""
+        part = self.parts[k]
+        if measure.is_load:
+            rows = [self.coefficients(signal) for signal in self._alone[k].signals(measure.load)]
+            return self.rows_of(measure, rows, samples) * self._turned(part)
+        first = np.array([order == 1 for order in self.times])
+        return np.asarray(first[:, None, None] * self._turned(part) * self._weights(measure, part))
+
+    def _weights(self, measure: Measure, part: Moving) -> ComplexArray:
         """Rows of the masses that ride on a throw, which turn with it."""
         engine = self.problem.engine
         riding = {rotor.name: rotor.unbalance for rotor in part.engine.rotors}
@@ -215,17 +248,13 @@ class ThrowWaves:
         ]
         return np.asarray(rows[0] - 1j * rows[1])
 
-    def _waves(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> NDArray[np.complex128]:
-        """Rows of every order of a part: the real part as it is, and turned by a quarter of its wave."""
-        return self.rows_of(measure, [self.coefficients(signal) for signal in signals], samples)
-
-    def coefficients(self, signal: Spectrum) -> NDArray[np.complex128]:
+    def coefficients(self, signal: Spectrum) -> ComplexArray:
         """Of the orders that are kept, shape (orders, places, d)."""
         return np.array([signal.at(float(order)) for order in self.times])
 
     def rows_of(
-        self, measure: Measure, own: Sequence[NDArray[np.complex128]], samples: int
-    ) -> NDArray[np.complex128]:  # fmt: skip
+        self, measure: Measure, own: Sequence[ComplexArray], samples: int
+    ) -> ComplexArray:  # fmt: skip
         """Rows of every order of coefficients at the operating points, shape (orders, k, d)."""
         steps, times = [round(order / self.base) for order in self.times], np.array([float(t) for t in self.times])
         angles = math.tau / float(self.base) * np.arange(samples) / samples
@@ -241,9 +270,14 @@ class ThrowWaves:
                 blocks.append(rows.reshape(len(steps), -1, counted.shape[-1]))
         return np.concatenate(blocks, axis=1) if blocks else np.zeros((len(steps), 1, 1), complex)
 
-    def _turned(self, part: Moving) -> NDArray[np.complex128]:
+    def _turned(self, part: Moving) -> ComplexArray:
         """Every order back to theta = 0 and no whole turns, shape (orders, 1, 1)."""
-        return np.asarray(np.exp(-1j * self.numbers * (part.angle - math.tau * part.lap))[:, None, None])
+        times = np.array([float(order) for order in self.times])
+        return np.asarray(np.exp(-1j * times * (part.angle - math.tau * part.lap))[:, None, None])
+
+    def arcs(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Bounds of the throws in a box of all angles, as the unbalances that ride on them know them [rad]."""
+        return lower, upper
 
     def samples(self, measure: Measure, wanted: int) -> int:
         """Steps at which squares are exact, or as many as wanted."""

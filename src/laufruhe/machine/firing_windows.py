@@ -3,6 +3,9 @@
 A cylinder fires at t_k = 2 pi l_k - (theta_p + c_k), p its throw, c_k what its pin and bank add, l_k whole
 turns. Bounds on intervals, and on throws, are bounds on differences of two throws, or of a throw and
 nothing: a network whose shortest paths are the tightest bounds, and which no crank keeps where a circle is negative.
+Where the bank angle or split pins are open, it is one of own angles, theta_p - s_k beta with beta their sum and
+s_k = +- 1/2 the side of a cylinder; two of one throw are as far apart as beta lets them be. Throws that are open are
+then counted from where cylinder 1 at its dead centre has the first one, as theta_p - s_1 beta.
 """
 
 from __future__ import annotations
@@ -16,12 +19,77 @@ import numpy as np
 
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts import Layout
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Indices
 
 SLACK = 1e-7
 """By which firing intervals may miss their bounds [rad]: a rounding of the programs that place throws."""
 # a circle of bounds that is negative by a rounding
 _ROUNDING = 1e-10
+# rounds in which throws and open angles narrow each other
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class OwnAngles:
+    """Own angles of cylinders: that of their throw, and what angles of banks and pins that are open add to it.
+
+    Attributes
+    ----------
+    throws
+        Of every own angle, its throw.
+    shares
+        What an open angle adds to every own angle, shape (own angles, open angles).
+    """
+
+    throws: Indices
+    shares: Array
+
+    @cached_property
+    def _differences(self) -> tuple[Indices, Indices]:
+        """Own angles of one throw, in pairs."""
+        first, second = np.nonzero(self.throws[:, None] == self.throws[None, :])
+        return first[first != second], second[first != second]
+
+    def shortened(self, paths: Array, lower: Array, upper: Array) -> Array | None:
+        """Shortest paths of own angles in a box of throws and open angles; None where nothing keeps them."""
+        count = len(lower) - self.shares.shape[1]
+        least, most = _range(self.shares, lower[count:], upper[count:])
+        paths = paths.copy()
+        paths[-1, :-1] = np.minimum(paths[-1, :-1], upper[self.throws] + most)
+        paths[:-1, -1] = np.minimum(paths[:-1, -1], -(lower[self.throws] + least))
+        first, second = self._differences
+        _, ahead = _range(self.shares[second] - self.shares[first], lower[count:], upper[count:])
+        paths[first, second] = np.minimum(paths[first, second], ahead)
+        for k in range(len(paths)):
+            paths = np.minimum(paths, paths[:, k : k + 1] + paths[k : k + 1, :])
+        return None if np.any(np.diag(paths) < -_ROUNDING) else paths
+
+    def box(self, paths: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """What shortest paths leave of a box of throws and open angles."""
+        count = len(lower) - self.shares.shape[1]
+        low, high = lower.copy(), upper.copy()
+        least, most = _range(self.shares, lower[count:], upper[count:])
+        np.minimum.at(high, self.throws, paths[-1, :-1] - least)
+        np.maximum.at(low, self.throws, -paths[:-1, -1] - most)
+        first, second = self._differences
+        # shares . angles is at most this
+        rows = [self.shares[second] - self.shares[first], self.shares, -self.shares]
+        room = [paths[first, second], paths[-1, :-1] - low[self.throws], paths[:-1, -1] + high[self.throws]]
+        for row, most_of_it in zip(np.concatenate(rows), np.concatenate(room), strict=True):
+            for s in np.flatnonzero(row):
+                others = np.where(np.arange(len(row)) == s, 0.0, row)
+                end = (most_of_it - _range(others[None], low[count:], high[count:])[0][0]) / row[s]
+                if row[s] > 0.0:
+                    high[count + s] = min(high[count + s], end)
+                else:
+                    low[count + s] = max(low[count + s], end)
+        return low, high
+
+
+def _range(shares: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Least and largest of shares . angles for angles between bounds."""
+    up, down = np.maximum(shares, 0.0), np.minimum(shares, 0.0)
+    return up @ lower + down @ upper, up @ upper + down @ lower
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,31 +103,36 @@ class FiringWindow:
     laps
         l_k of every cylinder.
     paths
-        Most by which throw j stands ahead of throw i [rad], shape (throws + 1, throws + 1); the last is no throw
-        but the angle 0.
+        Most by which own angle j stands ahead of own angle i [rad], shape (own angles + 1, own angles + 1); the last
+        is none but the angle 0.
+    own
+        Own angles; those of the throws where neither bank nor split pins are open.
+    root
+        Bounds of throws and open angles.
     """
 
     order: tuple[int, ...]
     laps: tuple[int, ...]
     paths: Array
+    own: OwnAngles
+    root: tuple[Array, Array]
 
-    @property
+    @cached_property
     def box(self) -> tuple[Array, Array]:
-        """Least and largest angle of every throw [rad]."""
-        return -self.paths[:-1, -1], self.paths[-1, :-1].copy()
+        """Least and largest of every throw and open angle [rad]."""
+        return self.within(*self.root) or self.root
 
     def within(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
         """The least box that holds all throws of a box that keep the window; None where there are none."""
-        paths = self.paths.copy()
-        paths[-1, :-1] = np.minimum(paths[-1, :-1], upper)
-        paths[:-1, -1] = np.minimum(paths[:-1, -1], -lower)
-        # the window's own paths are shortest: a shorter one goes through the angle 0
-        ahead = np.min(paths[-1, :, None] + self.paths, axis=0)
-        behind = np.min(self.paths + paths[:, -1][None, :], axis=1)
-        low, high = -behind[:-1], ahead[:-1]
-        if np.any(low > high + _ROUNDING):
-            return None
-        return np.minimum(low, high), np.maximum(low, high)
+        for _ in range(_ROUNDS if self.own.shares.size else 1):
+            paths = self.own.shortened(self.paths, lower, upper)
+            if paths is None:
+                return None
+            low, high = self.own.box(paths, lower, upper)
+            if np.any(low > high + _ROUNDING):
+                return None
+            lower, upper = np.minimum(low, high), np.maximum(low, high)
+        return lower, upper
 
 
 def lateness(layout: Layout) -> tuple[float, ...]:
@@ -80,6 +153,8 @@ class FiringBounds:
         Bounds of every throw [rad]; None where they are open, and cylinder 1 is at its dead centre at phi = 0.
     order
         Firing order; None where it is open.
+    open_angles
+        Bounds of the bank angle and of the split pins' angle, those of them that are open [rad].
     """
 
     cycle: Cycle
@@ -88,67 +163,105 @@ class FiringBounds:
     most: float
     throws: tuple[tuple[float, float], ...] | None
     order: tuple[int, ...] | None
+    open_angles: tuple[tuple[float, float], ...] = ()
 
     @cached_property
     def late(self) -> tuple[float, ...]:
-        """c_k of every cylinder [rad]."""
-        return lateness(self.layout)
+        """c_k of every cylinder, open angles at zero [rad]."""
+        found = lateness(self.layout)
+        least = sum(low for low, _ in self.open_angles)
+        return tuple(late + self.layout.side(k) * least for k, late in enumerate(found)) if least else found
+
+    def share(self, k: int) -> float:
+        """What an open angle adds to the own angle of a cylinder, beside that of cylinder 1 where throws are open."""
+        return (self.layout.side(0) if self.throws is None else 0.0) - self.layout.side(k) if self.open_angles else 0.0
+
+    @cached_property
+    def _named(self) -> list[tuple[int, float]]:
+        """Throw and share of every own angle."""
+        return sorted({(pin, self.share(k)) for k, pin in enumerate(self.layout.pins)})
+
+    @cached_property
+    def _own_of(self) -> list[int]:
+        """The own angle of every cylinder."""
+        return [self._named.index((pin, self.share(k))) for k, pin in enumerate(self.layout.pins)]
+
+    @cached_property
+    def own(self) -> OwnAngles:
+        """Own angles of all cylinders."""
+        shares = np.array([share for _, share in self._named])
+        return OwnAngles(np.array([pin for pin, _ in self._named]), np.tile(shares[:, None], len(self.open_angles)))
+
+    @cached_property
+    def _root(self) -> tuple[Array, Array]:
+        """Bounds of throws and open angles."""
+        free = ((-math.inf, math.inf),) * len(self.layout.throw_positions)
+        every = np.array([*(self.throws or free), *self.open_angles])
+        if self.throws is None:
+            # cylinder 1 is at its dead centre when phi = 0
+            every[self.layout.pins[0]] = -self.late[0]
+        return every[:, 0], every[:, 1]
 
     @property
     def anywhere(self) -> FiringWindow:
         """Throws within bounds of their own, whatever fires when."""
-        return FiringWindow((), (0,) * len(self.layout.positions), self._start())
+        return self._window((), (0,) * len(self.layout.positions), self._start())
+
+    def _window(self, order: tuple[int, ...], laps: tuple[int, ...], paths: Array) -> FiringWindow:
+        return FiringWindow(order, laps, paths, self.own, self._root)
 
     def windows(self) -> Iterator[FiringWindow]:
         """Every order and choice of dead centres that some throws keep, one after the other."""
-        order = self.order or tuple(range(1, len(self.layout.positions) + 1))
-        first = order[0] - 1 if self.order else 0
-        yield from self._grown((first,), {first: 0}, self._start())
+        firsts = [self.order[0] - 1] if self.order else [0]
+        if self.order is None and self.most > math.tau + SLACK:
+            # whose first dead centre comes more than a turn after the last of the others need not be cylinder 1
+            firsts = list(range(len(self.layout.positions)))
+        for first in firsts:
+            yield from self._grown((first,), {first: 0}, self._start())
 
     def rows(self, window: FiringWindow) -> tuple[Array, Array]:
-        """Firing intervals as A theta + b, shapes (n, throws) and (n,)."""
+        """Firing intervals as A u + b with u the throws and open angles, shapes (n, u) and (n,)."""
         order, late = [number - 1 for number in window.order], self.late
-        moments = np.zeros((len(order), len(self.layout.throw_positions)))
+        throws = len(self.layout.throw_positions)
+        moments = np.zeros((len(order), throws + len(self.open_angles)))
         moments[np.arange(len(order)), [self.layout.pins[k] for k in order]] = -1.0
+        moments[:, throws:] = -np.array([self.share(k) for k in order])[:, None]
         constants = math.tau * np.array(window.laps)[order] - np.array(late)[order]
         following = np.roll(constants, -1)
         following[-1] += self.cycle.angle
         return np.roll(moments, -1, axis=0) - moments, following - constants
 
     def _start(self) -> Array:
-        count = len(self.layout.throw_positions)
+        count = len(self.own.throws)
         paths = np.full((count + 1, count + 1), math.inf)
         np.fill_diagonal(paths, 0.0)
-        if self.throws is None:
-            own, late = self.layout.pins[0], self.late[0]
-            paths[-1, own], paths[own, -1] = -late, late
-        else:
-            paths[-1, :-1] = [high for _, high in self.throws]
-            paths[:-1, -1] = [-low for low, _ in self.throws]
-            paths[:-1, :-1] = np.minimum(paths[:-1, :-1], paths[:-1, -1:] + paths[-1:, :-1])
-        return paths
+        found = self.own.shortened(paths, *self._root)
+        assert found is not None
+        return found
 
     def _grown(self, fired: tuple[int, ...], laps: dict[int, int], paths: Array) -> Iterator[FiringWindow]:
         count = len(self.layout.positions)
         if len(fired) == count:
             closed = self._apart(paths, fired[-1], laps[fired[-1]], fired[0], laps[fired[0]], wrapped=True)
             if closed is not None:
-                yield FiringWindow(tuple(k + 1 for k in fired), tuple(laps[k] for k in range(count)), closed)
+                found = self._window(tuple(k + 1 for k in fired), tuple(laps[k] for k in range(count)), closed)
+                # own angles of different throws may still want other angles of banks and pins
+                if not self.open_angles or found.within(*self._root) is not None:
+                    yield found
             return
         before, pins = fired[-1], self.layout.pins
         told = [self.order[len(fired)] - 1] if self.order else [k for k in range(count) if k not in laps]
-        used = {pins[j] for j in fired}
-        back, there = paths[:, pins[before]].tolist(), paths[pins[before]].tolist()
+        used, last = {pins[j] for j in fired}, self._own_of[before]
+        back, there = paths[:, last].tolist(), paths[last].tolist()
         for k in told:
-            own = pins[k]
-            free = self.throws is None and own not in used
+            own, free = self._own_of[k], self.throws is None and pins[k] not in used
             for lap in (0,) if free else self._laps(k, before, laps[before], back[own], there[own]):
                 longer = self._apart(paths, before, laps[before], k, lap)
                 if longer is not None:
                     yield from self._grown((*fired, k), {**laps, k: lap}, longer)
 
     def _laps(self, k: int, before: int, lap_before: int, back: float, there: float) -> Sequence[int]:
-        """Whole turns that let cylinder k fire after another, whose throw is at most so far back, or there ahead."""
+        """Whole turns that let cylinder k fire after another, whose own angle is so far back at most, or ahead."""
         # 2 pi l = interval + theta_own + c_own + t_before
         still = self.late[k] - self.late[before] + math.tau * lap_before
         low = self.least + still - back
@@ -159,13 +272,15 @@ class FiringBounds:
         self, paths: Array, before: int, lap_before: int, after: int, lap_after: int, wrapped: bool = False
     ) -> Array | None:
         """Paths with the bounds of one more interval; None where nothing keeps them."""
-        pins, late = self.layout.pins, self.late
+        late = self.late
         still = math.tau * (lap_after - lap_before) - late[after] + late[before]
         still += self.cycle.angle if wrapped else 0.0
         most = self.most if wrapped else min(self.most, math.tau)
-        p, q = pins[before], pins[after]
+        # of orders that are one another turned on, the one with cylinder 1 first, unless only this one says it
+        least = max(self.least, math.tau) if wrapped and after and self.order is None else self.least
+        p, q = self._own_of[before], self._own_of[after]
         # least <= theta_p - theta_q + still <= most
-        ahead, behind = most - still + SLACK, still - self.least + SLACK
+        ahead, behind = most - still + SLACK, still - least + SLACK
         if p == q:
             return paths if min(ahead, behind) >= -_ROUNDING else None
         there, back = float(paths[q, p]), float(paths[p, q])

@@ -35,7 +35,7 @@ _KNOWN = 8
 
 @dataclass(frozen=True, eq=False)
 class ThrowBox:
-    """Throws between bounds, and what bounds the objective there.
+    """Throws, and angles that are open beside them, between bounds, and what bounds the objective there.
 
     Attributes
     ----------
@@ -133,7 +133,8 @@ class ThrowPrograms:
         count, kept = len(self.waves.orders), np.arange(self._low)
         own = np.concatenate([kept, count + kept, [2 * count]])
         throws = self._riders.size + (2 * count + 1) * np.arange(self.waves.throws)
-        columns = np.concatenate([np.arange(self._riders.size), np.add.outer(throws, own).ravel()])
+        beside = np.arange(throws[-1] + 2 * count + 1, norm.slope.shape[-1])
+        columns = np.concatenate([np.arange(self._riders.size), np.add.outer(throws, own).ravel(), beside])
         return replace(norm, slope=norm.slope[..., columns])
 
     def _with_laps(self, laps: tuple[int, ...]) -> _Turned:
@@ -144,7 +145,7 @@ class ThrowPrograms:
         weights, pulls = np.zeros((self.waves.throws, count)), np.zeros(self._riders.size)
         for _, norm in (*terms, *limits):
             size = np.linalg.norm(norm.slope.reshape(norm.constant.size, -1), axis=0)
-            own = size[self._riders.size :].reshape(self.waves.throws, 2 * count + 1)
+            own = self._by_throw(size)
             own = np.hypot(own[:, :count], own[:, count : 2 * count])
             weights += own / (float(own.max()) or 1.0)
             pulls += size[: self._riders.size] / (float(own.max()) or 1.0)
@@ -154,9 +155,14 @@ class ThrowPrograms:
         )  # fmt: skip
         return _Turned(AffineProblem(terms, limits, (), 1), heavy, weights, pulls)
 
+    def _by_throw(self, columns: Array) -> Array:
+        """Columns of the waves and the angle of every throw."""
+        width = 2 * len(self.waves.orders) + 1
+        return columns[self._riders.size :][: self.waves.throws * width].reshape(self.waves.throws, width)
+
     def _rows(self, norm: WaveNorm, laps: tuple[int, ...]) -> AffineNorm:
         """With whole turns, in columns."""
-        orders, throws, fixed = self.waves.numbers, self.waves.throws, norm.fixed
+        orders, throws, fixed = self.waves.orders[:, 0], self.waves.throws, norm.fixed
         k, d = fixed.constant.shape
         whole = np.zeros((throws, len(orders), k, d), complex)
         for part, wave in zip(self.waves.parts, norm.waves, strict=True):
@@ -165,7 +171,8 @@ class ThrowPrograms:
         slope = np.zeros((k, d, throws, 2 * len(orders) + 1))
         slope[..., : len(orders)] = np.moveaxis(whole.real, (0, 1), (2, 3))
         slope[..., len(orders) : -1] = -np.moveaxis(whole.imag, (0, 1), (2, 3))
-        together = np.concatenate([fixed.slope, slope.reshape(k, d, -1)], axis=-1)
+        beside = np.zeros((k, d, self.waves.orders.shape[1] - 1))
+        together = np.concatenate([fixed.slope, slope.reshape(k, d, -1), beside], axis=-1)
         return AffineNorm(fixed.norm, fixed.constant, together, fixed.grid)
 
     def _intervals(self, window: FiringWindow) -> AffineNorm:
@@ -175,11 +182,12 @@ class ThrowPrograms:
         most = min(firing.most, firing.cycle.angle - (len(constants) - 1) * firing.least)
         middle, half = 0.5 * (most + firing.least), max(0.5 * (most - firing.least), 0.0) + SLACK
         slope = np.zeros((len(constants), 1, self.waves.throws, 2 * len(self.waves.orders) + 1))
-        slope[:, 0, :, -1] = matrix / half
-        still = np.zeros((len(constants), 1, self._riders.size))
+        slope[:, 0, :, -1] = matrix[:, : self.waves.throws] / half
+        still, beside = np.zeros((len(constants), 1, self._riders.size)), matrix[:, None, self.waves.throws :] / half
         return AffineNorm(
             NORMS["maximum"], (constants - middle)[:, None] / half,
-            np.concatenate([still, slope.reshape(len(constants), 1, -1)], axis=-1), Grid(np.ones(len(constants)), 1),
+            np.concatenate([still, slope.reshape(len(constants), 1, -1), beside], axis=-1),
+            Grid(np.ones(len(constants)), 1),
         )  # fmt: skip
 
     def box(
@@ -202,10 +210,11 @@ class ThrowPrograms:
         self, program: Program, lower: Array, upper: Array, floor: float, cut: float, is_new: bool
     ) -> ThrowBox | None:
         """By one program."""
-        columns, arcs_of = self._riders.columns(lower, upper), ArcBox(self.waves.numbers[: self._low], lower, upper)
+        columns = self._riders.columns(*self.waves.arcs(lower, upper))
+        arcs_of = ArcBox(self.waves.orders[: self._low], lower, upper)
         if is_new and self._is_known(program, columns, arcs_of, cut):
             return None
-        mixed = Mixed(program, columns, lower, upper, self.waves.numbers[: self._low])
+        mixed = Mixed(program, columns, lower, upper, self.waves.orders[: self._low])
         solution = solve_cones(mixed.problem)
         found = solution.multipliers
         if solution.x is None:
@@ -223,7 +232,8 @@ class ThrowPrograms:
             return None
         middle, spread = mixed.middle(solution.x)
         middle = np.clip(middle, *kept)
-        for pin, column, distance in self._riders.spread(columns, solution.x[: mixed.unbalances], middle):
+        at, _ = self.waves.arcs(middle, middle)
+        for pin, column, distance in self._riders.spread(columns, solution.x[: mixed.unbalances], at):
             spread[pin] += float(program.pulls[column]) * distance
         return ThrowBox(program, *kept, max(value, floor), middle, spread)
 
@@ -250,11 +260,10 @@ class ThrowPrograms:
             tied = minorant(ties, Multipliers((), found.limits[count : count + len(columns.limits)]))
             value, pull = value + tied.constant, pull + tied.gradient
         value += sum(domain.least(pull) for domain in columns.domains)
-        orders = self.waves.numbers
-        own = under.gradient[self._riders.size :].reshape(self.waves.throws, -1)
-        waves = own[:, : len(orders)] - 1j * own[:, len(orders) : -1]
-        arcs = arcs_of.functions(waves, own[:, -1])
-        return float(value + arcs.least.sum()), arcs
+        count, own = len(self.waves.orders), self._by_throw(under.gradient)
+        beside = under.gradient[len(under.gradient) - self.waves.orders.shape[1] + 1 :]
+        arcs = arcs_of.functions(own[:, :count] - 1j * own[:, count:-1], own[:, -1], beside)
+        return float(value + arcs.least), arcs
 
     def _is_excluded(self, program: Program, columns: BoxColumns, found: Multipliers, arcs_of: ArcBox) -> bool:
         """Whether the limits' own multipliers show that no design in a box keeps all of them."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 
 from laufruhe.errors import ModelError
+from laufruhe.load_models.angle_waves import AngleWaves
 from laufruhe.load_models.throw_waves import ThrowWaves, averaged, averages
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.machine.firing_windows import FiringWindow
@@ -23,7 +24,16 @@ from laufruhe.solvers.stars.ranking import ranked_orders
 from laufruhe.solvers.throws.boxes import ThrowBox, ThrowPrograms
 from laufruhe.solvers.throws.riders import Riders
 from laufruhe.solvers.throws.stages import FEWEST_SAMPLES, MOST_SAMPLES, STEPS_COST, Stage, missed
-from laufruhe.solvers.throws.windows import amid, firing_of, nearest, windows_of
+from laufruhe.solvers.throws.windows import (
+    amid,
+    design_at,
+    firing_of,
+    nearest,
+    opened,
+    stay,
+    turn_freely,
+    windows_of,
+)
 
 Programs = tuple[Callable[[int], ThrowPrograms], Callable[[int], float], Sequence[FiringWindow]]
 """Programs at so many steps over the period, what their orders leave out of the objective, their windows."""
@@ -106,7 +116,7 @@ def search_throws(
     improve
         Told of throws that look good.
     """
-    if not _suits(problem, phasing):
+    if not knows(problem):
         return None
     windows = windows_of(problem, phasing)
     if windows is None:
@@ -117,18 +127,6 @@ def search_throws(
         search = ThrowSearch(problem, phasing, windows, improve, best)
     except ModelError:
         return None
-    return found_by(search, problem, best, floor, "boxes of throws")
-
-
-def loss_of(waves: ThrowWaves, problem: Problem) -> Callable[[int], float]:
-    """What orders that are left out take off the objective, at so many steps."""
-    return lambda samples: sum(term.weight * waves.left_out(term.measure, samples) for term in problem.objective)
-
-
-def found_by(
-    search: ThrowSearch, problem: Problem, best: StarDesign | None, floor: float, what: str
-) -> Searched | None:  # fmt: skip
-    """What dividing boxes told; None where they say nothing."""
     try:
         for stage, _, _ in search.roots:
             # what is too much to hold shows at once
@@ -138,17 +136,14 @@ def found_by(
         return None
     most = len(search.roots) + (MOST_BOXES if problem.search.boxes is None else problem.search.boxes)
     found, bound, boxes = divided(
-        search, _Part(floor), _Best(best), nothing_of(problem), search.reached, most,
-        what,
-    )  # fmt: skip
-    return Searched(min(bound, search.cut(found.value)), found.design, boxes, search.conflict, what)
+        search, _Part(floor), _Best(best), nothing_of(problem), search.reached, most, search.what
+    )
+    return Searched(min(bound, search.cut(found.value)), found.design, boxes, search.conflict, search.what)
 
 
-def _suits(problem: Problem, phasing: Phasing) -> bool:
-    """Whether banks and pins are given, and waves know what is asked."""
-    if any(pair is not None and pair[0] < pair[1] for pair in (phasing.bank, phasing.split)):
-        return False
-    return knows(problem)
+def loss_of(waves: ThrowWaves, problem: Problem) -> Callable[[int], float]:
+    """What orders that are left out take off the objective, at so many steps."""
+    return lambda samples: sum(term.weight * waves.left_out(term.measure, samples) for term in problem.objective)
 
 
 def knows(problem: Problem) -> bool:
@@ -162,7 +157,6 @@ class ThrowSearch:
     """Windows and boxes of the throws of a problem."""
 
     is_shared = False
-    most_samples, steps_cost = MOST_SAMPLES, STEPS_COST
 
     def __init__(
         self, problem: Problem, phasing: Phasing, windows: Sequence[FiringWindow], improve: Improve,
@@ -171,6 +165,8 @@ class ThrowSearch:
         self._problem, self._phasing, self._improve = problem, phasing, improve
         self._seen = self._tried = self._stood = 0
         self._best, self._not_met = _Best(best), set[str]()
+        # of one angle there are few boxes, so that steps may be many
+        self.most_samples, self.steps_cost = (6144, 2e-5) if self._is_one_angle else (MOST_SAMPLES, STEPS_COST)
         self.roots: list[tuple[Stage, FiringWindow, tuple[str, ...]]] = []
         free = all(decision.set.lower <= 0.0 for decision in problem.unbalances)
         for built in phasing.shafts.largest if free else phasing.shafts.allowed:
@@ -182,6 +178,18 @@ class ThrowSearch:
                     self.steps_cost,
                 )  # fmt: skip
                 self.roots += [(stage, window, left_out) for window in own]
+
+    @property
+    def what(self) -> str:
+        """What is divided, in words."""
+        return "boxes of throws" + (" and angles" if any(opened(self._phasing)) else "")
+
+    @property
+    def _is_one_angle(self) -> bool:
+        """Whether all that is open is one angle of a crank with one throw."""
+        phasing = self._phasing
+        throws = phasing.layout(*phasing.least_geometry).throw_positions
+        return sum(opened(phasing)) == 1 and len(throws) == 1 and phasing.throw_bounds is None
 
     @property
     def cost(self) -> float:
@@ -213,7 +221,7 @@ class ThrowSearch:
 
     def _programs(self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]) -> Iterator[Programs]:
         """Programs at so many steps over the period, what their orders leave out of the objective, their windows."""
-        phasing, layout = self._phasing, self._phasing.layout(*self._phasing.least_geometry)
+        phasing = self._phasing
         for k, window in enumerate(windows):
             candidate = replace(self.candidate(window, amid(window)), left_out=left_out)
             try:
@@ -225,15 +233,26 @@ class ThrowSearch:
                 raise
             rides = rides_of(phasing, candidate)
             riders = Riders(realised, rides, candidate.throws)
-            waves = ThrowWaves(riders.problem, layout, rides)
+            waves = self._waves(riders.problem, candidate, rides)
             yield partial(ThrowPrograms, waves, riders, firing_of(phasing)), loss_of(waves, realised), windows
             return
         raise ModelError("no crank fires")
 
+    def _waves(self, problem: Problem, candidate: Candidate, rides: dict[str, int]) -> ThrowWaves:
+        """Waves of the throws, and of angles that are open beside them."""
+        phasing = self._phasing
+        layout = phasing.layout_of(candidate)
+        if not any(opened(phasing)):
+            return ThrowWaves(problem, layout, rides)
+        if not stay(phasing, candidate):
+            raise ModelError("what rides on a throw knows how far pins are apart")
+        # where nothing tells when the crank turns, its first throw stays where it is, and what rides on it
+        stands = phasing.throw_bounds is not None or turn_freely(phasing, candidate, rides)
+        return AngleWaves(problem, layout, rides, opened(phasing), 0.0 if stands else layout.side(0))
+
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
         """A design with these throws, and with a firing order that they keep."""
-        told = tuple(float(angle) % math.tau for angle in throws)
-        found = Candidate(told, window.order or None, *self._phasing.least_geometry)
+        found = replace(design_at(self._phasing, throws), firing_order=window.order or None)
         if window.order:
             return found
         orders = ranked_orders(replace(self._phasing, intervals=Intervals(0.0, math.inf)), found)

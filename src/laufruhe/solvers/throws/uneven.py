@@ -32,7 +32,6 @@ from laufruhe.solvers.mounts.starts import columns_of, unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.nonlinear import solve_nonlinear
 from laufruhe.solvers.smooth.program import TURN, SmoothProgram
-from laufruhe.solvers.stars.angle_search import search_angle
 from laufruhe.solvers.stars.design import StarDesign, solve_fixed
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import TradePoint, ranked_star, ranking_result
@@ -98,11 +97,9 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
 
 
 def _searched(problem: Problem, phasing: Phasing, first: StarDesign | None, floor: float) -> Searched | None:
-    """What boxes of the one angle of a vee twin, or of throws, told; None where they say nothing."""
+    """What boxes of throws, bank angle and split pins told; None where they say nothing."""
     other = bounding(problem, first.value if first is not None else math.inf)
-    told = other(problem), of_other(phasing, other), first, floor, partial(_near, phasing)
-    found = search_angle(*told)
-    return search_throws(*told) if found is None else found
+    return search_throws(other(problem), of_other(phasing, other), first, floor, partial(_near, phasing))
 
 
 def _near(phasing: Phasing, candidate: Candidate, moving: bool) -> StarDesign | None:

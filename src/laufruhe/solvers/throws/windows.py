@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from laufruhe.load_models.amplitudes import amplitude_objective
+from laufruhe.load_models.uneven_model import rotor_states
 from laufruhe.machine.firing_windows import FiringBounds, FiringWindow
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Term
+from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.sets import Sector
 
 MOST_WINDOWS = 6_000
 
@@ -39,8 +44,57 @@ def firing_of(phasing: Phasing) -> FiringBounds:
     """What firing has to keep."""
     layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
     return FiringBounds(
-        phasing.cycle, layout, max(allowed.least, 0.0), allowed.most, phasing.throw_bounds, phasing.firing_order
-    )
+        phasing.cycle, layout, max(allowed.least, 0.0), allowed.most, phasing.throw_bounds, phasing.firing_order,
+        tuple(pair for pair in (phasing.bank, phasing.split) if pair is not None and pair[0] < pair[1]),
+    )  # fmt: skip
+
+
+def opened(phasing: Phasing) -> tuple[bool, bool]:
+    """Whether the bank angle and split pins are open."""
+    bank, split = (pair is not None and pair[0] < pair[1] for pair in (phasing.bank, phasing.split))
+    return bank, split
+
+
+def design_at(phasing: Phasing, angles: Array) -> Candidate:
+    """Throws, bank angle and split pins at throws and open angles of a box, without a firing order."""
+    layout = phasing.layout(*phasing.least_geometry)
+    count = len(layout.throw_positions)
+    told = iter(angles[count:])
+    geometry = [
+        float(np.clip(next(told), *pair)) if is_open and pair is not None else (None if pair is None else pair[0])
+        for pair, is_open in zip((phasing.bank, phasing.split), opened(phasing), strict=True)
+    ]
+    # throws that are open are counted from cylinder 1 at its dead centre
+    turned = layout.side(0) * float(angles[count:].sum()) if phasing.throw_bounds is None else 0.0
+    throws = tuple(float(angle + turned) % math.tau for angle in angles[:count])
+    return Candidate(throws, None, geometry[0], geometry[1])
+
+
+def stay(phasing: Phasing, candidate: Candidate) -> bool:
+    """Whether unbalances are the same at all open angles: a share of what turns on offset pins is not."""
+    ends = [(pair, 0.5 * (pair[0] + pair[1])) if pair else ((None,), None) for pair in (phasing.bank, phasing.split)]
+    every = [
+        rotor_states(
+            phasing.realise(replace(candidate, firing_order=None, bank_angle=b, split_pin=s, without_gas=True))
+        )
+        for b, s in product((*ends[0][0], ends[0][1]), (*ends[1][0], ends[1][1]))
+    ]
+    return all(states == every[0] for states in every)
+
+
+def turn_freely(phasing: Phasing, candidate: Candidate, rides: dict[str, int]) -> bool:
+    """Whether no unbalance that rides on no throw knows where the crank stands when cylinder 1 fires."""
+    problem = phasing.realise(replace(candidate, firing_order=None, without_gas=True))
+    free = {rotor.name for rotor in problem.engine.rotors if rotor.name not in rides}
+    if any(rotor.unbalance for rotor in problem.engine.rotors if rotor.name in free):
+        return False
+    for decision in problem.unbalances:
+        theirs = [drive for drive in decision.rotor_drives if drive.rotor in free]
+        if theirs and (
+            len(decision.rotor_drives) > 1 or not isinstance(decision.set, Sector) or not decision.set.free_angle
+        ):
+            return False
+    return True
 
 
 def _has_images(problem: Problem, phasing: Phasing) -> bool:
