@@ -441,7 +441,7 @@ def uneven_crankcase(rng: Generator) -> Table:
         del table["constraints"]
     inside = [name for name in INSIDE if name != "shaft twist" or "torsion" in table]
     objective = {"minimise": f"{rng.choice(NORMS)} {rng.choice(inside)}"}
-    return {**table, "objective": objective, "search": {"boxes": 60}}
+    return {**table, "objective": objective, "search": {"boxes": 20}, "fidelity": {"samples": 240}}
 
 
 def star_of(engine: Table, count: int) -> Table:

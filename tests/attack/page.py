@@ -19,7 +19,7 @@ FAMILIES = {
     "rigid mounts": ("inline", "vee", "boxer", "opposed-piston", "radial", "parts", "points", "gas", "places"),
     "crank stars": ("stars",),
     "staggered and split vees": ("open-vees",),
-    "uneven throws": ("uneven",),
+    "uneven throws": ("uneven", "uneven crankcase"),
     "elastic mounts, one to four numbers open": ("elastic-few", "elastic-many"),
     "convex mounts": ("convex-mounts", "elastic-balance"),
     "mounts and unbalances together": ("joint",),
