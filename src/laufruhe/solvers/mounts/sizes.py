@@ -43,7 +43,7 @@ def solve_mounted_sizes(problem: Problem) -> Result:
     best = searched(program, [*_first(program, held), *looks(problem)[:LOOKS]], min(problem.search.starts, STARTS))
     design = judged(problem, program.values(best))
     bound = _bound(problem, design)
-    told = "local programs; bound of the mounts with any masses that the sizes may have"
+    told = "local programs; bound of the mounts with any masses that the sizes may have" if bound else "local programs"
     proof = shown(program, design, bound, Reach.ASIDE, told)
     return concluded(design, initial, proof, {"solve": time.perf_counter() - started})
 
