@@ -13,9 +13,10 @@ from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.springs.bound import follows
+from laufruhe.prove.springs.box import SpringBox
 from laufruhe.prove.springs.limits import ANYTHING, Limits
 from laufruhe.prove.springs.program import Stated
-from laufruhe.prove.springs.search import SpringBoxes, _Box
+from laufruhe.prove.springs.search import SpringBoxes
 from prove.test_spring_bound import POWERTRAIN, powertrain
 
 ASKED = {
@@ -111,7 +112,7 @@ def test_transmissibility_of_lines_is_that_of_the_model(name: str) -> None:
     problem = load(tables)
     boxes = SpringBoxes(problem, 2.0 * objective_value(problem, evaluate(problem)), 1e-3, problem.start)
     near = np.array([d.start_number for d in problem.mount_decisions])
-    box = _Box(boxes, boxes._terms[0][1], np.inf, near * (1.0 - 1e-9), near * (1.0 + 1e-9))
+    box = SpringBox(boxes, boxes._terms[0][1], np.inf, near * (1.0 - 1e-9), near * (1.0 + 1e-9))
     found = []
     for ratio in boxes.limits.ratios:
         (order,) = ratio.orders
