@@ -12,9 +12,11 @@ import pytest
 
 import laufruhe
 from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.families import families_of
 from problem_files import PROBLEMS
 
 THREE = tables_of(PROBLEMS / "tractor-three-bearings.toml")
@@ -178,3 +180,20 @@ def test_without_gas_two_rods_on_a_pin_are_decided() -> None:
         throws = [math.degrees(angle) for angle in star.throws]
         one = laufruhe.solve(problem_of({**whole, "engine": {**given, "throws": throws}}))
         assert one.final.value(one.problem.objective[0].measure) == pytest.approx(star.value, rel=1e-6)
+
+
+def test_rows_of_stresses_that_one_throw_brings_to_the_next_are_those_of_the_exact_model() -> None:
+    """Torque of the throws before it goes through a journal: the places of one cylinder are not its own alone."""
+    gear = {"webs": {"thickness": "25 mm", "width": "110 mm"}}
+    whole = tables(4, {"minimise": "rms journal stress"}, running_gear=gear,
+                   engine={"big_end": {"diameter": "70 mm", "width": "30 mm"}})  # fmt: skip
+    phasing = problem_of(whole).phasing
+    family = families_of(phasing, True)[0][0]
+    model = family.model(phasing)
+    rows = model.at(model.samples)
+    for star in family.stars:
+        order = tuple(map(int, star))
+        own = phasing.realise(family.candidate(phasing, order))
+        term = rows.at(order).terms[0][1]
+        exact = evaluate(own).value(own.objective[0].measure)
+        assert term.norm.value(term.grid, term.constant) == pytest.approx(exact, rel=1e-9)

@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.load_models.lone_parts import lone, working
 from laufruhe.load_models.star_model import StarModel, StarNorm, StarProblem, normalised
 from laufruhe.machine.firing import even_patterns, firing_lattice, slot_order, slot_steps
 from laufruhe.numerics.spectrum import Spectrum
@@ -102,26 +101,17 @@ class FiringModel(StarModel):
         engine = self.problem.engine
         part = engine.slider_cranks[k]
         first = replace(part, throw=part.throw + part.shaft.ratio * part.firing_angle, firing_angle=0.0)
-        alone = replace(engine, slider_cranks=(first,), rotors=())
-        own, names = load.places(alone), load.places(engine)
+        # the others stand idle: one cylinder sends its torque through the journals of the next
+        alone = lone(engine, k, True, first)
         found = []
-        for at in self._fired.loads:
-            signal = load.signal(replace(at, moving=alone))
+        for at, point in zip(self._fired.loads, working(self.problem, part.name).points, strict=True):
+            signal = load.signal(replace(at, point=point, moving=alone))
             if load.feels_unbalances:
-                motored = load.signal(
-                    replace(at, moving=alone, fidelity=replace(at.fidelity, gas=False, gas_orders=None))
-                )
-                signal = signal + motored.each(np.negative)
-            placed = signal if own == names else signal.each(partial(_among, names, own))
-            found.append(placed.over(self.base))
+                fidelity = replace(at.fidelity, gas=False, gas_orders=None)
+                still = load.signal(replace(at, point=point, moving=alone, fidelity=fidelity))
+                signal = signal + still.each(np.negative)
+            found.append(signal.over(self.base))
         return found
-
-
-def _among(names: Sequence[str], own: Sequence[str], values: NDArray[Any]) -> NDArray[Any]:
-    """Values at some places, shape (n, own, d), among zeros at all others."""
-    out = np.zeros((len(values), len(names), values.shape[-1]), dtype=values.dtype)
-    out[:, [names.index(name) for name in own]] = values
-    return out
 
 
 def _averaged(signals: Sequence[Spectrum], steps: int | None) -> Sequence[Spectrum]:
