@@ -15,9 +15,10 @@ from laufruhe.prove.throws.star_cut import cut_of
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.stars.cuts import search_designs
+from laufruhe.solvers.stars.exchange import exchanges, improved
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.mixed_conic import solve_program
-from laufruhe.solvers.stars.program import owners_of, solve_design
+from laufruhe.solvers.stars.program import coarse_value, owners_of, solve_design
 from phasing import engines
 
 TWO_SHAFTS = engines.shaft("against", -1) + engines.shaft("second", 2)
@@ -263,3 +264,20 @@ def test_a_limit_at_its_edge_excludes_no_star(tmp_path):
         assert found >= {star for star, value in felt.items() if value <= edge}
         assert found <= {star for star, value in felt.items() if value <= edge * (1.0 + 1e-4)}
         assert 0 < len(found) < len(stars)
+
+
+@pytest.mark.parametrize("name", ["mean", "limited", "shafts"])
+def test_exchanges_lead_to_stars_that_no_exchange_betters(tmp_path, name):
+    choice = "most_shafts = 1" if name == "shafts" else ""
+    problem = engines.problem(tmp_path, 5, phasing=choice, rest=CASES[name])
+    model, stars = model_of(problem)
+    owners = owners_of(model)
+    values = {tuple(map(int, star)): coarse_value(model, tuple(map(int, star)), (), owners) for star in stars}
+    worst = max(values, key=values.__getitem__)
+    found = improved(model, worst, (), owners, 0.0)
+    value = coarse_value(model, found, (), owners)
+    # five throws: every star that has throw 1 where it is stands a few exchanges away
+    assert value == pytest.approx(min(values.values()), rel=1e-5)
+    assert value < values[worst]
+    assert improved(model, worst, (), owners, values[worst]) == worst
+    assert len(set(exchanges(worst))) == len(list(exchanges(worst))) == 6 + 8

@@ -21,8 +21,8 @@ PROBLEMS = Path(__file__).parents[2] / "problems"
 # a problem of every kind of search, and what its whole search finds
 OPTIMA = {
     "tractor-four-lanchester": 227.3,
-    "vee-eight-open": 444.5,
-    "two-stroke-four-open": 440.9,
+    "vee-eight-open": 444.51220,
+    "two-stroke-four-open": 440.97076,
     "tractor-four-shaft-heights": 204.43,
     "vee-twenty-open": 1690.7,
     "inline-five-uneven-gas": 285.7,

@@ -16,6 +16,7 @@ from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
 from laufruhe.solvers.stars.cuts import CutsFound, search_designs
+from laufruhe.solvers.stars.exchange import improved
 from laufruhe.solvers.stars.families import Family, FiringFamily
 from laufruhe.solvers.stars.firing_search import MOST_SLOTS, enumerate_orders
 from laufruhe.solvers.stars.program import owners_of, solve_design
@@ -170,6 +171,8 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
             continue
         # a program that has none yet leaves the first star, whose bound is worth as much
         star = family.first if program.star is None else program.star
+        # what few angles and the solver's own tolerance do not tell apart, exchanges do
+        star = improved(model, star, program.built, owners, program.bound * (1.0 + problem.tolerance))
         again = solve_design(model, star, program.built, owners, problem.tolerance, nothing)
         if again is None:
             answers.append(Answer((), 0.0, False, 1, "SCIP"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -98,6 +99,16 @@ def solve_design(
         return None
     found, multipliers = best
     return found, cut_of(sound, multipliers)
+
+
+def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> float:
+    """The least objective of one star with one set of shafts at few angles; infinite where it keeps no limit."""
+    kept = tuple(own < 0 or own in built for own in owners)
+    affine = _only(model.at(_grids(model.samples)[0]).at(star), kept)
+    if not any(kept):
+        return affine.objective(np.zeros(affine.size))
+    x = solve_cones(affine).x
+    return math.inf if x is None else affine.objective(x)
 
 
 def _broken(model: StarModel, star: Sequence[int], whole: AffineProblem, idle: Sequence[bool]) -> bool:
