@@ -235,3 +235,44 @@ def test_throws_between_bounds_of_their_own_are_decided_with_the_mounts(tmp_path
         low, high = decision.lower, decision.upper
         turned = low + (decision.value - low + 1e-9) % math.tau
         assert turned <= high + 1e-7
+
+
+RADIAL = """
+title = "five in one row"
+[engine]
+layout = "radial"
+cycle = "four-stroke"
+cylinders = 5
+bore = "80 mm"
+stroke = "84 mm"
+rod_ratio = 0.27
+knuckle_radius = "42 mm"
+reciprocating_mass = "0.7 kg"
+[gas]
+model = "seiliger"
+peak_pressure = "60 bar"
+imep = "7 bar"
+[fidelity]
+samples = 120
+[[operating_points]]
+speed = "1500 rpm"
+[[balancer_shafts]]
+name = "s"
+ratio = 1
+position = ["80 mm", "-60 mm"]
+unbalances = [{ radius = "40 mm", unbalance = { between = ["0 kg m", "0.01 kg m"] } }]
+[phasing]
+intervals = { largest_deviation = "350 deg" }
+"""
+
+
+@pytest.mark.slow
+def test_transmissibility_tells_firing_orders_apart(tmp_path):
+    """Gas is in what is transmitted, so that of twelve orders of one throw the even one is found."""
+    asked = '[objective]\nminimise = "transmissibility"\n'
+    problem = problem_of(tmp_path, RADIAL, BLOCK, MOUNTS, asked, SEARCH)
+    assert problem.feels_gas
+    result = solve(problem)
+    assert result.objective.value <= result.objective.initial * (1.0 + 1e-9)
+    assert len({entry.firing_orders[0].order for entry in result.phasing.ranking}) == 12
+    assert result.phasing.ranking[0].firing_orders[0].order == (1, 3, 5, 2, 4)

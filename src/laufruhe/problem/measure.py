@@ -119,8 +119,11 @@ class Measure:
 
     @property
     def feels_gas(self) -> bool:
-        """Whether gas loads it."""
-        return (self.is_load and self.load.feels_gas) or self.channel.is_flywheel
+        """Whether gas loads it, or what it is a number of."""
+        if self.is_load:
+            return self.load.feels_gas
+        channel = self.channel
+        return channel.is_flywheel or channel.of_run is not None or (channel.is_number and channel.of_loads)
 
     @property
     def feels_order(self) -> bool:
