@@ -16,6 +16,8 @@ LONGEST = 100
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
 DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])")
 """What a number looks like where commas divide it."""
+THOUSANDS = re.compile(r"^\s*[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
+"""What it looks like where a comma may as well divide thousands."""
 # kp/cm2 as it is typed for kp/cm^2; H2O keeps its figure
 _POWER = re.compile(r"(?<=[a-z])([23])\b")
 _OF_ANGLES = ("rad", "rad/s", "N m/rad", "N m s/rad")
@@ -141,7 +143,9 @@ def parse(text: str, unit: str) -> float:
     """SI value of a text such as '120 mm' in the dimension of `unit`; `UnitError` where it has none."""
     match = _QUANTITY.match(text) if len(text) <= LONGEST else None
     if match is None and DECIMAL_COMMA.match(text[:LONGEST]):
-        raise UnitError(f'has a comma, and decimals follow a point; write "{text.replace(",", ".", 1).strip()}"')
+        point, whole = (text.replace(",", mark, 1).strip() for mark in (".", ""))
+        either = f'write "{whole}" or "{point}"' if THOUSANDS.match(text) else f'write "{point}"'
+        raise UnitError(f"has a comma, and decimals follow a point; {either}")
     if match is None:
         raise UnitError(f"is not a number with a unit; {advice(unit)}")
     number, divisor, name = match.groups()

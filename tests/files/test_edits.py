@@ -60,7 +60,15 @@ def test_every_decision_is_found_by_the_name_that_results_show() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["opposed-pistons-masses", "shaper", "tractor-four-seven-metres", "geared-inertia", "rotary-two"]
+    "name",
+    [
+        "opposed-pistons-masses",
+        "shaper",
+        "tractor-four-seven-metres",
+        "geared-inertia",
+        "rotary-two",
+        "powertrain-load-cases",
+    ],
 )
 def test_masses_shares_and_weights_named_like_a_table_are_found(name: str) -> None:
     problem = laufruhe.load(PROBLEMS / f"{name}.toml")

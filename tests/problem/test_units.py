@@ -93,6 +93,9 @@ class TestParse:
     def test_a_decimal_comma_is_explained(self) -> None:
         with pytest.raises(UnitError, match=r'has a comma, and decimals follow a point; write "12\.5 mm"'):
             parse("12,5 mm", "m")
+        for text, said in (("6,000 rpm", 'write "6000 rpm" or "6.000 rpm"'), ("0,125 rpm", 'write "0.125 rpm"')):
+            with pytest.raises(UnitError, match=said):
+                parse(text, "rad/s")
 
     @pytest.mark.parametrize("text", ["50 Hz", "3000 min^-1", "50 s^-1", "3000/min"])
     def test_a_frequency_is_no_angular_speed(self, text: str) -> None:

@@ -26,11 +26,11 @@ _RULES = {
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",
     "string_type": "must be text in quotes",
-    "list_type": "must be a list in [ ]",
+    "list_type": "must be a list in [ ], or tables in [[ ]]",
     "bool_type": "must be true or false",
-    "model_type": "must be a table",
-    "model_attributes_type": "must be a table",
-    "dict_type": "must be a table",
+    "model_type": "must be one table, in [ ]",
+    "model_attributes_type": "must be one table, in [ ]",
+    "dict_type": "must be one table, in [ ]",
     "string_pattern_mismatch": "must be text on one line, without tabs",
 }
 

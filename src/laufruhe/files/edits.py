@@ -76,16 +76,17 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
         # masses of all cylinders are called by their key alone
         return "engine", name.replace(" ", "_")
     named = list(_named(tables))
-    if first in ProblemFile.model_fields and rest and (first in tables or first not in {label for label, _ in named}):
-        parent, _, last = name.rpartition(".")
-        keys = keys_of(dict(tables), parent)
-        here = _at(tables, keys)
-        return (*keys, last) if isinstance(here, dict) else keys_of(dict(tables), name)
+    # a part may be called as a table is: the name that results show comes first
     known = [(label, keys) for label, keys in named if name.startswith(f"{label}.")]
     for label, keys in sorted(known, key=lambda pair: -len(pair[0])):
         found = _below(_at(tables, keys), name.removeprefix(f"{label}.").split("."))
         if found is not None:
             return (*keys, *found)
+    if first in ProblemFile.model_fields and rest and (first in tables or first not in {label for label, _ in named}):
+        parent, _, last = name.rpartition(".")
+        keys = keys_of(dict(tables), parent)
+        here = _at(tables, keys)
+        return (*keys, last) if isinstance(here, dict) else keys_of(dict(tables), name)
     raise Refused(name, None, "is no number of this problem", nearest(name, _examples(tables, named)))
 
 
