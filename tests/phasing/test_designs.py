@@ -1,12 +1,15 @@
 """Stars, shafts and unbalances together: cuts, listing and the mixed-integer program agree."""
 
 import itertools
+import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from laufruhe.errors import InputError
+from laufruhe.files.reader import load_tables
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
@@ -281,3 +284,24 @@ def test_exchanges_lead_to_stars_that_no_exchange_betters(tmp_path, name):
     assert value < values[worst]
     assert improved(model, worst, (), owners, values[worst]) == worst
     assert len(set(exchanges(worst))) == len(list(exchanges(worst))) == 6 + 8
+
+
+@pytest.mark.parametrize(("bank", "split"), [((60, 90), 0), (90, (-30, 30))])
+def test_angles_as_given_are_those_of_the_design_that_is_evaluated(bank, split):
+    both = [angle if isinstance(angle, int) else {"between": list(angle)} for angle in (bank, split)]
+    text = {
+        "title": "ten", "engine": {
+            "layout": "vee", "cycle": "four-stroke", "cylinders": 10, "stroke": "80 mm", "rod_ratio": 0.27,
+            "reciprocating_mass": "0.5 kg", "rotating_mass": "0.5 kg", "cylinder_spacing": "100 mm", "throws": "open",
+            "bank_angle": both[0], "split_pin_angle": both[1],
+        },
+        "operating_points": [{"speed": "6000 rpm"}], "objective": {"minimise": "rms rocking couple"},
+    }  # fmt: skip
+    result = solve(load_tables(text, Path("ten.toml")))
+    name = "bank angle" if isinstance(split, int) else "split pin angle"
+    told = next(decision for decision in result.decisions if decision.name == name)
+    open_key, given = name.replace(" ", "_"), math.degrees(told.initial)
+    engine = {**text["engine"], "throws": [math.degrees(d.initial) for d in result.decisions if "throw" in d.name]}
+    again = load_tables({**text, "engine": {**engine, open_key: given}}, Path("ten.toml"))
+    assert objective_value(again, evaluate(again)) == pytest.approx(result.objective.initial, rel=1e-9)
+    assert given == pytest.approx(72.0 if isinstance(split, int) else -18.0)

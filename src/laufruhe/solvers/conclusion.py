@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -10,6 +11,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from laufruhe.fidelity.error_bounds import missed, relative
+from laufruhe.machine import Engine
+from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
@@ -301,19 +304,31 @@ def phase_decisions(problem: Problem, phasing: Phasing, candidate: Candidate) ->
         for k, (angle, was) in enumerate(zip(candidate.throws, before, strict=True)):
             low, high = phasing.throw_bounds[k] if phasing.throw_bounds else (0.0, math.tau)
             out.append(DecisionValue(f"throw {k + 1}", angle, "rad", low, high, was % math.tau, False))
-    for name, bounds, value in (
-        ("bank angle", phasing.bank, candidate.bank_angle),
-        ("split pin angle", phasing.split, candidate.split_pin),
+    bank, split = _geometry_given(problem.engine, phasing.layout_of(candidate))
+    for name, bounds, value, given_angle in (
+        ("bank angle", phasing.bank, candidate.bank_angle, bank),
+        ("split pin angle", phasing.split, candidate.split_pin, split),
     ):
         if bounds is not None and value is not None and bounds[0] < bounds[1]:
             edge = min(value - bounds[0], bounds[1] - value) <= 1e-9
-            out.append(DecisionValue(name, value, "rad", *bounds, bounds[0], edge))
+            out.append(DecisionValue(name, value, "rad", *bounds, given_angle, edge))
     optional = (name for names in phasing.shafts.optional for name in names)
     out += [
         DecisionValue(f"{name} built", float(name not in candidate.left_out), "", 0.0, 1.0, 1.0, False)
         for name in optional
     ]
     return tuple(out)
+
+
+def _geometry_given(engine: Engine, layout: Layout) -> tuple[float, float]:
+    """Angle between the banks, and between split pins, as an engine has them [rad]; zero where it has none."""
+    parts, bank, split = engine.slider_cranks, 0.0, 0.0
+    for left, right in itertools.permutations(range(len(layout.sides)), 2):
+        if layout.side(left) > layout.side(right):
+            bank = (parts[left].bank - parts[right].bank) % math.tau
+            if layout.pins[left] == layout.pins[right]:
+                split = math.remainder(parts[right].throw - parts[left].throw, math.tau)
+    return bank, split
 
 
 def no_star(problem: Problem, why: str, status: Status = Status.INFEASIBLE, conflict: tuple[str, ...] = ()) -> Result:
