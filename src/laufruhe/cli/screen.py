@@ -111,7 +111,8 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
         # whoever read the output has gone; click ends quietly
         raise
     except OSError as error:
-        complain(f"laufruhe: results cannot be written ({error.strerror or error})")
+        what = f"'{printed(str(error.filename))}'" if error.filename else "results"
+        complain(f"laufruhe: {what} cannot be written ({error.strerror or error})")
         raise typer.Exit(FAILED) from None
 
 

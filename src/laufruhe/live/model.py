@@ -37,7 +37,7 @@ from laufruhe.solvers.result import Result
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
 HOW = "laufruhe page {file} follows it"
 OBJECTIVE = "objective"
-NOTHING = "Nothing is open here that the loads are affine in."
+NOTHING = "Forces follow nothing that is open here in proportion, so this page has no sliders."
 
 
 def live_model(problem: Problem, result: Result) -> LiveModel:
@@ -147,9 +147,8 @@ class _Collected:
         stays = not measure.channel.is_moved_by(self.kinds)
         is_affine = measure.is_mass or (measure.is_load and not measure.channel.feels_inertia)
         if not stays and not is_affine:
-            why = (
-                f"not affine in what is open, so the value is that of the design decided; {HOW.format(file=self.file)}"
-            )
+            how = HOW.format(file=self.file)
+            why = f"does not follow what is open in proportion, so the value is that of the design decided; {how}"
             self.unmoved.append((name, why))
         self.asked.append(None if stays or not is_affine else measure)
         base = Shown(role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit))
@@ -244,7 +243,7 @@ def _still(problem: Problem, file: str) -> Iterator[tuple[str, str]]:
     yield from ((name, f"stars are chosen and not slid, so the one decided stays; {how}") for name in names)
     for decision in problem.decisions:
         if not decision.is_affine:
-            yield decision.name, f"loads are not affine in it, so it stays as it was decided; {how}"
+            yield decision.name, f"forces do not follow it in proportion, so it stays as it was decided; {how}"
     lots = problem.assembly.lots if problem.assembly is not None else ()
     yield from ((f"the {lot.kind} of every cylinder", "parts are chosen and not slid") for lot in lots)
     if problem.over is not None:
