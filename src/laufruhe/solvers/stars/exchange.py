@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import in_time, passed
 from laufruhe.solvers.stars.program import coarse_value
 
 # a better star is one that is better by more than what few angles blur
@@ -26,7 +26,7 @@ def improved(
     value = coarse_value(model, star, built, owners)
     while value > enough and not passed():
         found, best = min(
-            ((coarse_value(model, other, built, owners), other) for other in exchanges(star)),
+            ((coarse_value(model, other, built, owners), other) for other in in_time(exchanges(star))),
             default=(math.inf, star),
         )
         if not found < value * (1.0 - WORTH):
