@@ -343,6 +343,7 @@ def _loads(
 def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
     used = np.any([keep_all | np.any(rows != 0.0, axis=0) for rows in (bare.vectors, *slopes)], axis=0)
     used[:1] |= not used.any()
-    constant = bare.vectors[:, used]
-    slope = np.stack([rows[:, used] for rows in slopes], axis=-1) if slopes else np.zeros((*constant.shape, 0))
+    # in memory row by row, as every product with them takes them
+    constant, *moved = (np.compress(used, rows, axis=1) for rows in (bare.vectors, *slopes))
+    slope = np.stack(moved, axis=-1) if moved else np.zeros((*constant.shape, 0))
     return AffineNorm(bare.norm, constant, slope, bare.grid)

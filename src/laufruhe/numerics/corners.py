@@ -183,7 +183,7 @@ def merged(angles: Array, jumps: Array) -> Corners | None:
 
 def _left(angles: Array, jumps: Array) -> Corners | None:
     """Corners at which anything jumps; None where there are none."""
-    used = np.any(jumps.reshape(len(jumps), -1) != 0.0, axis=1)
+    used = jumps.reshape(len(jumps), -1).any(axis=1)
     if len(angles) and used.all():
         return Corners(angles, jumps)
     return Corners(angles[used], jumps[used]) if used.any() else None

@@ -124,10 +124,11 @@ class Spectrum:
         if self.corners is not None:
             angles = self.period * np.arange(samples) / samples
             return self.smooth.sample(samples) + self.corners.values(angles, self.period)
-        if len(self.coefficients) <= (samples + 1) // 2:
-            # no order reaches half the number of samples, so none is folded
+        if len(self.coefficients) <= samples // 2 + 1:
+            # no order is over half the number of samples, so none is folded
             half = np.asarray(0.5 * self.coefficients, dtype=complex)
-            half[:1] *= 2.0
+            # what is its own mirror image counts once
+            half[:: max(samples // 2, 1) if samples % 2 == 0 else samples] *= 2.0
             return _transformed(half, samples)
         folded = np.zeros((samples, *self.coefficients.shape[1:]), dtype=complex)
         for start in range(0, len(self.coefficients), samples):
@@ -180,9 +181,9 @@ class Spectrum:
 
     def repeats(self, also: tuple[Fraction, ...] = ()) -> Fraction:
         """Lowest order of its own shortest period, which holds some further orders too."""
-        # real and imaginary parts are looked through in half the time of complex numbers
-        parts = np.ascontiguousarray(self.coefficients).view(float)
-        used = np.flatnonzero(parts.reshape(len(parts), -1).any(axis=1))
+        # a product tells in half the time which orders hold anything
+        sizes = np.abs(np.ascontiguousarray(self.coefficients).view(float)).reshape(len(self.coefficients), -1)
+        used = np.flatnonzero(sizes @ np.ones(sizes.shape[1]))
         orders = [order for order in also if order > 0]
         if step := int(np.gcd.reduce(used)):
             orders.append(step * self.base)
@@ -192,8 +193,10 @@ class Spectrum:
         """The same signal over another period of its own, that of the lowest order `base`."""
         if base == self.base:
             return self
-        fine = self.rebased(_common(base, self.base))
-        step = int(base / fine.base)
+        ratio = base / self.base
+        fine, step = self, ratio.numerator
+        if ratio.denominator > 1:
+            fine = self.rebased(_common(base, self.base))
         corners = None if fine.corners is None else fine.corners.folded(fine.period / step, step)
         return type(self)(base, fine.coefficients[::step], corners)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -74,11 +75,12 @@ class RigidMounting:
         """Refuse a wrench that some direction lets through."""
         if not len(self.free):
             return
-        # most wrenches have next to nothing along what is free: real and imaginary parts tell
+        # most wrenches have next to nothing along what is free: squares of real and imaginary parts tell
         loads = np.ascontiguousarray(wrench.coefficients)
-        least = float(np.abs(loads.view(float)).max(initial=0.0)) / max(self.arm, 1.0)
-        along = np.abs(loads.view(float) @ self._leak)
-        if along.shape[1] * float(along.max(initial=0.0)) <= UNCARRIED_SHARE * least:
+        parts = loads.view(float)
+        along = (parts @ self._leak).ravel()
+        whole = float(np.vdot(parts, parts)) * (UNCARRIED_SHARE / max(self.arm, 1.0)) ** 2 / max(parts.size, 1)
+        if self._leak.shape[1] * float(along @ along) <= whole < math.inf:
             return
         scaled = loads / _scales(self.arm)
         size = float(np.abs(scaled).max(initial=0.0))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, ClassVar, Protocol
 
-from laufruhe.machine import Engine, Mount, SliderCrank
+from laufruhe.machine import Engine, Mount, Rotor, SliderCrank
 from laufruhe.machine.leads import led
 from laufruhe.machine.running_gear import Size
 from laufruhe.numerics.namespaces import NUMBERS
@@ -93,10 +93,7 @@ class Numbers:
 
     def engine(self, given: Engine) -> Engine:
         """The engine with these numbers."""
-        rotors = tuple(
-            replace(rotor, unbalance=self.unbalances[rotor.name]).placed(*self.places[rotor.name])
-            for rotor in given.rotors
-        )
+        rotors = tuple(self._turned(rotor) for rotor in given.rotors)
         mounts = given.mounts
         if self.mounts:
             rows = iter(self.mounts)
@@ -107,14 +104,21 @@ class Numbers:
             parts = tuple(self._loaded(part) for part in parts)
         # a sum of changes may leave a bound by a rounding
         geared = tuple(replace(g, share=min(max(float(self.shares[g.name]), 0.0), 1.0)) for g in given.geared)
-        found = replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, geared=geared)
+        found = replace(
+            given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, geared=geared, torsion=torsion
+        )
         if self.sizes:
             own = given.moving.sizes
             found = found.resized({size: own[size] + float(self.sizes.get(size, 0.0)) for size in own})
         if torsion is not None and (self.pistons or self.sizes):
-            torsion = turned_by(torsion, given.slider_cranks, found.slider_cranks)
-        found = replace(found, torsion=torsion)
+            found = replace(found, torsion=turned_by(torsion, given.slider_cranks, found.slider_cranks))
         return led(found, self.leads) if self.leads else found
+
+    def _turned(self, rotor: Rotor) -> Rotor:
+        """With its unbalance and place."""
+        unbalance, place = self.unbalances[rotor.name], tuple(self.places[rotor.name])
+        moved = rotor if unbalance == rotor.unbalance else replace(rotor, unbalance=unbalance)
+        return moved if place == rotor.place else moved.placed(*place)
 
     def _loaded(self, part: SliderCrank) -> SliderCrank:
         """With its masses changed."""

@@ -278,9 +278,9 @@ def load_rows(
     if not blocks:
         return Rows(measure.norm, np.zeros((1, 1)), Grid(np.ones(1), 1))
     count = len(bends[0])
-    return Rows(
-        measure.norm, np.concatenate(blocks), Grid(np.concatenate(weights), samples + count, count, len(blocks))
-    )
+    # of one block no copy is needed
+    rows, shares = (own[0] if len(own) == 1 else np.concatenate(own) for own in (blocks, weights))
+    return Rows(measure.norm, rows, Grid(shares, samples + count, count, len(blocks)))
 
 
 def bends_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> list[Array]:
