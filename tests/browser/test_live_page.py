@@ -60,6 +60,15 @@ def test_a_broken_limit_is_said(shown):
     assert re.search("Breaks .*(counterweight mass|and [1-9] more)", shown.locator("[data-role=regret]").inner_text())
 
 
+def test_limits_that_do_not_follow_stand_as_in_the_design_of_the_report(page: Page, tmp_path):
+    page.goto(page_of(problem_of("soft-single-run-up"), tmp_path).as_uri())
+    twist = page.locator('tr[data-measure="run-up twist"]')
+    twist.locator("text=broken").wait_for()
+    page.locator("text=/Breaks run-up twist/").wait_for()
+    page.evaluate("laufruheLive.page.then(page => page.setDesign({'web.mass': 0.4}))")
+    twist.locator("text=not followed").wait_for()
+
+
 def test_another_model_keeps_the_sliders_that_it_still_has(shown):
     kept = shown.evaluate("""async () => {
         const page = await laufruheLive.page, model = JSON.parse(document.getElementById("live-model").textContent);

@@ -15,6 +15,8 @@ from playwright.sync_api import Page, expect
 
 import laufruhe
 from browser.chromium import serious
+from laufruhe.live import decided
+from laufruhe.problem.evaluation import evaluate
 from problem_files import PROBLEMS, changed
 
 pytestmark = pytest.mark.slow
@@ -253,6 +255,27 @@ def test_it_watches_the_file_and_outlives_the_server(page: Page, tmp_path: Path)
         while live(page) == value and time.monotonic() < deadline:
             page.wait_for_timeout(50)
         assert live(page) > value
+
+
+def test_limits_of_a_run_up_are_measured_when_sliders_rest(page: Page) -> None:
+    path = PROBLEMS / "soft-single-run-up.toml"
+    with served(path) as (address, _):
+        page.goto(address)
+        settled(page)
+        twist = page.locator('tr[data-measure="run-up twist"]')
+        expect(twist).to_contain_text("kept")
+        weight = page.locator('#live [data-decision="web.mass"]')
+        weight.focus()
+        for _ in range(6):
+            page.keyboard.press("PageUp")
+        expect(twist).to_contain_text("broken")
+        expect(page.locator("[data-role=regret]")).to_contain_text("Breaks run-up twist")
+        design = page.evaluate("laufruhePage.state.handle.design()")
+        told = float(twist.get_attribute("data-value") or "nan")
+    problem = laufruhe.load(path)
+    values = decided(problem, design)
+    built = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
+    assert told == pytest.approx(built.standing(problem.limits[0]).value, rel=1e-9)
 
 
 def test_a_crank_is_clicked_and_given_back(page: Page) -> None:

@@ -50,7 +50,7 @@ def test_what_was_decided_is_marked() -> None:
     result = scenes.solved(scenes.TIGHT)
     scene = Scene.of(result)
     assert scene.rotors == {rotor.name for rotor in result.final.engine.rotors}
-    assert not scene.throws
+    assert not scene.cranks
     labels = [text.get_text() for text in engine.figure(result).legends[0].get_texts()]
     assert "weight, decided" in labels
     front, side = reaches(scene)

@@ -180,7 +180,7 @@ def test_a_cycle_shows_loads_and_mount_forces_angle_by_angle() -> None:
     assert [one.get_ylabel() for one in axes[1:]] == [
         "roll moment\n[N m]", *(f"{name}\n[N]" for name in result.final.mount_names)
     ]  # fmt: skip
-    assert "None, so not shown: rocking couple." in " ".join(texts(cycle.figure(result)).split())
+    assert "Not shown: rocking couple (none: balanced)." in " ".join(texts(cycle.figure(result)).split())
     for design, colour in ((result.initial, BEFORE), (result.final, AFTER)):
         loads = design.loads[0]
         assert loads.mount_forces is not None

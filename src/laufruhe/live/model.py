@@ -35,12 +35,12 @@ from laufruhe.solvers.conclusion import angle_name
 from laufruhe.solvers.result import Result
 
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
-HOW = "laufruhe page {file} follows it"
+HOW, HERE = "laufruhe page {file} follows it", "it is decided here, or moved beside"
 OBJECTIVE = "objective"
 NOTHING = "Forces follow nothing that is open here in proportion, so this page has no sliders."
 
 
-def live_model(problem: Problem, result: Result) -> LiveModel:
+def live_model(problem: Problem, result: Result, is_served: bool = False) -> LiveModel:
     """The page's model of a problem.
 
     Parameters
@@ -49,28 +49,30 @@ def live_model(problem: Problem, result: Result) -> LiveModel:
         As it was read.
     result
         Of it, solved or evaluated: what is not affine stays as it is there.
+    is_served
+        Whether the page has a server, which decides and measures what does not follow.
     """
     file = f"{problem.name}.toml"
     bare = LiveModel(
         problem.name, problem.title, file, tuple(point.name for point in problem.points), problem.engine.cycle.turns,
         objective=replace(result.problem, over=None).objective_name, unit=result.problem.objective_unit or "",
     )  # fmt: skip
-    values = _decided(result)
+    values = decided(result.problem, {entry.name: entry.value for entry in result.decisions})
+    how = HERE if is_served else HOW.format(file=file)
     moving = _moving(result.problem, values)
-    still = tuple(_still(result.problem, file))
+    still = tuple(_still(result.problem, how))
     bare = replace(bare, unmoved=still, why_not="" if moving.decisions else NOTHING)
     try:
-        found = _filled(bare, problem, moving, result, values)
+        found = _filled(bare, problem, moving, result, values, is_served)
     except ModelError as error:
         return replace(bare, why_not=f"The loads cannot be shown while decisions move: {error}.")
     return replace(found, save=saved(problem, result, moving, values))
 
 
-def _decided(result: Result) -> dict[str, Value]:
-    """Values of all decisions in the design of a result, by name."""
-    shown = {entry.name: entry.value for entry in result.decisions}
+def decided(problem: Problem, shown: Mapping[str, float]) -> dict[str, Value]:
+    """Values of all decisions by name, from sizes and angles as results show them; where there is none, the start."""
     found: dict[str, Value] = {}
-    for decision in result.problem.decisions:
+    for decision in problem.decisions:
         if decision.name not in shown:
             found[decision.name] = decision.start
         elif decision.is_affine and decision.set.width > 1:
@@ -89,10 +91,11 @@ def _moving(problem: Problem, values: Mapping[str, Value]) -> Problem:
 
 
 def _filled(
-    bare: LiveModel, problem: Problem, moving: Problem, result: Result, values: Mapping[str, Value]
+    bare: LiveModel, problem: Problem, moving: Problem, result: Result, values: Mapping[str, Value], is_served: bool
 ) -> LiveModel:
     model = AffineModel(moving)
-    collected = _Collected(model, {decision.kind for decision in moving.decisions}, bare.file, result)
+    kinds = {decision.kind for decision in moving.decisions}
+    collected = _Collected(model, kinds, result, _aside(bare.file, is_served))
     curves = _curves(collected, result)
     measures = collected.measures()
     start = _vector(model.domains, [decision.start for decision in moving.decisions])
@@ -115,8 +118,8 @@ def _filled(
 class _Collected:
     """Signals of a problem, each once, and what of its measures they say."""
 
-    def __init__(self, model: AffineModel, kinds: set[Kind], file: str, result: Result) -> None:
-        self.model, self.kinds, self.file = model, kinds, file
+    def __init__(self, model: AffineModel, kinds: set[Kind], result: Result, aside: str) -> None:
+        self.model, self.kinds, self.aside = model, kinds, aside
         self.decided = {found.name: found for found in result.limits}
         self.signals: dict[Measure, Signal] = {}
         self.unmoved: list[tuple[str, str]] = []
@@ -147,9 +150,7 @@ class _Collected:
         stays = not measure.channel.is_moved_by(self.kinds)
         is_affine = measure.is_mass or (measure.is_load and not measure.channel.feels_inertia)
         if not stays and not is_affine:
-            how = HOW.format(file=self.file)
-            why = f"does not follow what is open in proportion, so the value is that of the design decided; {how}"
-            self.unmoved.append((name, why))
+            self.unmoved.append((name, self.aside))
         self.asked.append(None if stays or not is_affine else measure)
         base = Shown(role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit))
         if not stays and not is_affine:
@@ -236,9 +237,14 @@ def _proved(result: Result) -> Proved | None:
     return Proved(objective.value, certificate.lower_bound, certificate.gap, str(certificate.kind))
 
 
-def _still(problem: Problem, file: str) -> Iterator[tuple[str, str]]:
+def _aside(file: str, is_served: bool) -> str:
+    """Why a measure does not follow sliders, and when its value is known."""
+    known = "it is measured when they rest" if is_served else f"its value is that of the design decided; {HOW}"
+    return f"does not follow sliders in proportion, so {known.format(file=file)}"
+
+
+def _still(problem: Problem, how: str) -> Iterator[tuple[str, str]]:
     """What is open and has no slider, and why."""
-    how = HOW.format(file=file)
     names = problem.phasing.open_names if problem.phasing is not None else ()
     yield from ((name, f"stars are chosen and not slid, so the one decided stays; {how}") for name in names)
     for decision in problem.decisions:

@@ -82,7 +82,7 @@ def cylinder(axes: Axes, pose: Pose, bore: float) -> None:
         axes.plot(*zip(*map(at, walls), strict=True), color=FAINT, linewidth=0.8, zorder=2.0)
 
 
-def piston_at(axes: Axes, pose: Pose, bore: float, order: float) -> None:
+def piston_at(axes: Axes, pose: Pose, bore: float, order: float, **look: Any) -> None:
     """A piston and its rings, from the front."""
     turn = cmath.exp(1j * pose.part.bank)
 
@@ -90,7 +90,7 @@ def piston_at(axes: Axes, pose: Pose, bore: float, order: float) -> None:
         return at(pose.piston + turn * bore * complex(up, side))
 
     corners = [corner(*place) for place in ((-0.25, -0.48), (-0.25, 0.48), (0.25, 0.48), (0.25, -0.48))]
-    axes.add_patch(Polygon(corners, closed=True, zorder=order - 0.01, linewidth=0.9, **PISTON))
+    axes.add_patch(Polygon(corners, closed=True, zorder=order - 0.01, linewidth=0.9, **look))
     for ring in (0.12, 0.19):
         ends = zip(corner(ring, -0.48), corner(ring, 0.48), strict=True)
         axes.plot(*ends, color=FAINT, linewidth=0.6, zorder=order - 0.005)

@@ -38,6 +38,7 @@ from laufruhe.solvers.result import Result
 
 # both views side by side, of one page, and between them [inch]
 WIDE, HIGH, ACROSS, NARROW = 8.0, 4.4, 0.8, 2.2
+_OF_RODS = {"rod", "piston_pin", "bolts"}
 ROOM = 1.1
 """Around what is seen, as a share of it."""
 
@@ -48,10 +49,12 @@ class Scene:
 
     Attributes
     ----------
-    rotors, mounts
+    rotors, mounts, pistons
         Names of those that were decided.
-    throws
-        Whether the crank was.
+    cranks
+        Names of the shafts whose throws, lead or sizes were.
+    rods
+        Whether their sizes were.
     state
         "decided", or "open" in a design as given.
     """
@@ -59,7 +62,9 @@ class Scene:
     engine: Engine
     rotors: frozenset[str]
     mounts: frozenset[str]
-    throws: bool
+    pistons: frozenset[str]
+    cranks: frozenset[str]
+    rods: bool
     state: str
 
     @classmethod
@@ -67,11 +72,16 @@ class Scene:
         """Of the design of a result."""
         engine, problem = result.final.engine, result.problem
         drives = [drive for decision in problem.decisions for drive in decision.drives]
-        rotors = {name for name in (getattr(drive, "rotor", None) for drive in drives) if name is not None}
-        numbers = {number for number in (getattr(drive, "mount", None) for drive in drives) if number is not None}
-        mounts = {mount.name for k, mount in enumerate(engine.mounts) if k in numbers}
+
+        def driven(what: str) -> frozenset[Any]:
+            return frozenset(getattr(drive, what) for drive in drives if hasattr(drive, what))
+
+        numbers, sizes = driven("mount"), {part for part, _ in driven("size")}
+        mounts = frozenset(mount.name for k, mount in enumerate(engine.mounts) if k in numbers)
+        every = frozenset(part.shaft.name for part in engine.slider_cranks)
+        cranks = every if problem.phasing is not None or sizes - _OF_RODS else driven("shaft") & every
         state = "decided" if changed(result) else "open"
-        return cls(engine, frozenset(rotors), frozenset(mounts), problem.phasing is not None, state)
+        return cls(engine, driven("rotor"), mounts, driven("part"), cranks, bool(sizes & _OF_RODS), state)
 
     @property
     def weights(self) -> list[Rotor]:
@@ -139,10 +149,10 @@ def _front(axes: Axes, scene: Scene, phi: float) -> None:
             bodies(axes, pose)
         else:
             cylinder(axes, pose, bore)
-            piston_at(axes, pose, bore, behind)
-            bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, facecolor=METAL, edgecolor=INK)
+            piston_at(axes, pose, bore, behind, **_piston_look(scene, pose))
+            bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, **_rod_look(scene))
             slot(axes, pose, bore, behind)
-        bar(axes, (pose.crank, 0.2 * bore), (pose.pin, 0.15 * bore), behind + 2.0, **_crank_look(scene))
+        bar(axes, (pose.crank, 0.2 * bore), (pose.pin, 0.15 * bore), behind + 2.0, **_crank_look(scene, pose))
         axes.add_patch(Circle(at(pose.pin), MM * 0.08 * bore, facecolor="white", edgecolor=INK, zorder=7.5))
     for rotor in scene.weights:
         centre, along = complex(rotor.shaft.z, rotor.shaft.y), direction(rotor, phi)
@@ -179,18 +189,19 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
         reach, sign = MM * 0.15 * bore, math.copysign(1.0, pin - crank)
         for web in (x - 0.24 * bore, x + 0.24 * bore):
             ends = (web - 0.06 * bore, web + 0.06 * bore)
-            box(axes, ends, (crank - sign * 1.3 * reach, pin + sign * reach), 4.5, **_crank_look(scene))
+            box(axes, ends, (crank - sign * 1.3 * reach, pin + sign * reach), 4.5, **_crank_look(scene, pose))
         journal = (pin - 0.7 * reach, pin + 0.7 * reach)
-        box(axes, (x - 0.18 * bore, x + 0.18 * bore), journal, 4.4, **_crank_look(scene))
+        box(axes, (x - 0.18 * bore, x + 0.18 * bore), journal, 4.4, **_crank_look(scene, pose))
         for body in pose.bodies:
             found = [level(place) for place in body.points]
             corner = (MM * (x - 0.5 * body.width), min(found))
             axes.add_patch(Rectangle(corner, MM * body.width, max(found) - min(found), **look_of(body)))
             piston = 0.5 * (min(found) + crank)
         if not pose.bodies:
-            box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, facecolor=METAL)
+            box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, **_rod_look(scene))
             high = MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
-            box(axes, (x - 0.48 * bore, x + 0.48 * bore), (piston - 0.5 * high, piston + 0.5 * high), 5.0, **PISTON)
+            walls, ends = (x - 0.48 * bore, x + 0.48 * bore), (piston - 0.5 * high, piston + 0.5 * high)
+            box(axes, walls, ends, 5.0, **_piston_look(scene, pose))
         pistons.append((pose, piston))
     _numbers(axes, pistons, quarter, bore)
     for rotor in scene.weights:
@@ -254,8 +265,12 @@ def _spots(scene: Scene) -> Iterator[tuple[float, complex, float]]:
 
 def legend_of(scene: Scene) -> list[Line2D | Patch]:
     """What stands for what."""
-    crank = f"crank, {scene.state}" if scene.throws else "crank"
-    found: list[Line2D | Patch] = [Patch(label=crank, **_crank_look(scene))]
+    found: list[Line2D | Patch] = []
+    for name, decided in (("crank", scene.cranks), ("piston", scene.pistons), ("rod", scene.rods)):
+        if decided:
+            found.append(Patch(label=f"{name}, {scene.state}", **DECIDED))
+    if not scene.cranks >= {part.shaft.name for part in scene.engine.slider_cranks}:
+        found.append(Patch(label="crank", **_PLAIN))
     # one of each kind
     kinds = {scene.is_decided(rotor): rotor for rotor in scene.weights}
     found += [
@@ -273,8 +288,20 @@ def _mount_look(decided: bool) -> dict[str, Any]:
     return {"marker": "^", "markersize": 9.0, "color": AFTER if decided else ORANGE, "linestyle": "none", "zorder": 9.0}
 
 
-def _crank_look(scene: Scene) -> dict[str, Any]:
-    return {"facecolor": PALE, "edgecolor": AFTER} if scene.throws else {"facecolor": IRON, "edgecolor": INK}
+DECIDED: dict[str, Any] = {"facecolor": PALE, "edgecolor": AFTER}
+_PLAIN: dict[str, Any] = {"facecolor": IRON, "edgecolor": INK}
+
+
+def _crank_look(scene: Scene, pose: Pose) -> dict[str, Any]:
+    return DECIDED if pose.part.shaft.name in scene.cranks else _PLAIN
+
+
+def _piston_look(scene: Scene, pose: Pose) -> dict[str, Any]:
+    return DECIDED if pose.part.name in scene.pistons else PISTON
+
+
+def _rod_look(scene: Scene) -> dict[str, Any]:
+    return DECIDED if scene.rods else {"facecolor": METAL, "edgecolor": INK}
 
 
 def _weight_look(scene: Scene, rotor: Rotor) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from matplotlib.transforms import Affine2D
 
 from laufruhe.numerics.arrays import Array
+from laufruhe.present.numbers import NOTHING, number
 
 INK, FAINT = "#222222", "#5c5c5c"
 FONT = "DejaVu Sans"
@@ -29,6 +30,8 @@ READ = 4.5
 THIN_SPACE = "\u2009"
 _POINTS = 72.0
 _ROUND = (1.0, 2.0, 5.0, 10.0)
+UNSEEN = 1e-5
+"""Share of the largest load at which another is told and not drawn."""
 LARGE = 1e4
 """Numbers from here on are given in thousands of their unit."""
 
@@ -136,6 +139,13 @@ def empty(axes: Axes, words: str) -> None:
     axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", color=FAINT, size=SMALL)
 
 
+def left_out(largest: float, most: float, unit: str) -> str:
+    """What is said of a load too small to be drawn beside the largest one; empty where it is drawn."""
+    if largest > UNSEEN * most:
+        return ""
+    return "none: balanced" if largest <= NOTHING * most else f"at most {number(largest, 2)} {unit}"
+
+
 def rows_of(count: int, most: int) -> int:
     """Side by side in as few rows as hold at most so many each, all about as long: 8 of at most 6 are 4 and 4."""
     return math.ceil(count / math.ceil(count / most)) if count else 1
@@ -186,6 +196,7 @@ class PlainNumbers(ScalarFormatter):
 
     def __init__(self) -> None:
         super().__init__(useOffset=False, useMathText=False)
+        self.set_scientific(False)
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         """The text of a tick."""

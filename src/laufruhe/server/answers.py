@@ -18,8 +18,10 @@ from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
 from laufruhe.files.reader import load_tables
 from laufruhe.files.toml_text import toml_text
+from laufruhe.live import decided
 from laufruhe.present.numbers import figure
 from laufruhe.present.pictures import PICTURES
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
@@ -157,6 +159,20 @@ def _standing(limit: Limit, value: float, price: float, found: Followed, scene: 
     (given,) = limit_values(scene.problem.changed(limits=(limit,)), scene.given)
     moves = limit.measure.channel.is_moved_by(kinds_of(scene.problem))
     return replace(given, value=math.nan, active=False, shadow_price=math.nan) if moves else given
+
+
+def measure(source: Source, asked: Asked) -> str:
+    """The design that is shown by the exact model: objective and limits, those too that do not follow sliders."""
+
+    def found() -> dict[str, Any]:
+        tables, whole = _asked_about(source, asked, with_held=True)
+        problem = replace(scene_of(whole, tables).problem, limits=whole.limits)
+        values = decided(problem, asked.design)
+        evaluation = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
+        limits = {limit.name: limit.value for limit in limit_values(problem, evaluation)}
+        return {"objective": objective_value(problem, evaluation) if problem.objective else None, "limits": limits}
+
+    return _said(found, source)
 
 
 def settle(source: Source, asked: Asked, seconds: float) -> str:

@@ -54,7 +54,7 @@ class Scene:
 
     def drawn(self, found: Followed | None) -> dict[str, Any]:
         """What the page draws from, with the optimum where it is known; why there is nothing to slide else."""
-        model = live_model(self.whole, self._result(found))
+        model = live_model(self.whole, self._result(found), is_served=True)
         about = {"engine": drawing_of(self.problem), "partners": list(partners(self.problem))}
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
 

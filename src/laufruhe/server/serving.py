@@ -52,10 +52,12 @@ class Page:
         self.watched = Watched(path)
         self.server = _listening(port, _files())
         self._seconds = seconds
-        self._follow, self._settle, self._front = Desk(_HASTE), Desk(_PATIENCE), Desk(_PATIENCE)
+        self._follow, self._measure = Desk(_HASTE), Desk(_HASTE)
+        self._settle, self._front = Desk(_PATIENCE), Desk(_PATIENCE)
         self.server.handles = {
             "/begin": self._begun,
             "/follow": self._asked(self._follow, FOLLOWED, answers.follow),
+            "/measure": self._asked(self._measure, FOLLOWED, answers.measure),
             "/settle": self._asked(self._settle, seconds + GRACE, answers.settle, seconds),
             "/save": self._asked(self._follow, FOLLOWED, answers.save),
             "/front": self._fronted,
@@ -89,7 +91,7 @@ class Page:
     def close(self) -> None:
         """End what works for it, and the server."""
         self.watched.close()
-        for desk in (self._follow, self._settle, self._front):
+        for desk in (self._follow, self._measure, self._settle, self._front):
             desk.close()
         self.server.server_close()
 

@@ -76,7 +76,6 @@ class Limits {
     const bar = element("i"), met = element("span", { class: "live-met" });
     const root = element("tr", { "data-measure": measure.name }, element("th", { scope: "row" }, measure.name), value, edge,
       element("td", {}, element("span", { class: "live-gauge", "aria-hidden": "true" }, bar), met));
-    root.classList.toggle("aside", !measure.followed);
     return { measure, root, value, edge, bar, met };
   }
 

@@ -17,12 +17,12 @@ function measured(model, x) {
 }
 
 /** How a value stands to a limit: the side that has least room, and whether it is kept; null where that is not known. */
-function standing(measure, value) {
+function standing(measure, value, isKnown) {
   const { signal, sides, followed } = measure;
-  if (signal === null) return { value, met: followed ? measure.met : null, side: sides[0] ?? null };
+  if (signal === null && followed) return { value, met: measure.met, side: sides[0] ?? null };
   const room = ([sense, edge]) => (sense === "at most" ? edge - value : value - edge) / (Math.abs(edge) || 1);
   const side = sides.reduce((a, b) => (a && room(a) <= room(b) ? a : b), null);
-  return { value, met: !side || room(side) >= -KEPT, side };
+  return { value, met: isKnown ? !side || room(side) >= -KEPT : null, side };
 }
 
 /** Measures of a role. */
@@ -30,19 +30,23 @@ function ofRole(model, role) {
   return model.measures.filter((measure) => measure.role === role);
 }
 
-/** What is known of one design: objective, limits, and what is minimised after it. */
-function judged(model, values) {
-  return judgedAt(model, vectorOf(model, values));
+/**
+ * What is known of one design: objective, limits, and what is minimised after it.
+ * @param {{values: object, objective: number | null, limits: object}} told what the exact model says of one design
+ */
+function judged(model, values, told) {
+  return judgedAt(model, vectorOf(model, values), isSame(model, values, told.values) ? told : null);
 }
 
-/** The same of a decision vector. */
-function judgedAt(model, x) {
+/** The same of a decision vector, and of what does not follow where that is told of it. */
+function judgedAt(model, x, told = null) {
   const found = measured(model, x), value = (measure) => found[model.measures.indexOf(measure)];
+  const known = (measure) => (measure.followed ? undefined : told?.limits[measure.name]) ?? value(measure);
   const terms = ofRole(model, "objective"), isKnown = terms.length > 0 && terms.every((measure) => measure.followed);
   return {
     x,
-    objective: isKnown ? terms.reduce((sum, measure) => sum + measure.weight * value(measure), 0) : null,
-    limits: ofRole(model, "limit").map((measure) => standing(measure, value(measure))),
+    objective: isKnown ? terms.reduce((sum, measure) => sum + measure.weight * value(measure), 0) : told?.objective ?? null,
+    limits: ofRole(model, "limit").map((measure) => standing(measure, known(measure), measure.followed || told !== null)),
     ranks: ofRole(model, "rank").map((measure) => ({ measure, value: value(measure) })),
   };
 }
@@ -82,13 +86,12 @@ function proofWords({ kind, gap }) {
 /**
  * How an objective stands to the optimum, in words.
  * @param told of an objective
- * @param {{value: number, isNothing: boolean, isOptimum: boolean, isBroken: boolean}} at the objective, whether the
- *   optimum is nothing, whether the design is the optimum, and whether it breaks a limit
+ * @param {{value: number, isNothing: boolean, isOptimum: boolean, isBroken: boolean, unknown: string[]}} at the objective,
+ *   whether the optimum is nothing, whether the design is the optimum, whether it breaks a limit, and limits not followed
  */
-function against(model, bound, told, at) {
+function against(bound, told, at) {
   const best = `the optimum of ${told(bound.value)} (${proofWords(bound)})`, less = at.value - bound.value;
-  const unknown = model.measures.filter((measure) => !measure.followed).map((measure) => measure.name);
-  const aside = unknown.length ? ` Not followed here: ${unknown.join(", ")}.` : "";
+  const aside = at.unknown.length ? ` Not followed here: ${at.unknown.join(", ")}.` : "";
   if (at.isOptimum) return `This is ${best}.`;
   if (Math.abs(less) <= AT * Math.abs(bound.value)) return `As much as ${best}.${aside}`;
   if (less < 0 && (aside || at.isBroken)) return `Less than ${best}, which keeps all limits.${aside}`;

@@ -18,6 +18,7 @@ class Page {
     this.optimum = this.known("optimum");
     this.given = this.known("given");
     this.bound = this.model.proved;
+    this.exact = { values: this.optimum ?? this.given, objective: this.bound?.value ?? null, limits: {} };
     this.size = sizeOf(this.model);
     // the address is that of the first model, whatever was moved since stays
     this.values = fitting(this.model, this.history ? this.values : fromAddress() ?? {}, this.optimum ?? this.given);
@@ -196,7 +197,7 @@ class Page {
     const { values, model } = this;
     if (this.isMoved) this.draw.compare();
     this.isMoved = false;
-    const found = judged(model, values);
+    const found = judged(model, values, this.exact);
     this.found = found;
     this.sliders.forEach((slider) => slider.show(values[slider.field.name]));
     this.value.textContent = found.objective === null ? "" : this.told(found.objective);
@@ -211,16 +212,16 @@ class Page {
   }
 
   showRegret({ objective }) {
-    const { bound } = this, broken = this.broken(), isNothing = bound && bound.value <= 1e-9 * this.size;
+    const { bound } = this, broken = this.standingSo(false), isNothing = bound && bound.value <= 1e-9 * this.size;
     this.regret.classList.toggle("broken", broken.length > 0);
     const more = broken.length > 2 ? ` and ${broken.length - 2} more` : "";
     const limits = broken.length ? `Breaks ${broken.slice(0, 2).join(", ")}${more}. ` : "";
     this.regret.textContent = limits;
     if (!bound || objective === null) return;
     const isOptimum = this.optimum !== null && isSame(this.model, this.values, this.optimum);
-    const at = { value: objective, isNothing, isOptimum, isBroken: broken.length > 0 };
+    const at = { value: objective, isNothing, isOptimum, isBroken: broken.length > 0, unknown: this.standingSo(null) };
     this.regret.setAttribute("data-value", (objective - bound.value) / (isNothing ? 1 : bound.value));
-    this.regret.textContent = limits + against(this.model, bound, (value) => this.told(value), at);
+    this.regret.textContent = limits + against(bound, (value) => this.told(value), at);
   }
 
   /** The objective in words; what is a rounding beside the designs known is nothing. */
@@ -228,13 +229,14 @@ class Page {
     return figure(value, this.model.objective, 4, this.size);
   }
 
-  /** Names of the limits that are broken. */
-  broken() {
-    return ofRole(this.model, "limit").filter((_, k) => this.found.limits[k].met === false).map((measure) => measure.name);
+  /** Names of the limits that are kept (true), broken (false), or not known (null). */
+  standingSo(met) {
+    return ofRole(this.model, "limit").filter((_, k) => this.found.limits[k].met === met).map((measure) => measure.name);
   }
 
   sentence() {
-    const broken = this.broken(), kept = this.found.limits.length ? "All limits are kept." : "";
+    const broken = this.standingSo(false), isKnown = !this.standingSo(null).length;
+    const kept = this.found.limits.length ? `All limits${isKnown ? "" : " that follow"} are kept.` : "";
     const limits = broken.length ? `Broken: ${broken.join(", ")}.` : kept;
     return `${this.model.objective.name} ${this.value.textContent}. ${limits}`;
   }
@@ -293,6 +295,15 @@ class Page {
     this.sliders.forEach((slider) => slider.setMark("optimum", this.optimum[slider.field.name]));
     this.best.hidden = false;
     this.isMoved = true;
+    this.askFrame();
+  }
+
+  /** Whether something is asked of a design that does not follow sliders. */
+  get isAside() { return this.model.measures.some((measure) => !measure.followed); }
+
+  /** What the exact model says of a design, where that does not follow. */
+  setExact(exact) {
+    this.exact = exact;
     this.askFrame();
   }
 

@@ -52,7 +52,8 @@ def figure(result: Result) -> Figure:
                 continue
             m, seen = chunk[column], turned if on_crank else 1.0
             _draw(axes, [factor * plane[:, m] * seen for plane in planes], series, factor * largest / FILLED)
-            name = f"bearing {names[m]}{', on the crankshaft' if on_crank else ''}"
+            # under the panel of its bearing
+            name = "on the crankshaft" if on_crank else f"bearing {names[m]}"
             axes.set_title(fitted(name, PANEL + 0.2), loc="left", size=SMALL, color=INK)
             across, up = ("across", "along") if on_crank else ("lateral", "vertical")
             axes.set(xlabel=f"{across} [{unit}]", ylabel="" if column else f"{up} [{unit}]")

@@ -15,7 +15,7 @@ from matplotlib.ticker import MultipleLocator
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.style import Series, entry, headed, page, series_of, styled
-from laufruhe.plots.words import FAINT, INK, aligned, empty, fitted, in_thousands, round_ticks, width_of
+from laufruhe.plots.words import FAINT, INK, aligned, empty, fitted, in_thousands, left_out, round_ticks, width_of
 from laufruhe.present.measures import hardest_point, has_firing, has_loads
 from laufruhe.solvers.result import Result
 
@@ -26,8 +26,8 @@ ALONE, BESIDE, NARROW, HIGH, GAP, ACROSS = 6.8, 4.0, 2.7, 1.1, 0.2, 0.25
 WIDTHS = (2.4, 1.4)
 # between two numbers [inch]
 DIGIT = 0.085
-# smaller shares of the largest component of a row, and of all, are roundings
-SHARE, NOTHING = 1e-6, 1e-9
+# a smaller share of the largest component of a row is a rounding
+SHARE = 1e-6
 applies = has_loads
 STYLES = ("-", (0, (4, 1.6)), (0, (1.2, 1.2)))
 
@@ -37,12 +37,16 @@ _LEGEND: Any = {"facecolor": "white", "edgecolor": "none", "framealpha": 0.85}
 
 @dataclass(frozen=True)
 class Row:
-    """What one panel shows: curves by their names, each of every design, shape (designs, angles), and its ends."""
+    """What one panel shows: curves by their names, each of every design, shape (designs, angles), and its ends.
+
+    What is too small to be drawn is told.
+    """
 
     label: str
     unit: str
     curves: Mapping[str, Array]
     ends: tuple[float, float]
+    left_out: str = ""
 
     @property
     def words(self) -> str:
@@ -60,7 +64,7 @@ def figure(result: Result) -> Figure:
     columns = [list(_rows(series, k, mounts, np.radians(degrees))) for k in shown]
     every = list(zip(*columns, strict=True))
     rows = [row for row in every if any(each.curves for each in row)]
-    balanced = [row[0].label for row in every if not any(each.curves for each in row)]
+    balanced = [row for row in every if not any(each.curves for each in row)]
     drawn = page(len(rows), len(shown), (wide, HIGH), gap=GAP, lead=0.1, across=ACROSS)
     for j, row in enumerate(rows):
         panels = drawn.panels[j * len(shown) : (j + 1) * len(shown)]
@@ -77,7 +81,8 @@ def figure(result: Result) -> Figure:
     aligned(drawn.panels[:: len(shown)])
     at = "" if len(result.problem.points) > 1 else f" at {result.problem.points[0].name}"
     what = "Loads on the block and forces on the mounts" if mounts else "Loads on the block"
-    none = f" None, so not shown: {', '.join(balanced)}." if balanced else ""
+    largest = [max(row, key=lambda each: each.ends[1]) for row in balanced]
+    none = f" Not shown: {', '.join(f'{row.label} ({row.left_out})' for row in largest)}." if balanced else ""
     marked, mark = ("the cylinders that fire", "a cylinder fires")
     if not has_firing(result):
         marked, mark = "the cylinders whose dead centre at the head end it is", "a dead centre at the head end"
@@ -135,10 +140,10 @@ def _rows(series: Sequence[Series], k: int, mounts: Sequence[int], angles: Array
     """Shaking force and moments about the origin (C2, C7), and the magnitude of every mount's force."""
     loads = [one.design.loads[k] for one in series]
     x, y, z, roll, pitch, yaw = np.moveaxis(np.stack([load.wrench.values(angles) for load in loads]), -1, 0)
-    nothing = NOTHING * max(float(np.abs(load.wrench.coefficients).max(initial=0.0)) for load in loads)
-    yield _row("shaking force", "N", {"vertical": z, "lateral": y, "longitudinal": x}, nothing)
-    yield _row("roll moment", "N m", {"": roll}, nothing)
-    yield _row("rocking couple", "N m", {"pitch": pitch, "yaw": yaw}, nothing)
+    most = max(float(np.abs(load.wrench.coefficients).max(initial=0.0)) for load in loads)
+    yield _row("shaking force", "N", {"vertical": z, "lateral": y, "longitudinal": x}, most)
+    yield _row("roll moment", "N m", {"": roll}, most)
+    yield _row("rocking couple", "N m", {"pitch": pitch, "yaw": yaw}, most)
     forces = [load.mount_forces.values(angles) for load in loads if load.mount_forces is not None]
     sizes = [np.linalg.norm(np.stack([force[:, m] for force in forces]), axis=-1) for m in mounts]
     # mounts are compared: one scale serves them all
@@ -147,9 +152,12 @@ def _rows(series: Sequence[Series], k: int, mounts: Sequence[int], angles: Array
         yield Row(series[0].design.mount_names[m], "N", {"": size}, (0.0, top))
 
 
-def _row(label: str, unit: str, curves: Mapping[str, Array], nothing: float) -> Row:
+def _row(label: str, unit: str, curves: Mapping[str, Array], most: float) -> Row:
     size = {name: float(np.abs(curve).max()) for name, curve in curves.items()}
-    least = max(SHARE * max(size.values()), nothing)
+    top = max(size.values())
+    if words := left_out(top, most, unit):
+        return Row(label, unit, {}, (0.0, top), words)
+    least = SHARE * top
     felt = {name: curve for name, curve in curves.items() if size[name] > least}
     ends = [float(end) for curve in felt.values() for end in (curve.min(), curve.max())]
     return Row(label, unit, felt, (min(ends, default=0.0), max(ends, default=0.0)))
@@ -167,7 +175,7 @@ def _draw(axes: Axes, row: Row, degrees: Array, colours: Sequence[str], factor: 
     round_ticks(axes.yaxis, 4)
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     if not row.curves:
-        empty(axes, "none: balanced")
+        empty(axes, row.left_out)
 
 
 def _firings(engine: Engine) -> dict[float, list[int]]:

@@ -33,7 +33,7 @@ def figure(result: Result) -> Figure:
     drawn = page(1, 1, (wide, 0.1 + (0.52 if uneven else 0.42) * len(shown)))
     axes = drawn.panels[0]
     for row, (k, order) in enumerate(shown):
-        _bar(axes, row, order, cycle / count, BEST if k == 0 else NEXT)
+        _bar(axes, row, order, uneven, BEST if k == 0 else NEXT)
     axes.set_yticks([-row for row in range(len(shown))], [f"star {k + 1}" for k, _ in shown])
     axes.set(xlim=(0.0, cycle), ylim=(0.5 - len(shown), 0.5), xlabel="crank angle [°]")
     axes.set_xticks(np.linspace(0.0, cycle, 9 if cycle > 400 else 5))
@@ -54,7 +54,7 @@ def _shown(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:
     return (own + others)[:SHOWN]
 
 
-def _bar(axes: Axes, row: int, order: RankedOrder, even: float, shades: tuple[str, str]) -> None:
+def _bar(axes: Axes, row: int, order: RankedOrder, uneven: bool, shades: tuple[str, str]) -> None:
     start, count = 0.0, len(order.order)
     letters = axes.bbox.width / axes.figure.dpi / count
     for k, (cylinder, interval) in enumerate(zip(order.order, order.intervals, strict=True)):
@@ -62,7 +62,7 @@ def _bar(axes: Axes, row: int, order: RankedOrder, even: float, shades: tuple[st
         shade = shades[k % 2]
         axes.barh(-row, width, 0.78, left=start, color=shade, edgecolor="white", linewidth=1.0)
         words: Any = {"ha": "center", "va": "center", "color": ink_on(shade), "size": SMALL}
-        told = f"{width:.1f}" if abs(width - even) > 1e-6 * even else ""
+        told = f"{width:.1f}" if uneven else ""
         if width_of(told) > letters - 0.04:
             told = f"{width:.0f}"
         up = 0.19 if told else 0.0

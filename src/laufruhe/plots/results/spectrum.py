@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.plots.style import headed, page, point_name, series_of, styled
-from laufruhe.plots.words import empty, in_thousands, round_ticks
+from laufruhe.plots.words import empty, in_thousands, left_out, round_ticks
 from laufruhe.present.measures import hardest_point, has_loads, main_load, mount_orders, padded
 from laufruhe.problem.loads import PointLoads
 from laufruhe.solvers.result import Result
@@ -36,12 +36,15 @@ def figure(result: Result) -> Figure:
     base = float(main_load(series[0].design.loads[k]).base)
     amplitudes = [_seen([measure(one.design.loads[k]) for one in series], base) for _, _, measure in panels]
     last = base * max(len(values[0]) - 1 for values in amplitudes)
+    tops = [max(float(each.max(initial=0.0)) for each in values) for values in amplitudes]
     drawn = page(len(panels), 1, (6.8, 3.2 if len(panels) == 1 else 1.5), gap=0.25)
-    for axes, (label, unit, _), values in zip(drawn.panels, panels, amplitudes, strict=True):
-        factor, unit = in_thousands(max(float(each.max(initial=0.0)) for each in values), unit)
-        values = [factor * each for each in values]
-        _bars(axes, values, base, [one.colour for one in series])
-        _frame(axes, f"{label} [{unit}]", values, last)
+    for axes, (label, unit, _), values, top in zip(drawn.panels, panels, amplitudes, tops, strict=True):
+        words, (factor, shown) = left_out(top, max(tops), unit), in_thousands(top, unit)
+        _frame(axes, f"{label} [{shown}]", factor * top, last)
+        if words:
+            empty(axes, words)
+        else:
+            _bars(axes, [factor * each for each in values], base, [one.colour for one in series])
         axes.tick_params(labelbottom=axes is drawn.panels[-1])
     drawn.panels[-1].set_xlabel("order, multiples of crank speed")
     title = "Mount forces by order" if with_mounts else "Shaking force and couples by order"
@@ -85,12 +88,9 @@ def _bars(axes: Axes, series: list[Array], base: float, colours: list[str]) -> N
         axes.bar(places, values[drawn], width, color=colour, linewidth=0)
 
 
-def _frame(axes: Axes, label: str, series: list[Array], last: float) -> None:
-    top = max(float(values.max(initial=0.0)) for values in series)
+def _frame(axes: Axes, label: str, top: float, last: float) -> None:
     axes.set(xlim=(-0.6, max(last, SHORTEST) + 0.6), ylim=(0.0, 1.1 * top if top > 0.0 else 1.0), ylabel=label)
     axes.xaxis.set_major_locator(MaxNLocator(12, integer=True, steps=[1, 2, 5, 10]))
     round_ticks(axes.yaxis, 5)
     axes.grid(axis="x", visible=False)
     axes.tick_params(axis="x", length=2)
-    if top <= 0.0:
-        empty(axes, "none: balanced")

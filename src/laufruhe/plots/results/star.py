@@ -13,6 +13,7 @@ from matplotlib.patches import Circle
 from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.present.measures import has_ranking, ranking_of
+from laufruhe.present.numbers import figure as told
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import RankedStar
@@ -44,7 +45,7 @@ def figure(result: Result) -> Figure:
 def _title(result: Result, star: RankedStar, k: int) -> str:
     unit, scale = (result.objective.unit, result.objective.initial) if result.objective else ("", 0.0)
     built = f", with {', '.join(star.shafts)}" if star.shafts else ""
-    return f"{k + 1}. {number(star.value, scale=scale)} {unit}{built}"
+    return f"{k + 1}. {told(star.value, unit, scale=scale)}{built}"
 
 
 def _balance(star: RankedStar) -> str:

@@ -218,8 +218,17 @@ function designed() {
 
 function drawDesign() {
   if (!state.handle) return;
+  clearTimeout(state.measuring);
+  if (state.handle.isAside) state.measuring = setTimeout(() => measure().catch(failed), RETRY);
   engine.follow(state.handle.design());
   comparison.tell(state.handle.measures());
+}
+
+/** What of the design that is shown no slider moves in proportion, by the exact model. */
+async function measure() {
+  const values = state.handle.design();
+  const found = await ask("measure", { edits: [...state.edits.values()], held: state.held, design: values });
+  if (found.limits && !state.gone) state.handle?.setExact({ ...found, values });
 }
 
 /** @param {unknown} error */

@@ -19,6 +19,7 @@ export const state = {
   asking: false,
   again: false,
   resting: 0,
+  measuring: 0,
   writing: 0,
   serial: 0,
   dropped: 0,
