@@ -7,6 +7,7 @@ import math
 import pytest
 
 import laufruhe
+from laufruhe.problem.evaluation import evaluate, objective_value
 
 # of a six-cylinder only order 6 is left, along one line: the mean of |cos 6 phi| has corners between the angles
 SIX = """
@@ -47,3 +48,18 @@ def test_corners_between_the_angles_neither_open_a_gap_nor_raise_a_bound(samples
     assert result.certificate.gap <= 1e-4
     # the mean over the whole cycle, not over angles that favour it
     assert (1.0 - 2e-4) * truth <= result.certificate.lower_bound <= truth * (1.0 + 1e-9)
+
+
+@pytest.mark.slow
+def test_more_angles_leave_the_gas_its_steps() -> None:
+    """What is told is what whoever evaluates the file finds at as many angles."""
+    single = SIX.replace("cylinders = 6", "cylinders = 1").replace("opposite_throw = 5", "opposite_throw = 1")
+    gas = '[gas]\nmodel = "seiliger"\npeak_pressure = "60 bar"\nimep = "7 bar"\n[fidelity]\nsamples = 96\n'
+    bearings = '[[main_bearings]]\nx = "60 mm"\n[[main_bearings]]\nx = "-60 mm"\n'
+    text = single.replace("shaking force", "main-bearing force").replace("stroke =", 'bore = "90 mm"\nstroke =')
+    problem = laufruhe.load(text + gas + bearings)
+    result = laufruhe.solve(problem)
+    assert result.objective is not None
+    assert result.final.samples > 96
+    again = evaluate(problem, result.final.engine, result.final.samples)
+    assert objective_value(problem, again) == pytest.approx(result.objective.value, rel=1e-12)

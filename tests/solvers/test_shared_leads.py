@@ -125,6 +125,25 @@ def test_gas_that_is_not_felt_hinders_no_lead() -> None:
     assert str(with_gas.certificate.kind) == "global"
 
 
+ARMS = {"count": 5, "at_rim": ["30 mm", "40 mm"], "at_hub": ["60 mm", "20 mm"], "hub_diameter": "80 mm"}
+RIM = {"mean_diameter": "300 mm", "width": "60 mm", "height": "40 mm", "arms": ARMS}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", [0, 60])
+def test_a_lead_moves_the_mean_torque_that_arms_hand_on(start: float) -> None:
+    """So a limit on their stress neither excludes every lead for the one given, nor is taken as kept for it."""
+    limit = {"limit": "arm stress", "max": "13.5 MPa"}
+    more = {"flywheel": {"rim": RIM}, "operating_points": [{"speed": "300 rpm"}]}
+    stress = [
+        evaluate(own).excess(own.limits)
+        for own in (problem("rms shaking force", lead, constraints=[limit], **more) for lead in (0, 60))
+    ]
+    assert stress[0] > 0.0 > stress[1]
+    with pytest.raises(ModelError, match=r"lead together for .* arm stress"):
+        laufruhe.solve(problem("rms shaking force", between(0, 60, start=start), constraints=[limit], **more))
+
+
 @pytest.mark.parametrize(
     ("more", "quantity", "words"),
     [

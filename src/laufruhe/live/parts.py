@@ -200,10 +200,13 @@ def _curve(curve: Curve) -> dict[str, Any]:
 
 
 def _measure(shown: Shown) -> dict[str, Any]:
-    return {**asdict(shown), **with_unit(shown.unit)}
+    return {**asdict(shown), "value": _told(shown.value), **with_unit(shown.unit)}
 
 
 def _design(design: Design) -> dict[str, Any]:
-    # on a resonance there is no number
-    told = [None if value is None or not np.isfinite(value) else value for value in design.measured]
-    return {"x": design.x, "measured": told}
+    return {"x": design.x, "measured": [_told(value) for value in design.measured]}
+
+
+def _told(value: float | None) -> float | None:
+    """On a resonance there is no number, nor of a shaft that was left out."""
+    return None if value is None or not np.isfinite(value) else value

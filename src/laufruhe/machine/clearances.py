@@ -45,13 +45,14 @@ def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: 
     ----------
     names
         Shafts that count: one alone from the crankshaft, all where None. One of two is a balancer shaft.
+        An engine may lack one that is optional.
     swept
         Whether what the weights and throws of both sweep is taken off.
     """
     low, high = _shafts(lower), _shafts(upper)
     counted = low if names is None else (*names, CRANKSHAFT.name) if len(names) == 1 else names
     out = []
-    for a, b in itertools.combinations(counted, 2):
+    for a, b in itertools.combinations((name for name in counted if name in low), 2):
         if low[a].balances or low[b].balances:
             taken = low[a].radius + low[b].radius if swept else 0.0
             least, most = _apart((low[a].shaft, low[b].shaft), (high[a].shaft, high[b].shaft))
@@ -64,7 +65,7 @@ def reaches(names: Sequence[str] | None, lower: Engine, upper: Engine) -> list[S
     low, high, origin = _shafts(lower), _shafts(upper), Shaft("origin")
     out = []
     for name in low if names is None else names:
-        if low[name].balances:
+        if name in low and low[name].balances:
             least, most = _apart((low[name].shaft, origin), (high[name].shaft, origin))
             out.append((least + low[name].radius, most + low[name].radius))
     return out

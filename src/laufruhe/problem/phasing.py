@@ -101,12 +101,15 @@ class ShaftChoice:
         Shafts that may be built; infinite when not limited.
     most_mass
         [kg].
+    clashes
+        Sets, one or several, that may not be built together for where they stand.
     """
 
     optional: tuple[tuple[str, ...], ...] = ()
     masses: tuple[float, ...] = ()
     most: float = math.inf
     most_mass: float = math.inf
+    clashes: tuple[tuple[int, ...], ...] = ()
 
     @property
     def allowed(self) -> tuple[tuple[int, ...], ...]:
@@ -121,8 +124,10 @@ class ShaftChoice:
         return tuple(b for b in self.allowed if not any(set(b) < set(other) for other in self.allowed))
 
     def allows(self, built: Sequence[int]) -> bool:
-        """Whether these sets keep the limits on number and mass."""
+        """Whether these sets keep the limits on number and mass, and have room beside each other."""
         number = sum(len(self.optional[k]) for k in built)
+        if any(set(clash) <= set(built) for clash in self.clashes):
+            return False
         return number <= self.most and sum(self.masses[k] for k in built) <= self.most_mass * (1.0 + 1e-12)
 
 

@@ -28,6 +28,7 @@ from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.mounts.convex import is_convex, solve_convex_mounts
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.runs import solve_runs
+from laufruhe.solvers.stars.rooms import with_room
 from laufruhe.solvers.tolerances.assembly import solve_assembly
 from laufruhe.solvers.tolerances.robust import solve_robust
 
@@ -314,7 +315,8 @@ def _decided(problem: Problem) -> Result:
         given = evaluate_start(problem)
         # what cannot be evaluated is refused first
         objective_value(problem, given)
-        broken = broken_limits(fixed, given)
+        problem, least = with_room(problem, fixed, given)
+        broken = broken_limits(fixed, least)
         if broken:
             return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)

@@ -15,18 +15,27 @@ from laufruhe.problem.decision import Kind
 
 @dataclass(frozen=True, eq=False)
 class FlywheelChannel(NumberChannel):
-    """A number that goes one way with every number of the flywheel."""
+    """A number that goes one way with every number of the flywheel.
+
+    Attributes
+    ----------
+    of_work
+        Whether the mean torque is in it, which leads between shared chambers and rods of another length move too.
+    """
+
+    of_work: bool = False
 
     def is_moved_by(self, kinds: Collection[Kind]) -> bool:
         """The flywheel, discs where it follows from them, and all that moves the torque where that counts."""
-        moving = {Kind.FLYWHEEL} | ({Kind.STAR, Kind.PISTON, Kind.SIZE, Kind.LEAD} if self.of_torque else set())
+        moving = {Kind.FLYWHEEL} | ({Kind.SIZE, Kind.LEAD} if self.of_work or self.of_torque else set())
+        moving |= {Kind.STAR, Kind.PISTON} if self.of_torque else set()
         # a rim is no disc of the crankshaft
         return bool((moving | ({Kind.TORSION} if self.of_inertia else set())) & set(kinds))
 
 
 def _found(
     name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
-    needs: Needs = Needs.FLYWHEEL, rises: bool = True, of_torque: bool = False,
+    needs: Needs = Needs.FLYWHEEL, rises: bool = True, of_torque: bool = False, of_work: bool = False,
 ) -> FlywheelChannel:  # fmt: skip
     """The largest of a number of the flywheel over the operating points that count."""
 
@@ -41,7 +50,8 @@ def _found(
         return () if inertia is None else (of_wheel(measure, evaluation)(wheel or Flywheel(inertia)),)
 
     return FlywheelChannel(
-        name, unit, keys, needs, values=values, of_wheel=of_wheel, rises=rises, of_torque=of_torque
+        name, unit, keys, needs, values=values, of_wheel=of_wheel, rises=rises, of_torque=of_torque,
+        of_work=of_work,
     )  # fmt: skip
 
 
@@ -54,6 +64,7 @@ FLYWHEEL_INERTIA = _found("flywheel inertia", "kg m^2", lambda wheel, _: wheel.i
 FLYWHEEL_MASS = _found("flywheel mass", "kg", lambda wheel, _: wheel.ring.whole * wheel.ring.mass, needs=Needs.RIM)
 RIM_STRESS = _found("rim stress", "Pa", lambda wheel, swing: wheel.ring.stress(swing.speed), AT, Needs.RIM)
 ARM_STRESS = _found(
-    "arm stress", "Pa", lambda wheel, swing: wheel.ring.arm_stress(swing.speed, swing.torque), AT, Needs.ARMS
-)
+    "arm stress", "Pa", lambda wheel, swing: wheel.ring.arm_stress(swing.speed, swing.torque), AT, Needs.ARMS,
+    of_work=True,
+)  # fmt: skip
 OF_FLYWHEEL = (IRREGULARITY, FLYWHEEL_INERTIA, FLYWHEEL_MASS, RIM_STRESS, ARM_STRESS)

@@ -196,6 +196,7 @@ def _shafts(built: Any, shafts: ShaftChoice) -> list[Any]:
         held.append(np.array([len(names) for names in shafts.optional], dtype=float) @ built <= shafts.most)
     if np.isfinite(shafts.most_mass):
         held.append(np.array(shafts.masses) @ built <= shafts.most_mass)
+    held += [sum(built[k] for k in clash) <= len(clash) - 1 for clash in shafts.clashes]
     return held
 
 

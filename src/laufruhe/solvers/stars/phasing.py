@@ -113,7 +113,9 @@ def _with_more_angles(problem: Problem, families: Sequence[Family], result: Resu
             break
         # averages about angles fall short of means by the square of their step
         times = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), FINER)
-        problem = problem.at(replace(problem.fidelity, samples=times * problem.fidelity.samples))
+        own = problem.fidelity
+        # the gas keeps its steps: a design is worth the same at as many angles, whoever evaluates it
+        problem = problem.at(replace(own, samples=times * own.samples, gas_samples=own.gas_steps))
         assert problem.phasing is not None
         answer = searched(replace(problem, tolerance=_share(problem)), problem.phasing, families)
         found = _best_of(problem, problem.phasing, answer) if answer.designs else result

@@ -1,0 +1,76 @@
+"""Limits on where shafts stand beside optional shafts: what is left out breaks none, whatever decides the rest."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from laufruhe.files.reader import load_tables
+from laufruhe.solvers import solve
+from laufruhe.solvers.result import Result
+
+
+def _shaft(name: str, ratio: int, y: str) -> dict[str, Any]:
+    unbalance = {"between": ["0 kg m", "0.02 kg m"]}
+    weight = {"x": "0 mm", "radius": "20 mm", "unbalance": unbalance, "angle": {"between": [0, 360]}}
+    return {"name": name, "ratio": ratio, "position": [y, "-60 mm"], "optional": True, "shaft_mass": "1 kg",
+            "unbalances": [weight]}  # fmt: skip
+
+
+def _solved(limits: list[dict[str, Any]], throws: Any = (0, 180, 180, 0), **phasing: Any) -> Result:
+    engine = {"layout": "inline", "cycle": "four-stroke", "stroke": "100 mm", "rod_ratio": 0.25}
+    engine |= {"reciprocating_mass": "1 kg", "cylinder_spacing": "110 mm"}
+    engine |= {"throws": list(throws)} if throws != "open" else {"throws": "open", "cylinders": 4}
+    found = {
+        "title": "Four with two shafts that may be left out", "engine": engine,
+        "operating_points": [{"speed": "3000 rpm"}], "objective": {"minimise": "rms shaking force"},
+        "balancer_shafts": [_shaft("near", 2, "60 mm"), _shaft("far", -2, "-400 mm")], "constraints": limits,
+        "phasing": phasing,
+    }  # fmt: skip
+    return solve(load_tables(found, Path("rooms.toml")))
+
+
+def _built(result: Result) -> dict[str, float]:
+    return {d.name.split()[0]: d.value for d in result.decisions if d.name.endswith(" built")}
+
+
+LIMITS = {
+    "one is beyond the envelope": ({"limit": "envelope radius", "max": "200 mm"}, ("far",)),
+    "one is too near the crank": ({"limit": "shaft distance", "of": ["near"], "min": "90 mm"}, ("near",)),
+    "two are too near": ({"limit": "shaft distance", "of": ["near", "far"], "min": "470 mm"}, ()),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("throws", "method"), [((0, 180, 180, 0), "auto"), ("open", "auto"), ("open", "program")])
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_shaft_without_room_is_left_out(name: str, throws: Any, method: str) -> None:
+    """Half of the force is left where one shaft is built: either does as well, the one that has room is taken."""
+    limit, gone = LIMITS[name]
+    result = _solved([limit], throws, method=method, time_limit="60 s")
+    assert result.certificate is not None
+    # the program sees few angles
+    assert result.certificate.gap <= (0.02 if method == "program" else 1e-4)
+    assert sum(_built(result).values()) == 1.0
+    assert all(_built(result)[shaft] == 0.0 for shaft in gone)
+    free = _solved([], throws, most_shafts=1)
+    assert result.objective is not None
+    assert free.objective is not None
+    assert math.isclose(result.objective.value, free.objective.value, rel_tol=1e-3)
+
+
+def test_shafts_that_are_wanted_and_have_no_room_are_named() -> None:
+    """Where the force is limited too, no choice is left."""
+    most = {"limit": "rms shaking force", "max": "1000 N", "name": "force"}
+    result = _solved([LIMITS["one is beyond the envelope"][0], most])
+    assert str(result.status) == "infeasible"
+
+
+def test_a_limit_may_name_a_shaft_that_is_not_built() -> None:
+    """Of it there is no distance, and nothing is broken."""
+    result = _solved([{"limit": "shaft distance", "of": ["near", "far"], "min": "470 mm"}], most_shafts=1)
+    assert result.limits[0].value == math.inf
+    assert not result.limits[0].active
